@@ -1,0 +1,72 @@
+"""Every exception that dh2sim raises on purpose; this module imports nothing of the package."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+class Dh2simError(Exception):
+    """Base of all of them; its text is fit to be shown to a user as it is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, order=True)
+class Problem:
+    """One thing that is wrong in a robot file, and where."""
+
+    file: str
+    """Name of the file as the user gave it."""
+    line: int
+    """Line, counted from 1."""
+    column: int
+    """Column, counted from 1."""
+    path: str
+    """Path of the key, such as ``joints[2].limits.position``; empty for the whole file."""
+    message: str
+    """What was found and what is allowed."""
+
+    def __str__(self) -> str:
+        """Return ``file:line:column: path: message``."""
+        where = f"{self.file}:{self.line}:{self.column}: "
+        return f"{where}{self.path}: {self.message}" if self.path else f"{where}{self.message}"
+
+
+class RobotFileError(Dh2simError):
+    """A robot file is wrong; ``problems`` holds everything that is, in the order of the file."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        """Keep the problems sorted by place; the text has a line for each."""
+        self.problems = tuple(sorted(problems))
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class UnknownRobotError(Dh2simError):
+    """Neither a file nor a robot that comes with dh2sim has this name."""
+
+
+class UnknownFrameError(Dh2simError):
+    """The robot has no frame of this name."""
+
+
+class ConfigurationError(Dh2simError, ValueError):
+    """A joint vector has the wrong shape or holds something that is no finite number."""
+
+
+class MeshError(Dh2simError):
+    """A mesh cannot be used."""
+
+
+class ModelError(Dh2simError):
+    """The robot is well described, but a format or an engine cannot hold it."""
+
+
+class EngineError(Dh2simError):
+    """An engine refused a model file."""
+
+
+class OutputError(Dh2simError):
+    """Files could not be written; what stood there before stands untouched."""
+
+
+class MismatchError(Dh2simError):
+    """A written model does not match its table; nothing was put in place."""

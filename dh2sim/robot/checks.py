@@ -1,0 +1,135 @@
+"""Checks between parts of a robot file; each works on what is well-formed and leaves the rest alone."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from dh2sim.robot.document import Node
+from dh2sim.robot.fields import name_problem
+from dh2sim.robot.report import Loc, Report
+from dh2sim.robot.rows import RowView, choice_at, number_at, row_views
+from dh2sim.robot.spec import ActuatorType, JointType
+from dh2sim.robot.words import listed, shown
+
+_RESERVED: Final = re.compile(r"base_link-base|flange-tool0|base_link-dh_0|link_[0-9]+-(flange|dh_[0-9]+)")
+_SLACK: Final = 1e-12
+"""By which a configuration may pass a limit, of the larger of the two limits' sizes."""
+_TAKEN_BY: Final = {
+    "kp": (ActuatorType.POSITION,),
+    "kv": (ActuatorType.POSITION, ActuatorType.VELOCITY),
+}
+"""Which actuators a gain is for."""
+
+
+def check(root: Node, names: Mapping[str, float], report: Report) -> None:
+    """Note in ``report`` what does not go together; ``names`` are the evaluated parameters."""
+    rows = row_views(root, names)
+    _check_names(rows, report)
+    for row in rows:
+        _check_type(row, report)
+    _check_configurations(root, rows, names, report)
+    _check_actuators(root, rows, report)
+
+
+def _at_key(root: Node, loc: Loc, report: Report, message: str) -> None:
+    entry = root.entry(*loc)
+    if entry is not None:
+        report.add(entry.line, entry.column, loc, message)
+
+
+def _check_names(rows: Sequence[RowView], report: Report) -> None:
+    """Joint names are unique, and none is one that the exports need."""
+    first: dict[str, RowView] = {}
+    for row in rows:
+        if row.name is None:
+            continue
+        given = row.node.at("name")
+        place = given or row.node
+        loc: Loc = ("joints", row.index, "name") if given else ("joints", row.index)
+        if _RESERVED.fullmatch(row.name):
+            message = f"{shown(row.name)} is the name of a fixed joint in the exports; choose another"
+            report.add(place.line, place.column, loc, message)
+        other = first.setdefault(row.name, row)
+        if other is not row:
+            line = (other.node.at("name") or other.node).line
+            what = "joint name" if given else "default joint name"
+            message = f"duplicate {what} {shown(row.name)}; joints[{other.index}] on line {line} has it already"
+            report.add(place.line, place.column, loc, message)
+
+
+def _check_type(row: RowView, report: Report) -> None:
+    """A row has nothing that its type has no use for."""
+    node, here = row.node, ("joints", row.index)
+    if row.type is JointType.CONTINUOUS and (entry := node.entry("limits", "position")):
+        message = "a continuous joint has no position limits; make it revolute or remove them"
+        report.add(entry.line, entry.column, (*here, "limits", "position"), message)
+    if row.type is not JointType.FIXED:
+        return
+    for key in ("flip", "limits", "dynamics", "actuator"):
+        entry = node.entry(key)
+        if entry is not None and (key != "flip" or entry.value.value is True):
+            message = f"a fixed row does not move: it takes no '{key}'"
+            report.add(entry.line, entry.column, (*here, key), message)
+
+
+def _check_configurations(root: Node, rows: Sequence[RowView], names: Mapping[str, float], report: Report) -> None:
+    """Configurations have proper names, a value for each moving row, and each value within its limits."""
+    node = root.at("configurations")
+    if node is None or not isinstance(node.value, dict):
+        return
+    moving = [row for row in rows if row.type is not JointType.FIXED]
+    countable = root.at("joints") is not None and all(row.type is not None for row in rows)
+    for name, entry in node.value.items():
+        if problem := name_problem(name, "the name of a configuration"):
+            report.add(entry.line, entry.column, ("configurations",), problem)
+        values = entry.value
+        loc: Loc = ("configurations", name)
+        if not countable or not isinstance(values.value, list):
+            continue
+        if len(values.value) != len(moving):
+            joints = listed(row.name or f"joints[{row.index}]" for row in moving)
+            expected = f"expected {len(moving)} numbers, one for each moving row ({joints})"
+            message = f"{expected}, found {len(values.value)}"
+            report.add(values.line, values.column, loc, message)
+            continue
+        for index, (value, row) in enumerate(zip(values.value, moving, strict=True)):
+            if outside := _outside(number_at(value, names), row):
+                report.add(value.line, value.column, (*loc, index), outside)
+
+
+def _outside(value: float, row: RowView) -> str | None:
+    """Return a complaint about a coordinate outside a row's position limits, or None."""
+    if row.position is None or row.type is JointType.CONTINUOUS:
+        return None
+    lower, upper = row.position
+    slack = _SLACK * max(abs(lower), abs(upper))
+    if math.isnan(slack) or lower >= upper or not (value < lower - slack or value > upper + slack):
+        return None
+    return f"{value!r} is outside the limits of {row.name or f'joints[{row.index}]'}: {lower!r} to {upper!r}"
+
+
+def _check_actuators(root: Node, rows: Sequence[RowView], report: Report) -> None:
+    """An actuator has only the gains that its type uses."""
+    default = _actuator_type(root.at("actuators"), ActuatorType.POSITION)
+    _check_gains(root, ("actuators",), default, report)
+    for row in rows:
+        if row.type is not JointType.FIXED:
+            place: Loc = ("joints", row.index, "actuator")
+            _check_gains(root, place, _actuator_type(root.at(*place), default), report)
+
+
+def _actuator_type(node: Node | None, inherited: ActuatorType | None) -> ActuatorType | None:
+    """Return an actuator's type; None where it is wrong."""
+    if node is None or node.at("type") is None:
+        return inherited
+    return choice_at(node.at("type"), ActuatorType)
+
+
+def _check_gains(root: Node, loc: Loc, kind: ActuatorType | None, report: Report) -> None:
+    for gain, kinds in _TAKEN_BY.items():
+        if kind is not None and kind not in kinds:
+            message = f"an actuator of type '{kind}' takes no {gain}; {gain} is for {' and '.join(kinds)}"
+            _at_key(root, (*loc, gain), report, message)

@@ -1,0 +1,196 @@
+"""YAML text to a tree of nodes.
+
+Only what a robot file needs is accepted: one document of mappings with text keys, lists and scalars. Depth
+and the number of nodes with aliases expanded are bounded, so that no file takes long to refuse.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, NoReturn
+
+from ruamel.yaml import YAML, events
+from ruamel.yaml.error import MarkedYAMLError, StringMark
+from ruamel.yaml.events import Event, NodeEvent, ScalarEvent
+
+from dh2sim.robot.document import NOT_PRINTABLE, Entry, Node, Value
+from dh2sim.robot.report import Loc, Report
+from dh2sim.robot.scalars import resolve_plain
+from dh2sim.robot.words import shown
+
+MAX_DEPTH: Final = 32
+MAX_NODES: Final = 50_000
+
+
+def compose(text: str, report: Report) -> Node:
+    """Return the tree of a YAML document; problems that leave a tree are noted in ``report``.
+
+    Raises:
+        RobotFileError: There is no tree, with everything noted so far.
+    """
+    composer = _Composer(report)
+    for event in _events(text, report):
+        composer.take(event)
+    if composer.root is None:
+        report.add(1, 1, (), "the file is empty; a robot needs at least name, convention and joints")
+        raise report.error()
+    return composer.root
+
+
+def _events(text: str, report: Report) -> Iterator[Event]:
+    """Yield ruamel's events; whatever it raises becomes a problem of the file."""
+    mark: StringMark | None = None
+    try:
+        for event in YAML(typ="safe", pure=True).parse(text):
+            mark = event.start_mark
+            yield event
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark or mark
+        message = ", ".join(" ".join(str(part).split()) for part in (error.problem, error.context) if part)
+    except Exception:  # ruamel lets some of Python's own through, such as chr()'s for "\Uffffffff"
+        message = "an escape or a character that stands for nothing"
+    else:
+        return
+    line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+    lines = text.split("\n")
+    if line <= len(lines) and re.match(r" *\t", lines[line - 1]):
+        message = "a tab in the indentation; YAML is indented with spaces"
+    report.add(line, column, (), f"not valid YAML: {message}")
+    raise report.error() from None
+
+
+@dataclass(slots=True)
+class _Frame:
+    """A collection that is still open."""
+
+    node: Node
+    anchor: str | None
+    key: tuple[str | None, Node] | None = None
+    """Key whose value comes next; its name is None where the key is wrong."""
+    size: int = 1
+    height: int = 1
+
+    def part(self) -> Loc:
+        """Return the key or index of what comes next; nothing where a key comes next."""
+        if isinstance(self.node.value, list):
+            return (len(self.node.value),)
+        return () if self.key is None else (self.key[0] or str(self.key[1].value),)
+
+
+class _Composer:
+    """Turns events into nodes, without recursion."""
+
+    def __init__(self, report: Report) -> None:
+        self.root: Node | None = None
+        self._report = report
+        self._stack: list[_Frame] = []
+        self._anchors: dict[str, tuple[Node, int, int] | None] = {}
+        """Node, size and height; None while the anchored node is still open."""
+        self._total = 0
+
+    def take(self, event: Event) -> None:
+        """Take the next event."""
+        match event:
+            case events.DocumentStartEvent():
+                if self.root is not None:
+                    self._fail(event, "a second YAML document; a robot file holds one")
+                if getattr(event, "version", None) not in (None, (1, 2)):
+                    self._fail(event, "only YAML 1.2 is read")
+            case events.AliasEvent():
+                self._alias(event)
+            case events.ScalarEvent():
+                self._attach(self._scalar(event), event.anchor, 1, 1)
+            case events.MappingStartEvent():
+                self._open(event, {})
+            case events.SequenceStartEvent():
+                self._open(event, [])
+            case events.CollectionEndEvent():
+                frame = self._stack.pop()
+                self._attach(frame.node, frame.anchor, frame.size, frame.height)
+
+    def _loc(self) -> Loc:
+        return tuple(part for frame in self._stack for part in frame.part())
+
+    def _fail(self, event: Event, message: str) -> NoReturn:
+        mark = event.start_mark
+        self._report.add(mark.line + 1, mark.column + 1, self._loc(), message)
+        raise self._report.error()
+
+    def _count(self, event: Event, size: int, height: int) -> None:
+        self._total += size
+        if self._total > MAX_NODES:
+            self._fail(event, f"more than {MAX_NODES} values (aliases counted each time)")
+        if len(self._stack) + height > MAX_DEPTH:
+            self._fail(event, f"nested deeper than {MAX_DEPTH} levels")
+
+    def _node(self, event: NodeEvent, value: Value) -> Node:
+        self._count(event, 1, 1)
+        node = Node(event.start_mark.line + 1, event.start_mark.column + 1, value)
+        tag = getattr(event, "tag", None)
+        if tag is not None:
+            written = shown(tag.replace("tag:yaml.org,2002:", "!!"))
+            self._fail(event, f"tag {written} is not allowed; write the value alone")
+        return node
+
+    def _scalar(self, event: ScalarEvent) -> Node:
+        plain = event.style is None
+        node = self._node(event, resolve_plain(event.value) if plain else event.value)
+        if not plain and (found := NOT_PRINTABLE.search(event.value)):
+            self._fail(event, f"control character U+{ord(found.group()):04X} is not allowed")
+        return node
+
+    def _open(self, event: NodeEvent, value: Value) -> None:
+        if event.anchor:
+            self._anchors[event.anchor] = None
+        self._stack.append(_Frame(self._node(event, value), event.anchor))
+
+    def _alias(self, event: NodeEvent) -> None:
+        if event.anchor not in self._anchors:
+            self._fail(event, f"alias {shown(event.anchor)} has no anchor before it")
+        anchored = self._anchors[event.anchor]
+        if anchored is None:
+            self._fail(event, f"alias {shown(event.anchor)} stands inside its own anchor")
+        node, size, height = anchored
+        self._count(event, size, height)
+        self._attach(node, None, size, height, event)
+
+    def _attach(self, node: Node, anchor: str | None, size: int, height: int, at: Event | None = None) -> None:
+        if anchor:
+            self._anchors[anchor] = (node, size, height)
+        if not self._stack:
+            self.root = node
+            return
+        frame = self._stack[-1]
+        frame.size += size
+        frame.height = max(frame.height, height + 1)
+        match frame.node.value:
+            case list() as items:
+                items.append(node)
+            case dict() as entries if frame.key is not None:
+                (name, key), frame.key = frame.key, None
+                if name is not None:
+                    entries[name] = Entry(key.line, key.column, node)
+            case dict() as entries:
+                if at is not None:
+                    node = Node(at.start_mark.line + 1, at.start_mark.column + 1, node.value)
+                frame.key = (self._key_name(frame, entries, node), node)
+
+    def _key_name(self, frame: _Frame, entries: dict[str, Entry], key: Node) -> str | None:
+        """Return the name of a key, or note what is wrong with it and return None."""
+        if not isinstance(key.value, str):
+            hint = "; put it in quotes" if isinstance(key.value, bool | int | float) else ""
+            message = f"a key must be text, found {shown(key.value)}{hint}"
+        elif key.value == "<<":
+            message = "merge keys ('<<') are not supported; write the keys out"
+        elif key.value in entries:
+            first = entries[key.value].line
+            message = f"duplicate key {shown(key.value)}; it stands on line {first} already"
+            self._report.add(key.line, key.column, self._loc(), message)
+            return None
+        else:
+            return key.value
+        frame.node.wrong = True
+        self._report.add(key.line, key.column, self._loc(), message)
+        return None

@@ -1,0 +1,254 @@
+"""Arithmetic in strings: numbers, names, + - * / **, parentheses and a few functions.
+
+Grammar and precedence are Python's own; everything is computed in doubles and nothing is ever passed to
+Python's parser or evaluator.
+
+    sum     = term   { ("+" | "-") term }
+    term    = factor { ("*" | "/") factor }
+    factor  = ("+" | "-") factor | power
+    power   = primary [ "**" factor ]
+    primary = number | name | function "(" sum { "," sum } ")" | "(" sum ")"
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple, TypeAlias
+
+from dh2sim.robot.words import did_you_mean, listed, shown
+
+MAX_LENGTH: Final = 1000
+MAX_DEPTH: Final = 50
+
+FUNCTIONS: Final[Mapping[str, tuple[int, Callable[..., float]]]] = {
+    "sqrt": (1, math.sqrt),
+    "sin": (1, math.sin),
+    "cos": (1, math.cos),
+    "tan": (1, math.tan),
+    "asin": (1, math.asin),
+    "acos": (1, math.acos),
+    "atan": (1, math.atan),
+    "atan2": (2, math.atan2),
+}
+"""Number of arguments and function; angles in radians."""
+CONSTANTS: Final[Mapping[str, float]] = {"pi": math.pi}
+
+_TOKEN: Final = re.compile(
+    r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
+    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
+    r"|(?P<operator>\*\*|[-+*/(),])"
+)
+_NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_NOT_A_NUMBER: Final = re.compile(r"[A-Za-z0-9_.]+")
+_HINTS: Final = {
+    "^": "use ** for powers",
+    "\N{MINUS SIGN}": "write -",
+    "\N{EN DASH}": "write -",
+    "\N{MULTIPLICATION SIGN}": "write *",
+    "\N{MIDDLE DOT}": "write *",
+    "\N{GREEK SMALL LETTER PI}": "write pi",
+    "\N{DEGREE SIGN}": "angles are in the unit that 'units' names",
+    "<": "comparisons are not allowed",
+    ">": "comparisons are not allowed",
+    "=": "comparisons are not allowed",
+    "!": "comparisons are not allowed",
+}
+_ALLOWED: Final = f"Allowed: numbers, + - * / **, parentheses, parameters, pi, {listed(FUNCTIONS)}"
+
+
+class ExpressionError(ValueError):
+    """A text is no arithmetic expression, or has no finite real value."""
+
+
+class _Token(NamedTuple):
+    kind: str
+    text: str
+
+
+_END: Final = _Token("end", "")
+_Tokens: TypeAlias = list[_Token]
+
+
+def evaluate(text: str, names: Mapping[str, float]) -> float:
+    """Return the value of an expression.
+
+    Args:
+        text: The expression.
+        names: Values of the parameters; NaN for one that is wrong itself, of which enough has been said.
+
+    Returns:
+        A finite number, or NaN where a parameter used is NaN.
+
+    Raises:
+        ExpressionError: With a message that says what is wrong, fit for a user.
+    """
+    try:
+        parser = _Parser(_tokens(text), names)
+        value = parser.whole()
+    except ExpressionError as error:
+        raise (error if _NAME.fullmatch(text.strip()) else _within(text, error)) from None
+    except ZeroDivisionError:
+        raise _within(text, "division by zero") from None
+    except OverflowError:
+        raise _within(text, "the result is too large") from None
+    except ValueError:
+        raise _within(text, "a function has no real value there") from None
+    if parser.used_unknown_value:
+        return math.nan
+    if not math.isfinite(value):
+        raise _within(text, "the result is too large")
+    return value
+
+
+def names_in(text: str) -> tuple[str, ...]:
+    """Return the names an expression uses, functions left out; none where it is no expression."""
+    try:
+        tokens = _tokens(text)
+    except ExpressionError:
+        return ()
+    return tuple(dict.fromkeys(t.text for t in tokens if t.kind == "name" and t.text not in FUNCTIONS))
+
+
+def is_name(text: str) -> bool:
+    """Return whether expressions can use ``text`` as the name of a parameter."""
+    return _NAME.fullmatch(text) is not None and text not in FUNCTIONS and text not in CONSTANTS
+
+
+def _within(text: str, error: object) -> ExpressionError:
+    return ExpressionError(f"in {shown(text)}: {error}")
+
+
+def _tokens(text: str) -> _Tokens:
+    if len(text) > MAX_LENGTH:
+        raise ExpressionError(f"the expression has {len(text)} characters; at most {MAX_LENGTH} are allowed")
+    tokens: _Tokens = []
+    position = 0
+    while position < len(text):
+        if text[position].isspace():
+            position += 1
+            continue
+        found = _TOKEN.match(text, position)
+        if found is None:
+            character = text[position]
+            hint = f"; {_HINTS[character]}" if character in _HINTS else ""
+            raise ExpressionError(f"unexpected {character!r}{hint}. {_ALLOWED}")
+        kind = found.lastgroup or ""
+        position = found.end()
+        if kind == "number" and (rest := _NOT_A_NUMBER.match(text, position)):
+            raise ExpressionError(f"{shown(found.group() + rest.group())} is no number; a product needs *")
+        tokens.append(_Token(kind, found.group()))
+    return tokens
+
+
+class _Parser:
+    """Reads tokens from the left and computes as it goes."""
+
+    def __init__(self, tokens: _Tokens, names: Mapping[str, float]) -> None:
+        self.used_unknown_value = False
+        self._tokens = tokens
+        self._names = names
+        self._position = 0
+        self._depth = 0
+
+    def whole(self) -> float:
+        """Return the value of all tokens."""
+        value = self._sum()
+        if self._next is not _END:
+            raise self._unexpected()
+        return value
+
+    @property
+    def _next(self) -> _Token:
+        return self._tokens[self._position] if self._position < len(self._tokens) else _END
+
+    def _take(self, *texts: str) -> str | None:
+        """Step over the next token if it is one of these operators, and return it."""
+        token = self._next
+        if token.kind != "operator" or token.text not in texts:
+            return None
+        self._position += 1
+        return token.text
+
+    def _unexpected(self) -> ExpressionError:
+        if self._next is _END:
+            return ExpressionError("it ends too early" if self._tokens else "it is empty")
+        after = f" after {self._tokens[self._position - 1].text!r}" if self._position else ""
+        hint = "; write a decimal point as ." if self._next.text == "," else ""
+        return ExpressionError(f"unexpected {shown(self._next.text)}{after}{hint}")
+
+    def _sum(self) -> float:
+        value = self._term()
+        while operator := self._take("+", "-"):
+            right = self._term()
+            value = value + right if operator == "+" else value - right
+        return value
+
+    def _term(self) -> float:
+        value = self._factor()
+        while operator := self._take("*", "/"):
+            right = self._factor()
+            value = value * right if operator == "*" else value / right
+        return value
+
+    def _factor(self) -> float:
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise ExpressionError(f"nested deeper than {MAX_DEPTH} levels")
+        sign = self._take("+", "-")
+        value = self._factor() if sign else self._power()
+        self._depth -= 1
+        return -value if sign == "-" else value
+
+    def _power(self) -> float:
+        value = self._primary()
+        if self._take("**") is None:
+            return value
+        result: float | complex = value ** self._factor()
+        if isinstance(result, complex):
+            raise ExpressionError("a negative number has no real power of a fraction")
+        return result
+
+    def _primary(self) -> float:
+        token = self._next
+        if token.kind == "number":
+            self._position += 1
+            return float(token.text)
+        if token.kind == "name":
+            self._position += 1
+            return self._call(token.text) if self._take("(") else self._name(token.text)
+        if self._take("("):
+            value = self._sum()
+            if self._take(")") is None:
+                raise self._unexpected()
+            return value
+        raise self._unexpected()
+
+    def _name(self, name: str) -> float:
+        if name in FUNCTIONS:
+            raise ExpressionError(f"'{name}' is a function; write {name}(...)")
+        try:
+            value = CONSTANTS[name] if name in CONSTANTS else self._names[name]
+        except KeyError:
+            hint = did_you_mean(name, itertools.chain(CONSTANTS, FUNCTIONS, self._names))
+            known = listed(itertools.chain(CONSTANTS, self._names))
+            raise ExpressionError(f"unknown name {shown(name)}.{hint} Known names: {known}") from None
+        self.used_unknown_value |= math.isnan(value)
+        return value
+
+    def _call(self, name: str) -> float:
+        if name not in FUNCTIONS:
+            hint = did_you_mean(name, FUNCTIONS)
+            raise ExpressionError(f"unknown function {shown(name)}.{hint} Functions: {listed(FUNCTIONS)}")
+        count, function = FUNCTIONS[name]
+        arguments = [self._sum()]
+        while self._take(","):
+            arguments.append(self._sum())
+        if self._take(")") is None:
+            raise self._unexpected()
+        if len(arguments) != count:
+            takes = "1 argument" if count == 1 else f"{count} arguments"
+            raise ExpressionError(f"'{name}' takes {takes}, found {len(arguments)}")
+        return function(*arguments)

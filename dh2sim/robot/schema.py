@@ -1,0 +1,225 @@
+"""The robot file as it is written, in its own units, as pydantic models and as JSON Schema."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Final, TypeAlias
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from dh2sim.robot.fields import (
+    LONGEST_NAME,
+    NAME_PATTERN,
+    PROBLEM,
+    Angles,
+    Color,
+    Flag,
+    MeshFile,
+    Name,
+    NotNegative,
+    Number,
+    Parameters,
+    Positive,
+    Range,
+    Text,
+    Vector,
+    one_of,
+)
+from dh2sim.robot.spec import ActuatorType, Convention, JointType
+from dh2sim.robot.units import AngleUnit, LengthUnit
+
+_TRIANGLE_TOLERANCE: Final = 1e-9
+"""By which two principal moments may fall short of the third, relative to it."""
+
+ConventionField: TypeAlias = Annotated[Convention, one_of(Convention)]
+ActuatorTypeField: TypeAlias = Annotated[ActuatorType, one_of(ActuatorType)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+
+class UnitsEntry(_Model):
+    """Units of the angles and lengths in this file."""
+
+    angle: Annotated[AngleUnit, one_of(AngleUnit)] = Field(default=AngleUnit.RAD, description="Unit of angles.")
+    length: Annotated[LengthUnit, one_of(LengthUnit)] = Field(default=LengthUnit.M, description="Unit of lengths.")
+
+
+class MeshEntry(_Model):
+    """A mesh file that shows a link."""
+
+    file: MeshFile = Field(description="STL, OBJ, PLY or GLB file; relative to the folder of this file.")
+    scale: Positive = Field(default=1.0, description="Metres per unit of the mesh file.")
+
+
+class PoseEntry(_Model):
+    """A pose: position, and angles about fixed x, y, z as in URDF."""
+
+    xyz: Vector = Field(default=(0.0, 0.0, 0.0), description="Position, in the file's length unit.")
+    rpy: Angles = Field(default=(0.0, 0.0, 0.0), description="Roll, pitch, yaw, in the file's angle unit.")
+
+
+class BaseEntry(PoseEntry):
+    """Pose of DH frame 0 in base_link, and how the base looks."""
+
+    mesh: MeshEntry | None = Field(default=None, description="Visual mesh, in DH frame 0.")
+    color: Color | None = Field(default=None, description="Red, green, blue and optionally alpha, each 0 to 1.")
+
+
+class InertiaEntry(_Model):
+    """Inertia about the centre of mass along DH frame i's axes, kg·m²."""
+
+    ixx: Number = Field(description="kg·m²")
+    iyy: Number = Field(description="kg·m²")
+    izz: Number = Field(description="kg·m²")
+    ixy: Number = Field(default=0.0, description="kg·m²; the matrix entry, as in URDF.")
+    ixz: Number = Field(default=0.0, description="kg·m²; the matrix entry, as in URDF.")
+    iyz: Number = Field(default=0.0, description="kg·m²; the matrix entry, as in URDF.")
+
+    @property
+    def matrix(self) -> list[list[float]]:
+        """The symmetric matrix, 3 × 3."""
+        return [
+            [self.ixx, self.ixy, self.ixz],
+            [self.ixy, self.iyy, self.iyz],
+            [self.ixz, self.iyz, self.izz],
+        ]
+
+    @model_validator(mode="after")
+    def _is_of_a_body(self) -> InertiaEntry:
+        matrix = np.array(self.matrix)
+        scale = float(np.abs(matrix).max())
+        if math.isnan(scale):
+            return self
+        a, b, c = np.linalg.eigvalsh(matrix / scale).tolist() if scale > 0 else (0.0, 0.0, 0.0)
+        moments = ", ".join(f"{moment * scale:.6g}" for moment in (a, b, c))
+        message = None
+        if a <= 0:
+            message = f"not positive definite: the principal moments are {moments}"
+        elif a + b < c * (1 - _TRIANGLE_TOLERANCE):
+            message = f"no body has the principal moments {moments}: two make less than the third"
+        if message:
+            raise PydanticCustomError(PROBLEM, "{message}", {"message": message})
+        return self
+
+
+class LinkEntry(_Model):
+    """The link that a joint moves."""
+
+    mass: Positive | None = Field(default=None, description="kg")
+    com: Vector | None = Field(default=None, description="Centre of mass in DH frame i, in the file's length unit.")
+    inertia: InertiaEntry | None = Field(default=None, description="About com, along DH frame i's axes, kg·m².")
+    density: Positive | None = Field(
+        default=None, description="kg/m³, for shapes made from the table; used where mass is not given."
+    )
+    radius: Positive | None = Field(
+        default=None, description="Of the shapes made from the table, in the file's length unit."
+    )
+    color: Color | None = Field(default=None, description="Red, green, blue and optionally alpha, each 0 to 1.")
+    mesh: MeshEntry | None = Field(default=None, description="Visual mesh, in DH frame i.")
+
+
+class LimitsEntry(_Model):
+    """Limits of a joint, in the file's units."""
+
+    position: Range | None = Field(
+        default=None, description="Lower and upper joint coordinate, in the file's angle or length unit."
+    )
+    velocity: Positive | None = Field(default=None, description="In the file's angle or length unit per second.")
+    effort: Positive | None = Field(default=None, description="N·m or N.")
+
+
+class DynamicsEntry(_Model):
+    """Joint dynamics, in SI units."""
+
+    damping: NotNegative = Field(default=0.0, description="N·m·s/rad or N·s/m.")
+    friction: NotNegative = Field(default=0.0, description="Coulomb friction, N·m or N.")
+    armature: NotNegative = Field(default=0.0, description="Rotor inertia seen at the joint, kg·m² or kg.")
+
+
+class ActuatorEntry(_Model):
+    """What drives a joint in the MJCF."""
+
+    type: ActuatorTypeField | None = Field(default=None, description="What the control signal is; default position.")
+    kp: Positive | None = Field(default=None, description="Position gain, N·m/rad or N/m; for position.")
+    kv: Positive | None = Field(
+        default=None, description="Velocity gain, N·m·s/rad or N·s/m; for position and velocity."
+    )
+
+
+class JointEntry(_Model):
+    """A row of the DH table: its transform at coordinate zero, how it moves and what it carries."""
+
+    name: Name | None = Field(default=None, description="Default joint_<i>, counted from 1.")
+    type: Annotated[JointType, one_of(JointType)] = Field(description="How the row moves.")
+    convention: ConventionField | None = Field(default=None, description="Overrides the file's for this row.")
+    a: Number = Field(default=0.0, description="a_i (modified: a_{i-1}), in the file's length unit.")
+    alpha: Number = Field(default=0.0, description="alpha_i (modified: alpha_{i-1}), in the file's angle unit.")
+    d: Number = Field(default=0.0, description="d_i, in the file's length unit; a prismatic coordinate adds to it.")
+    theta: Number = Field(
+        default=0.0, description="theta_i, in the file's angle unit; a revolute coordinate adds to it."
+    )
+    flip: Flag = Field(default=False, description="True: the joint coordinate subtracts instead.")
+    limits: LimitsEntry = Field(default=LimitsEntry(), description="Limits, in the file's units.")
+    dynamics: DynamicsEntry = Field(default=DynamicsEntry(), description="Joint dynamics, SI.")
+    link: LinkEntry = Field(default=LinkEntry(), description="The link that this joint moves.")
+    actuator: ActuatorEntry = Field(default=ActuatorEntry(), description="Overrides the file's actuators.")
+
+
+class RobotEntry(_Model):
+    """A robot described by its Denavit-Hartenberg table.
+
+    A number may be an arithmetic expression in a string: + - * / **, parentheses, parameters, pi, sqrt, sin,
+    cos, tan, asin, acos, atan, atan2 (arguments in radians).
+    """
+
+    name: Name = Field(description="Name of the robot; names the exported files.")
+    description: Text = Field(default="", description="What the robot is.")
+    source: Text = Field(default="", description="Where the numbers come from.")
+    convention: ConventionField = Field(
+        description="standard: Rz(theta) Tz(d) Tx(a) Rx(alpha); modified: Tx(a) Rx(alpha) Rz(theta) Tz(d)."
+    )
+    units: UnitsEntry = Field(default=UnitsEntry(), description="Units of this file; default rad and m.")
+    parameters: Parameters = Field(
+        default_factory=dict, description="Named constants for expressions, in the file's units."
+    )
+    base: BaseEntry = Field(default=BaseEntry(), description="DH frame 0 in base_link.")
+    tool: PoseEntry = Field(default=PoseEntry(), description="tool0 in DH frame n.")
+    gravity: Vector = Field(default=(0.0, 0.0, -9.81), description="m/s² in base_link.")
+    joints: list[JointEntry] = Field(min_length=1, description="The DH table, a row each, base first.")
+    configurations: dict[str, list[Number]] = Field(
+        default={},
+        description="Named joint vectors, a number for each moving row, in the file's units.",
+        json_schema_extra={"propertyNames": {"pattern": NAME_PATTERN, "maxLength": LONGEST_NAME}},
+    )
+    actuators: ActuatorEntry = Field(default=ActuatorEntry(), description="What drives every joint.")
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a robot file, for editors."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "dh2sim robot file",
+        **_tidied(RobotEntry.model_json_schema()),
+    }
+
+
+def _tidied(schema: Any) -> Any:
+    """Return a schema in which a key may be left out but not be null, without pydantic's made-up titles."""
+    if isinstance(schema, list):
+        return [_tidied(value) for value in schema]
+    if not isinstance(schema, dict):
+        return schema
+    tidied = {
+        key: _tidied(value)
+        for key, value in schema.items()
+        if not (key == "title" and isinstance(value, str)) and not (key == "default" and value is None)
+    }
+    match tidied.pop("anyOf", None):
+        case [inner, {"type": "null"}]:
+            return {**inner, **tidied}
+        case _:
+            return tidied

@@ -1,0 +1,18 @@
+"""Names for array types; imports nothing of the package."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+"""An array of doubles; its shape stands in the docstring of whatever carries it."""
+
+
+def read_only(values: object) -> Array:
+    """Return a copy of ``values`` as doubles that nobody can write to."""
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array
