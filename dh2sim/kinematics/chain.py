@@ -1,0 +1,84 @@
+"""The table turned once into a chain of joint-placed bodies; nothing after it knows of conventions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from dh2sim.kinematics.transforms import compose, identity, joint_part, link_part, pose_from_rpy
+from dh2sim.robot.spec import Convention, JointType, RobotSpec
+from dh2sim.typing import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Joint:
+    """A joint and where it sits on its parent; it moves about or along its own z axis."""
+
+    name: str
+    type: JointType
+    sign: float
+    """+1, or -1 for a flipped row, which moves about or along -z."""
+    T_parent_joint: Array = field(repr=False)
+    """Pose of the joint frame at q = 0 in the parent joint frame (base_link for the first), shape (4, 4)."""
+    T_joint_dh: Array = field(repr=False)
+    """Pose of the row's DH frame in the joint frame, shape (4, 4)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class KinematicChain:
+    """A serial chain: one joint-placed body for every row of the table."""
+
+    joints: tuple[Joint, ...]
+    T_base_link_dh0: Array = field(repr=False)
+    """Pose of DH frame 0 in base_link, shape (4, 4)."""
+    T_dhn_tool0: Array = field(repr=False)
+    """Pose of tool0 in the last DH frame, shape (4, 4)."""
+
+    @property
+    def moving_joints(self) -> tuple[Joint, ...]:
+        """The joints that have a coordinate, in the order of a joint vector."""
+        return tuple(joint for joint in self.joints if joint.type.moves)
+
+    @property
+    def n(self) -> int:
+        """Number of joint coordinates."""
+        return len(self.moving_joints)
+
+
+def build_chain(spec: RobotSpec) -> KinematicChain:
+    """Turn a Denavit-Hartenberg table into a chain of joint-placed bodies.
+
+    With X = Tx(a) Rx(alpha) and Z = Rz(theta) Tz(d), a row's transform is Z X (standard) or X Z (modified).
+    The joint moves in Z, so the X of a standard row stands behind its joint and goes in front of the next. A
+    fixed row becomes a joint that does not move.
+
+    Args:
+        spec: The robot; rows of both conventions may be mixed.
+
+    Returns:
+        One joint for every row; its transforms are the same bits on every machine.
+    """
+    T_base_link_dh0 = pose_from_rpy(spec.base.pose.xyz, spec.base.pose.rpy)
+    T_parent_dh = T_base_link_dh0  # the previous row's DH frame in the parent of the joint at hand
+    joints = []
+    for row in spec.rows:
+        link, joint = link_part(row.a, row.alpha), joint_part(row.theta, row.d)
+        match row.convention:
+            case Convention.STANDARD:
+                T_dh_joint, T_joint_dh = joint, link
+            case Convention.MODIFIED:
+                T_dh_joint, T_joint_dh = compose(link, joint), identity()
+        joints.append(
+            Joint(
+                name=row.name,
+                type=row.type,
+                sign=-1.0 if row.flip else 1.0,
+                T_parent_joint=compose(T_parent_dh, T_dh_joint),
+                T_joint_dh=T_joint_dh,
+            )
+        )
+        T_parent_dh = T_joint_dh
+    return KinematicChain(
+        joints=tuple(joints),
+        T_base_link_dh0=T_base_link_dh0,
+        T_dhn_tool0=pose_from_rpy(spec.tool.xyz, spec.tool.rpy),
+    )

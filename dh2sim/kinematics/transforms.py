@@ -1,0 +1,162 @@
+"""Rigid transforms as read-only 4x4 arrays, the same bits on every machine.
+
+Written out in Python's own floating-point arithmetic: a matrix product by BLAS may fuse multiplications and
+additions, and then the last bit depends on the processor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from numpy.typing import ArrayLike
+
+from dh2sim.kinematics.trig import atan2, sin_cos
+from dh2sim.typing import Array, read_only
+
+_LOCKED = 4e-16
+"""Cosine of the pitch, at and below which nothing but rounding is left of roll."""
+
+
+def identity() -> Array:
+    """Return the identity, shape (4, 4)."""
+    return _transform(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0))
+
+
+def compose(T_a_b: Array, T_b_c: Array) -> Array:
+    """Return the pose of frame c in frame a.
+
+    Args:
+        T_a_b: Pose of frame b in frame a, shape (4, 4).
+        T_b_c: Pose of frame c in frame b, shape (4, 4).
+
+    Returns:
+        T_a_b · T_b_c, shape (4, 4).
+    """
+    left, right = T_a_b.tolist(), T_b_c.tolist()
+    rotation = [
+        [row[0] * right[0][k] + row[1] * right[1][k] + row[2] * right[2][k] for k in range(3)] for row in left[:3]
+    ]
+    position = [row[0] * right[0][3] + row[1] * right[1][3] + row[2] * right[2][3] + row[3] for row in left[:3]]
+    return _transform(rotation, position)
+
+
+def invert(T_a_b: Array) -> Array:
+    """Return the pose of frame a in frame b, given that of b in a; both of shape (4, 4)."""
+    rows = T_a_b.tolist()
+    columns = [[rows[i][k] for i in range(3)] for k in range(4)]
+    position = [-(c[0] * columns[3][0] + c[1] * columns[3][1] + c[2] * columns[3][2]) for c in columns[:3]]
+    return _transform(columns[:3], position)
+
+
+def link_part(a: float, alpha: float) -> Array:
+    """Return the link part of a Denavit-Hartenberg row, X = Tx(a) Rx(alpha).
+
+    Args:
+        a: Link length, m.
+        alpha: Link twist, rad.
+
+    Returns:
+        Shape (4, 4).
+    """
+    s, c = sin_cos(alpha)
+    return _transform(((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)), (a, 0.0, 0.0))
+
+
+def joint_part(theta: float, d: float) -> Array:
+    """Return the joint part of a Denavit-Hartenberg row, Z = Rz(theta) Tz(d).
+
+    Args:
+        theta: Joint angle, rad.
+        d: Joint offset, m.
+
+    Returns:
+        Shape (4, 4).
+    """
+    s, c = sin_cos(theta)
+    return _transform(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, d))
+
+
+def pose_from_rpy(xyz: ArrayLike, rpy: ArrayLike) -> Array:
+    """Return the transform of a position and URDF angles, R = Rz(yaw) Ry(pitch) Rx(roll).
+
+    Args:
+        xyz: Position, m, shape (3,).
+        rpy: Roll, pitch and yaw about fixed x, y and z, rad, shape (3,).
+
+    Returns:
+        Shape (4, 4).
+    """
+    (sr, cr), (sp, cp), (sy, cy) = (sin_cos(angle) for angle in read_only(rpy).tolist())
+    rotation = (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+    return _transform(rotation, read_only(xyz).tolist())
+
+
+def rpy_from_rotation(R: Array) -> Array:
+    """Return the URDF angles of a rotation: R = Rz(yaw) Ry(pitch) Rx(roll).
+
+    Near pitch = ±pi/2 roll is badly determined, and then so is yaw. Here roll is computed first, rounded, and
+    taken off; yaw and pitch come from what is left and so make up for the error of roll. At pitch = ±pi/2
+    roll is 0.
+
+    Args:
+        R: Rotation matrix, shape (3, 3), or a transform, shape (4, 4).
+
+    Returns:
+        Roll in (-pi, pi], pitch in [-pi/2, pi/2], yaw in (-pi, pi]; rad, shape (3,). Building the rotation
+        from them gives R again to within a few 1e-16, wherever the pitch is.
+    """
+    r = R.tolist()
+    locked = math.sqrt(r[2][1] * r[2][1] + r[2][2] * r[2][2]) <= _LOCKED
+    roll = 0.0 if locked else atan2(r[2][1], r[2][2])
+    sine, cosine = sin_cos(roll)
+    pitch = atan2(-r[2][0], r[2][1] * sine + r[2][2] * cosine)
+    if locked:
+        pitch = math.copysign(math.pi / 2, -r[2][0])
+    yaw = atan2(r[0][2] * sine - r[0][1] * cosine, r[1][1] * cosine - r[1][2] * sine)
+    return read_only(_clean((roll, pitch, yaw)))
+
+
+def quaternion_from_rotation(R: Array) -> Array:
+    """Return the unit quaternion of a rotation.
+
+    S. W. Shepperd, Quaternion from rotation matrix, J. Guidance and Control 1(3), 1978: of the four products
+    4w², 4x², 4y², 4z² the greatest is the pivot, so that nothing cancels. Here the row of products with the
+    pivot is normalised as a whole.
+
+    Args:
+        R: Rotation matrix, shape (3, 3), or a transform, shape (4, 4).
+
+    Returns:
+        (w, x, y, z), shape (4,); the first component that is not zero is positive.
+    """
+    r = R.tolist()
+    trace = r[0][0] + r[1][1] + r[2][2]
+    pivot = max(range(4), key=(trace, r[0][0], r[1][1], r[2][2]).__getitem__)
+    if pivot == 0:
+        q = [1.0 + trace, r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]]
+    else:
+        i = pivot - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q = [r[k][j] - r[j][k], 0.0, 0.0, 0.0]
+        q[1 + i] = 1.0 + r[i][i] - r[j][j] - r[k][k]
+        q[1 + j] = r[j][i] + r[i][j]
+        q[1 + k] = r[k][i] + r[i][k]
+    norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    norm = -norm if next(value for value in q if value != 0.0) < 0.0 else norm
+    return read_only(_clean([value / norm for value in q]))
+
+
+def _transform(rotation: Sequence[Sequence[float]], position: Sequence[float]) -> Array:
+    """Assemble a read-only transform; every zero becomes +0.0."""
+    rows = [_clean((*row, p)) for row, p in zip(rotation, position, strict=True)]
+    return read_only([*rows, [0.0, 0.0, 0.0, 1.0]])
+
+
+def _clean(values: Sequence[float]) -> list[float]:
+    """Turn -0.0 into 0.0."""
+    return [value + 0.0 for value in values]

@@ -1,0 +1,132 @@
+"""Sine, cosine and arctangent, correctly rounded, so that files come out the same on every machine.
+
+The C library's functions differ in the last bit between systems. These work with whole numbers: angles and
+their functions are integers over a power of two, and only the last division rounds.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+_GUARD_BITS = 256
+"""Bits behind those of the argument; a double's distance to a multiple of pi/2 takes about 62 of them."""
+_SNAP_TURNS = 16
+_SNAP_WIDTH = 4e-16
+
+
+def sin_cos(angle: float) -> tuple[float, float]:
+    """Return the sine and the cosine of ``angle``.
+
+    An angle that is a multiple k·pi/2, ``|k|`` ≤ 16, to within the rounding of a double, which is at most
+    4e-16·max(1, ``|k|``) away, is taken for that multiple and gives exact 0, 1 and -1. Everything else is
+    correctly rounded.
+
+    Args:
+        angle: rad, finite.
+
+    Returns:
+        Sine and cosine; a zero is +0.0.
+
+    Raises:
+        ValueError: ``angle`` is NaN or infinite.
+    """
+    if not math.isfinite(angle):
+        raise ValueError(f"the angle must be finite, got {angle!r}")
+    bits = _GUARD_BITS + abs(math.frexp(angle)[1])
+    quadrant, rest = _reduce(angle, bits)
+    if abs(quadrant) <= _SNAP_TURNS and abs(rest / (1 << bits)) <= _SNAP_WIDTH * max(1, abs(quadrant)):
+        rest = 0
+    sine, cosine = _turn(quadrant, *_taylor(rest, bits))
+    return sine / (1 << bits), cosine / (1 << bits)
+
+
+def atan2(y: float, x: float) -> float:
+    """Return the angle of the point (``x``, ``y``), correctly rounded.
+
+    The C library's answer b is refined by the angle between the point and the direction of b,
+    atan((y cos b - x sin b) / (x cos b + y sin b)).
+
+    Args:
+        y: finite.
+        x: finite.
+
+    Returns:
+        The angle, rad, in (-pi, pi]; 0.0 at the origin. The signs of zeros do not matter.
+
+    Raises:
+        ValueError: ``x`` or ``y`` is NaN or infinite.
+    """
+    if not (math.isfinite(y) and math.isfinite(x)):
+        raise ValueError(f"the coordinates must be finite, got y = {y!r}, x = {x!r}")
+    if y == 0.0:
+        return math.pi if x < 0.0 else 0.0
+    if x == 0.0:
+        return math.copysign(math.pi / 2, y)
+    guess = math.atan2(y, x)
+    if guess == 0.0:  # too small for a double
+        return 0.0
+    bits = _GUARD_BITS + abs(math.frexp(guess)[1])
+    quadrant, rest = _reduce(guess, bits)
+    sine, cosine = _turn(quadrant, *_taylor(rest, bits))
+    (y_over, y_under), (x_over, x_under) = y.as_integer_ratio(), x.as_integer_ratio()
+    y_whole, x_whole = y_over * x_under, x_over * y_under
+    tangent = ((y_whole * cosine - x_whole * sine) << bits) // (x_whole * cosine + y_whole * sine)
+    correction = tangent - (tangent**3 // 3 >> 2 * bits)  # next term: below 1e-75 of the guess
+    return (_fixed(guess, bits) + correction) / (1 << bits)
+
+
+def _fixed(value: float, bits: int) -> int:
+    """``value`` in units of 2**-bits, rounded down."""
+    numerator, denominator = value.as_integer_ratio()
+    return (numerator << bits) // denominator
+
+
+@lru_cache(maxsize=64)
+def _pi(bits: int) -> int:
+    """Pi in units of 2**-bits, to within one: Machin's 16 atan(1/5) - 4 atan(1/239)."""
+    extra = 16
+    one = 1 << (bits + extra)
+    return (16 * _arctangent_of_inverse(5, one) - 4 * _arctangent_of_inverse(239, one)) >> extra
+
+
+def _arctangent_of_inverse(x: int, one: int) -> int:
+    """Gregory's series for atan(1/x), in units of 1/one."""
+    power, total, k, sign = one // x, 0, 1, 1
+    while power:
+        total += sign * (power // k)
+        power, k, sign = power // (x * x), k + 2, -sign
+    return total
+
+
+def _reduce(angle: float, bits: int) -> tuple[int, int]:
+    """Return k and the rest in units of 2**-bits such that angle = k·pi/2 + rest, with |rest| <= pi/4."""
+    scaled = _fixed(angle, bits)
+    finer = bits + abs(math.frexp(angle)[1])  # k has as many bits as the angle
+    half_pi = _pi(finer) >> 1
+    quadrant = ((scaled << (finer - bits)) + (half_pi >> 1)) // half_pi
+    return quadrant, scaled - (quadrant * half_pi >> (finer - bits))
+
+
+def _taylor(rest: int, bits: int) -> tuple[int, int]:
+    """Sine and cosine of ``rest``, all in units of 2**-bits, by their Taylor series."""
+    sums = [0, 0]  # cosine, sine
+    term, k = 1 << bits, 0
+    while term not in (0, -1):
+        sums[k % 2] += term if k % 4 < 2 else -term
+        k += 1
+        term = (term * rest >> bits) // k
+    return sums[1], sums[0]
+
+
+def _turn(quadrant: int, sine: int, cosine: int) -> tuple[int, int]:
+    """Sine and cosine of an angle that is ``quadrant`` quarter turns further."""
+    match quadrant % 4:
+        case 0:
+            return sine, cosine
+        case 1:
+            return cosine, -sine
+        case 2:
+            return -sine, -cosine
+        case _:
+            return -cosine, sine
