@@ -1,0 +1,83 @@
+"""What is asked of an engine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from dh2sim.errors import EngineError
+from dh2sim.typing import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DynamicTerms:
+    """Terms of M(q) q̈ + b(q, q̇) = τ for N states of n joints, without friction, damping and rotor inertia."""
+
+    mass_matrix: Array
+    """M, shape (N, n, n)."""
+    bias: Array
+    """b(q, q̇): Coriolis, centrifugal and gravity terms, shape (N, n)."""
+    gravity: Array
+    """b(q, 0), shape (N, n)."""
+
+
+class PoseEngine(Protocol):
+    """Reads a model file and tells where its frames are."""
+
+    name: str
+    """Such as ``mujoco-mjcf``."""
+    frames: tuple[str, ...]
+    """The frames that the file has, of those asked for."""
+
+    def frame_poses(self, q: Array) -> Array:
+        """Poses of ``frames`` in base_link, shape (N, number of frames, 4, 4); q in rad and m, shape (N, n)."""
+        ...
+
+
+class DynamicsEngine(PoseEngine, Protocol):
+    """Also knows velocities and masses."""
+
+    def jacobian(self, q: Array) -> Array:
+        """Geometric Jacobian of tool0 in base_link, linear rows first, shape (N, 6, n); q of shape (N, n)."""
+        ...
+
+    def dynamic_terms(self, q: Array, velocity: Array, gravity: Array) -> DynamicTerms:
+        """Dynamic terms; q and velocity of shape (N, n), gravity in m/s² in base_link, shape (3,)."""
+        ...
+
+
+def present_frames(path: str, found: Sequence[str], rows: int, *, dh_frames_required: bool) -> tuple[str, ...]:
+    """Return those of dh_0 … dh_n and tool0 that a file has.
+
+    Args:
+        path: of the file, for the message.
+        found: names of all frames in the file.
+        rows: n.
+        dh_frames_required: whether a file may leave out all DH frames (never only some of them).
+
+    Raises:
+        EngineError: tool0 or a DH frame is missing.
+    """
+    dh = [f"dh_{i}" for i in range(rows + 1)]
+    known = set(found)
+    some = dh_frames_required or any(name in known for name in dh)
+    wanted = [*dh, "tool0"] if some else ["tool0"]
+    missing = [name for name in wanted if name not in known]
+    if missing:
+        raise EngineError(f"{path}: there is no frame {', '.join(missing)}")
+    return tuple(wanted)
+
+
+def require_joints(path: str, found: Sequence[str], wanted: Sequence[str]) -> None:
+    """Check that a file's moving joints are those of the robot, in any order.
+
+    Raises:
+        EngineError: a joint is missing, or there is one too many.
+    """
+    missing = [name for name in wanted if name not in set(found)]
+    extra = [name for name in found if name not in set(wanted)]
+    if missing:
+        raise EngineError(f"{path}: there is no moving joint {', '.join(missing)}")
+    if extra:
+        raise EngineError(f"{path}: the joint {', '.join(extra)} moves, but the robot file has no such moving row")

@@ -1,0 +1,98 @@
+"""pinocchio on a URDF file; an optional engine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dh2sim.engines.engine import DynamicTerms, present_frames, require_joints
+from dh2sim.errors import EngineError
+from dh2sim.typing import Array
+
+
+class PinocchioEngine:
+    """One URDF file, read by pinocchio."""
+
+    name = "pinocchio"
+
+    def __init__(self, path: Path, joints: Sequence[str], rows: int) -> None:
+        """Read a file.
+
+        Args:
+            path: a .urdf file.
+            joints: names of the moving joints, in the order of a joint vector.
+            rows: number of rows of the table.
+
+        Raises:
+            ImportError: pinocchio is not installed.
+            EngineError: pinocchio refuses the file, or frames or joints are missing.
+        """
+        import pinocchio
+
+        self._pin: Any = pinocchio
+        try:
+            self._model: Any = pinocchio.buildModelFromUrdf(str(path))
+        except (ValueError, RuntimeError) as error:
+            raise EngineError(f"{path}: pinocchio refuses the file: {' '.join(str(error).split())}") from error
+        model = self._model
+        self._data: Any = model.createData()
+        found = [name for name in model.names if name != "universe"]
+        require_joints(str(path), found, joints)
+        self._joints = [model.joints[model.getJointId(name)] for name in joints]
+        self._dofs = np.array([joint.idx_v for joint in self._joints], dtype=int)
+        self.frames = present_frames(
+            str(path), [frame.name for frame in model.frames], rows, dh_frames_required=False
+        )
+        self._ids = [model.getFrameId(name) for name in self.frames]
+
+    def frame_poses(self, q: Array) -> Array:
+        """Poses of ``frames`` in base_link; see ``PoseEngine``."""
+        poses = np.empty((len(q), len(self._ids), 4, 4))
+        for k, row in enumerate(q):
+            self._pin.framesForwardKinematics(self._model, self._data, self._configuration(row))
+            for i, frame in enumerate(self._ids):
+                poses[k, i] = self._data.oMf[frame].homogeneous
+        return poses
+
+    def jacobian(self, q: Array) -> Array:
+        """Geometric Jacobian of tool0; see ``DynamicsEngine``."""
+        result = np.empty((len(q), 6, len(self._dofs)))
+        for k, row in enumerate(q):
+            jacobian = self._pin.computeFrameJacobian(
+                self._model,
+                self._data,
+                self._configuration(row),
+                self._ids[-1],
+                self._pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+            )
+            result[k] = jacobian[:, self._dofs]
+        return result
+
+    def dynamic_terms(self, q: Array, velocity: Array, gravity: Array) -> DynamicTerms:
+        """Mass matrix, bias and gravity terms; see ``DynamicsEngine``."""
+        pin, model, data = self._pin, self._model, self._data
+        model.gravity.linear = np.array(gravity)
+        n = len(self._dofs)
+        mass, bias, load = np.zeros((len(q), n, n)), np.zeros((len(q), n)), np.zeros((len(q), n))
+        order = np.ix_(self._dofs, self._dofs)
+        for k in range(len(q)):
+            configuration, speed = self._configuration(q[k]), np.zeros(model.nv)
+            speed[self._dofs] = velocity[k]
+            upper = np.triu(pin.crba(model, data, configuration))
+            mass[k] = (upper + np.triu(upper, 1).T)[order]
+            bias[k] = pin.nonLinearEffects(model, data, configuration, speed)[self._dofs]
+            load[k] = pin.computeGeneralizedGravity(model, data, configuration)[self._dofs]
+        return DynamicTerms(mass_matrix=mass, bias=bias, gravity=load)
+
+    def _configuration(self, row: Array) -> Array:
+        """Pinocchio's own vector: a continuous joint is stored as cosine and sine."""
+        configuration = np.zeros(self._model.nq)
+        for joint, value in zip(self._joints, row, strict=True):
+            if joint.nq == 2:
+                configuration[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
+            else:
+                configuration[joint.idx_q] = value
+        return configuration

@@ -1,0 +1,50 @@
+"""yourdfpy on a URDF file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dh2sim.engines.engine import present_frames, require_joints
+from dh2sim.errors import EngineError
+from dh2sim.typing import Array
+
+
+class YourdfpyEngine:
+    """One URDF file, read by yourdfpy; a Python loop, so it is asked for fewer configurations."""
+
+    name = "yourdfpy"
+
+    def __init__(self, path: Path, joints: Sequence[str], rows: int) -> None:
+        """Read a file.
+
+        Args:
+            path: a .urdf file.
+            joints: names of the moving joints, in the order of a joint vector.
+            rows: number of rows of the table.
+
+        Raises:
+            EngineError: yourdfpy refuses the file, or frames or joints are missing.
+        """
+        import yourdfpy
+
+        try:
+            self._urdf: Any = yourdfpy.URDF.load(str(path), load_meshes=False)
+        except Exception as error:  # its parser raises whatever it trips over
+            raise EngineError(f"{path}: yourdfpy refuses the file: {' '.join(str(error).split())}") from error
+        found = list(self._urdf.actuated_joint_names)
+        require_joints(str(path), found, joints)
+        self._order = np.array([list(joints).index(name) for name in found], dtype=int)
+        self.frames = present_frames(str(path), list(self._urdf.link_map), rows, dh_frames_required=False)
+
+    def frame_poses(self, q: Array) -> Array:
+        """Poses of ``frames`` in base_link; see ``PoseEngine``."""
+        poses = np.empty((len(q), len(self.frames), 4, 4))
+        for k, row in enumerate(q):
+            self._urdf.update_cfg(np.array(row[self._order], dtype=np.float64))
+            for i, frame in enumerate(self.frames):
+                poses[k, i] = self._urdf.get_transform(frame, "base_link")
+        return poses

@@ -1,0 +1,99 @@
+"""Mass, centre of mass and inertia of solid primitives in closed form, and of what is built from them.
+
+Everything is done in plain double arithmetic in a fixed order, so that every machine writes the same bytes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from dh2sim.model.shapes import Shape, ShapeKind
+from dh2sim.typing import Array, read_only
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MassProperties:
+    """Mass properties of a rigid body in some frame."""
+
+    mass: float
+    """kg."""
+    com: Array
+    """Centre of mass, m, shape (3,)."""
+    inertia: Array
+    """About the centre of mass, along the frame's axes, kg·m², shape (3, 3)."""
+
+
+def of_shape(shape: Shape, density: float) -> MassProperties:
+    """Mass properties of a solid shape in its link's frame; ``density`` in kg/m³.
+
+    Cylinder: I_z = m r²/2, I_x = m (3 r² + l²)/12. The capsule adds two half balls of mass m_b = 2/3 π r³ ρ, whose
+    centres of mass lie 3/8 r beyond the cylinder's ends: I_z += 2 · 2/5 m_b r²,
+    I_x += 2 m_b (2/5 r² + l²/4 + 3/8 l r). (Beer & Johnston, Vector Mechanics, tables of inertia; parallel axes.)
+    """
+    r, length = shape.radius, shape.length
+    mass = density * math.pi * r * r * length
+    I_z = mass * r * r / 2
+    I_x = mass * (3 * r * r + length * length) / 12
+    if shape.kind is ShapeKind.CAPSULE:
+        half_ball = density * math.pi * r * r * r * 2 / 3
+        I_z += 2 * half_ball * (2 / 5) * r * r
+        I_x += 2 * half_ball * (2 / 5 * r * r + length * length / 4 + 3 / 8 * length * r)
+        mass += 2 * half_ball
+    own = read_only([[I_x, 0, 0], [0, I_x, 0], [0, 0, I_z]])
+    T = shape.T_link_shape
+    return MassProperties(mass=mass, com=read_only(T[:3, 3]), inertia=rotate_tensor(T, own))
+
+
+def combine(parts: Iterable[MassProperties]) -> MassProperties:
+    """Mass properties of rigid bodies fixed to each other, all in one frame (parallel-axis theorem)."""
+    parts = tuple(parts)
+    mass = math.fsum(part.mass for part in parts)
+    com = [math.fsum(part.mass * float(part.com[i]) for part in parts) / mass for i in range(3)]
+    moved = [
+        shift_inertia(part.inertia, part.mass, [float(part.com[i]) - com[i] for i in range(3)]) for part in parts
+    ]
+    inertia = [[math.fsum(float(tensor[i][j]) for tensor in moved) for j in range(3)] for i in range(3)]
+    return MassProperties(mass=mass, com=read_only(com), inertia=read_only(inertia))
+
+
+def shift_inertia(inertia: Array, mass: float, offset: list[float]) -> Array:
+    """Inertia, shape (3, 3), about a point ``offset`` (m) away from the centre of mass: I + m (o·o E - o oᵀ)."""
+    square = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]
+    return read_only(
+        [
+            [float(inertia[i, j]) + mass * ((square if i == j else 0.0) - offset[i] * offset[j]) for j in range(3)]
+            for i in range(3)
+        ]
+    )
+
+
+def rotate_tensor(T: Array, tensor: Array) -> Array:
+    """R A Rᵀ, shape (3, 3), with R the rotation of the pose ``T``; exactly symmetric."""
+    R = [[float(T[i, j]) for j in range(3)] for i in range(3)]
+    A = [[float(tensor[i, j]) for j in range(3)] for i in range(3)]
+    RA = [[R[i][0] * A[0][j] + R[i][1] * A[1][j] + R[i][2] * A[2][j] for j in range(3)] for i in range(3)]
+    out = [[0.0] * 3 for _ in range(3)]
+    for i in range(3):
+        for j in range(i, 3):
+            out[i][j] = out[j][i] = RA[i][0] * R[j][0] + RA[i][1] * R[j][1] + RA[i][2] * R[j][2] + 0.0
+    return read_only(out)
+
+
+def in_frame(T: Array, body: MassProperties) -> MassProperties:
+    """``body``, given in frame b, in the frame a in which b has pose ``T`` (T_a_b, shape (4, 4))."""
+    return MassProperties(
+        mass=body.mass, com=read_only(move_point(T, body.com)), inertia=rotate_tensor(T, body.inertia)
+    )
+
+
+def move_point(T: Array, point: Array) -> list[float]:
+    """A point (m, shape (3,)) of frame b in frame a, with T_a_b of shape (4, 4)."""
+    return [
+        float(T[i, 0]) * float(point[0])
+        + float(T[i, 1]) * float(point[1])
+        + float(T[i, 2]) * float(point[2])
+        + float(T[i, 3])
+        for i in range(3)
+    ]

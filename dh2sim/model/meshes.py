@@ -1,0 +1,82 @@
+"""Meshes that show links: read with trimesh, handed on in the one form that every engine reads, binary STL."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from dh2sim.errors import MeshError
+from dh2sim.robot.spec import MeshSpec
+
+if TYPE_CHECKING:
+    import trimesh
+
+MOST_FACES = 200_000
+"""MuJoCo refuses an STL file with more."""
+STL_HEADER, STL_FACE = 84, 50
+"""Bytes of a binary STL file: before the faces, and for each."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeshAsset:
+    """A mesh file as it is exported; it shows a link in the link's DH frame."""
+
+    file_name: str
+    """Name in the export's ``meshes`` folder."""
+    data: bytes = field(repr=False)
+    """A binary STL file."""
+    scale: float
+    """Metres per unit of the file."""
+    converted_from: str | None
+    """Suffix of the original where it was no binary STL file, such as ``.glb``; colours and textures are lost."""
+
+
+def load_mesh(mesh: MeshSpec, link_name: str) -> MeshAsset:
+    """Read a mesh file.
+
+    Args:
+        mesh: which file, and its scale.
+        link_name: names the exported file.
+
+    Raises:
+        MeshError: it cannot be read, holds no faces, holds numbers that are not finite, or too many faces; the text
+            names the row of the robot file.
+    """
+    try:
+        original = mesh.file.read_bytes()
+        surface = _read(mesh)
+    except Exception as error:  # trimesh's readers raise whatever their formats trip over
+        raise MeshError(f"{mesh.location}: cannot read the mesh '{mesh.file}': {_words(error)}") from error
+    _check(surface, mesh)
+    suffix = mesh.file.suffix.lower()
+    if suffix == ".stl" and len(original) == STL_HEADER + STL_FACE * len(surface.faces):
+        data, converted = original, None
+    else:
+        data, converted = bytes(surface.export(file_type="stl")), suffix
+    return MeshAsset(file_name=f"{link_name}.stl", data=data, scale=mesh.scale, converted_from=converted)
+
+
+def _read(mesh: MeshSpec) -> trimesh.Trimesh:
+    import trimesh  # takes seconds: only robots with meshes pay for it
+
+    return trimesh.load_mesh(mesh.file, process=False)
+
+
+def _check(surface: trimesh.Trimesh, mesh: MeshSpec) -> None:
+    import numpy as np
+
+    faces = len(getattr(surface, "faces", ()))
+    if faces == 0:
+        raise MeshError(f"{mesh.location}: the mesh '{mesh.file}' holds no faces")
+    if faces > MOST_FACES:
+        raise MeshError(
+            f"{mesh.location}: the mesh '{mesh.file}' holds {faces} faces; MuJoCo reads at most {MOST_FACES}. "
+            "Simplify it, for instance with Blender's Decimate or trimesh's simplify_quadric_decimation"
+        )
+    if not np.isfinite(surface.vertices).all():
+        raise MeshError(f"{mesh.location}: the mesh '{mesh.file}' holds coordinates that are no finite numbers")
+
+
+def _words(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return text or type(error).__name__

@@ -1,0 +1,98 @@
+"""The primitive shapes that links are made of, placed in the joint frame of their link."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from dh2sim.kinematics.transforms import compose
+from dh2sim.typing import Array, read_only
+
+
+class ShapeKind(StrEnum):
+    """A primitive; its axis is its own z, and its centre is its origin."""
+
+    CYLINDER = "cylinder"
+    CAPSULE = "capsule"
+
+
+class ShapePart(StrEnum):
+    """What a shape stands for; joints are drawn darker than links."""
+
+    JOINT = "joint"
+    LINK = "link"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Shape:
+    """A primitive that belongs to a link."""
+
+    kind: ShapeKind
+    part: ShapePart
+    radius: float
+    """m, positive."""
+    length: float
+    """Of the cylindrical part along z, m, positive; a capsule has half a ball more at each end."""
+    T_link_shape: Array = field(repr=False)
+    """Pose of the shape's centre in the link's (joint-placed) frame, shape (4, 4)."""
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """Ends of the cylindrical part's axis in the link frame, m, two arrays of shape (3,)."""
+        centre, half = self.T_link_shape[:3, 3], 0.5 * self.length * self.T_link_shape[:3, 2]
+        return centre - half, centre + half
+
+
+def between(kind: ShapeKind, part: ShapePart, radius: float, start: Array, end: Array) -> Shape:
+    """Make a shape whose axis runs from ``start`` to ``end`` (link frame, m, shape (3,) each, not the same)."""
+    along = [float(b) - float(a) for a, b in zip(start, end, strict=True)]
+    length = math.sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2])
+    centre = [0.5 * (float(a) + float(b)) for a, b in zip(start, end, strict=True)]
+    return Shape(
+        kind=kind,
+        part=part,
+        radius=radius,
+        length=length,
+        T_link_shape=pose_with_z(centre, [component / length for component in along]),
+    )
+
+
+def along_z(kind: ShapeKind, part: ShapePart, radius: float, start: float, end: float) -> Shape:
+    """Make a shape on the link frame's z axis, from height ``start`` to ``end`` (m, start < end)."""
+    return between(kind, part, radius, read_only([0, 0, start]), read_only([0, 0, end]))
+
+
+def placed(shape: Shape, T_link_frame: Array) -> Shape:
+    """Return ``shape``, given in some frame, in the link in which that frame has pose ``T_link_frame``."""
+    return Shape(
+        kind=shape.kind,
+        part=shape.part,
+        radius=shape.radius,
+        length=shape.length,
+        T_link_shape=compose(T_link_frame, shape.T_link_shape),
+    )
+
+
+def pose_with_z(origin: list[float], z: list[float]) -> Array:
+    """Return a pose, shape (4, 4), at ``origin`` (m) whose z axis is the unit vector ``z``; x is any normal to it.
+
+    The frame is turned about the coordinate axis that z is farthest from, so axes along x, y or z stay exact.
+    """
+    smallest = min(range(3), key=lambda i: (abs(z[i]), i))
+    other = [0.0, 0.0, 0.0]
+    other[smallest] = 1.0
+    if z[2] == 1.0:
+        x, y = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]
+    else:
+        y = _cross(z, other)
+        norm = math.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
+        y = [component / norm for component in y]
+        x = _cross(y, z)
+    return read_only(
+        [[x[i] + 0.0, y[i] + 0.0, z[i] + 0.0, origin[i] + 0.0] for i in range(3)] + [[0.0, 0.0, 0.0, 1.0]]
+    )
+
+
+def _cross(a: list[float], b: list[float]) -> list[float]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
