@@ -1,0 +1,181 @@
+"""``dh2sim validate``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dh2sim.cli.running import FELL_SHORT, build_all
+from dh2sim.errors import OutputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dh2sim.model.robot_model import RobotModel
+    from dh2sim.validate.report import Check, ValidationReport
+
+
+def validate(
+    robots: Annotated[
+        list[str],
+        typer.Argument(metavar="ROBOT...", help="Robot files, or names of robots that come with dh2sim."),
+    ],
+    samples: Annotated[int, typer.Option(min=1, help="Random configurations, inside the limits.")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random configurations.")] = 0,
+    tolerance: Annotated[
+        float,
+        typer.Option(help="Allowed angle, rad, and distance as a share of the larger of 1 m and the reach."),
+    ] = 1e-12,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--dir", metavar="DIR", help="Read the files in DIR/<name>/ instead of exporting afresh."),
+    ] = None,
+    json_file: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE|-", help="Write the report as JSON; - prints it, and nothing else."),
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the report as JUnit XML.")] = None,
+) -> int:
+    """Check every engine against the table: poses, Jacobians and dynamics.
+
+    Compared are the library itself, MuJoCo on the MJCF and on the URDF, yourdfpy, and pinocchio where it is
+    installed. Exit status 1 if anything differs by more than rounding.
+
+    \b
+    Examples:
+      dh2sim validate stanford
+      dh2sim validate my_arm.yaml --samples 100000 --json report.json
+      dh2sim validate robots/*.yaml --dir generated --junit report.xml
+    """
+    if not 0.0 < tolerance < 1.0:
+        raise typer.BadParameter(f"{tolerance} is not between 0 and 1", param_hint="--tolerance")
+    models = build_all(robots)
+    if folder is not None:
+        _require_files(models, folder)
+    from dh2sim.validate.junit import to_junit
+    from dh2sim.validate.report import ValidationReport
+    from dh2sim.validate.run import engine_samples, validate_robot
+
+    with _progress(len(models) * engine_samples(samples)) as advance:
+        report = ValidationReport(
+            robots=tuple(
+                validate_robot(
+                    model,
+                    samples=samples,
+                    seed=seed,
+                    tolerance=tolerance,
+                    folder=None if folder is None else folder / model.name,
+                    advance=advance,
+                )
+                for model in models
+            )
+        )
+    text = json.dumps(report.to_json(), indent=2)
+    if json_file == "-":
+        print(text)
+    else:
+        _print(report)
+        if json_file is not None:
+            _write(Path(json_file), text + "\n")
+    if junit is not None:
+        _write(junit, to_junit(report))
+    return 0 if report.ok else FELL_SHORT
+
+
+def _require_files(models: list[RobotModel], folder: Path) -> None:
+    for model in models:
+        if not (folder / model.name).is_dir():
+            advice = f"write it with 'dh2sim export {model.name} --out {folder}'"
+            raise OutputError(f"there is no folder '{folder / model.name}'; {advice}")
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"cannot write '{path}': {error.strerror or error}") from error
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[Callable[[int], None]]:
+    """Show a progress bar on standard error, if that is a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    with Progress(
+        TextColumn("comparing"),
+        BarColumn(),
+        TextColumn("{task.completed:,.0f} of {task.total:,.0f} poses"),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+        disable=not sys.stderr.isatty(),
+    ) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda done: bar.advance(task, done)
+
+
+def _print(report: ValidationReport) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from dh2sim.validate.junit import failure_text
+
+    console = Console(highlight=False)
+    for robot in report.robots:
+        verdict = (
+            Text("matches its table", "bold green") if robot.ok else Text("DOES NOT match its table", "bold red")
+        )
+        console.print(Text.assemble((robot.name, "bold"), " ", verdict))
+        table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
+        table.add_column("engine", no_wrap=True)
+        table.add_column("compared", no_wrap=True)
+        table.add_column("samples", justify="right", no_wrap=True)
+        table.add_column("worst error", justify="right", no_wrap=True)
+        table.add_column("limit", justify="right", no_wrap=True)
+        table.add_column("", no_wrap=True)
+        for check in robot.checks:
+            mark = {
+                True: Text("ok", "green"),
+                False: Text("FAILED", "bold red"),
+                None: Text("skipped", "yellow"),
+            }
+            if check.max_position_error is not None and check.max_rotation_error is not None:
+                worst = f"{check.max_position_error:.1e} m {check.max_rotation_error:.1e} rad"
+            else:
+                worst = "" if check.max_error is None else f"{check.max_error:.1e}"
+            table.add_row(
+                check.engine,
+                _compared(check),
+                f"{check.samples:,}" if check.samples else "",
+                worst,
+                "" if check.tolerance is None else f"{check.tolerance:.0e}",
+                mark[check.ok],
+            )
+        console.print(table)
+        for check in robot.checks:
+            if check.ok is False:
+                lead = Text(f"  {check.engine}, {check.quantity.value}: ", "red")
+                console.print(lead + Text(failure_text(check)), soft_wrap=True)
+            elif check.ok is None:
+                console.print(Text(f"  {check.engine}: {check.reason}", "yellow"), soft_wrap=True)
+        if not robot.ok:
+            console.print()
+    failed = [robot.name for robot in report.robots if not robot.ok]
+    if len(report.robots) > 1:
+        count = len(report.robots)
+        console.print(f"{count - len(failed)} of {count} robots match their tables.")
+
+
+def _compared(check: Check) -> str:
+    if check.frames is not None:
+        return f"pose, {check.frames} frames"
+    return "jacobian (central)" if check.reference == "central differences" else check.quantity.value

@@ -1,0 +1,1 @@
+"""Does it hold: every engine against the table itself."""

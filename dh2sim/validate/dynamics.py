@@ -1,0 +1,94 @@
+"""Dynamics: do the files hold the model's masses, and do the engines make the same equations of motion of them?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dh2sim.engines.engine import DynamicTerms
+from dh2sim.engines.mujoco_engine import MujocoEngine
+from dh2sim.errors import EngineError
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.typing import Array
+from dh2sim.validate.report import Check, Quantity, Worst
+
+TOLERANCE = 1e-9
+"""Relative."""
+
+
+def check_inertias(engine: MujocoEngine, model: RobotModel) -> Check:
+    """Compare mass, centre of mass and inertia of every link in a file with the model's.
+
+    Errors are relative: to the mass, to the reach, and to the inertia's trace.
+    """
+    worst, where = 0.0, ""
+    for link in model.links:
+        if link.inertial is None:
+            continue
+        try:
+            body, found = link.inertial, engine.mass_properties(link.name)
+        except EngineError as refusal:
+            return Check(engine=engine.name, quantity=Quantity.INERTIA, ok=False, reason=str(refusal))
+        errors = [
+            abs(found.mass - body.mass) / body.mass,
+            float(np.max(np.abs(found.com - body.com))) / max(1.0, model.reach),
+            float(np.max(np.abs(found.inertia - body.inertia))) / float(np.trace(body.inertia)),
+        ]
+        error = float(np.max(errors))
+        if not error <= worst:
+            worst, where = error, link.name
+    return Check(
+        engine=engine.name,
+        quantity=Quantity.INERTIA,
+        ok=bool(worst <= TOLERANCE),
+        reference="dh2sim",
+        max_error=worst,
+        tolerance=TOLERANCE,
+        worst=Worst(where=where, q=()),
+    )
+
+
+def check_dynamics(
+    engine: str, terms: DynamicTerms, reference: DynamicTerms, names: Sequence[str], q: Array
+) -> list[Check]:
+    """Compare an engine's dynamic terms with those of MuJoCo on the MJCF.
+
+    Args:
+        engine: the engine's name.
+        terms: what it computed for the N states.
+        reference: what MuJoCo computed from the MJCF.
+        names: of the n joints.
+        q: joint vectors of the states, shape (N, n).
+
+    Returns:
+        A check for each of the three terms. Entries of the mass matrix are relative to sqrt(M_ii M_jj), forces to the
+        greatest force that the same joint sees in any of the states, so that light wrists count like heavy shoulders.
+    """
+    diagonal = np.sqrt(np.einsum("kii->ki", reference.mass_matrix))
+    mass = np.abs(terms.mass_matrix - reference.mass_matrix) / (diagonal[:, :, None] * diagonal[:, None, :])
+    force = np.abs(reference.bias).max(axis=0)
+    # a joint that never feels a force: noise counts against a thousandth of what the others feel
+    force = np.maximum(force, 1e-3 * force.max(initial=0.0))
+    force = np.where(force > 0.0, force, np.square(diagonal).max(axis=0))
+    return [
+        _check(engine, Quantity.MASS_MATRIX, mass.max(axis=2), names, q),
+        _check(engine, Quantity.BIAS, np.abs(terms.bias - reference.bias) / force, names, q),
+        _check(engine, Quantity.GRAVITY, np.abs(terms.gravity - reference.gravity) / force, names, q),
+    ]
+
+
+def _check(engine: str, quantity: Quantity, error: Array, names: Sequence[str], q: Array) -> Check:
+    """Make a check from errors by state and joint, shape (N, n)."""
+    sample, joint = divmod(int(np.argmax(error)), error.shape[1])
+    largest = float(error[sample, joint])
+    return Check(
+        engine=engine,
+        quantity=quantity,
+        ok=bool(largest <= TOLERANCE),
+        reference="mujoco-mjcf",
+        samples=len(q),
+        max_error=largest,
+        tolerance=TOLERANCE,
+        worst=Worst(where=names[joint], q=tuple(q[sample].tolist()), sample=sample),
+    )

@@ -1,0 +1,133 @@
+"""What a validation found, and how it is told to programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+
+class Quantity(StrEnum):
+    """What is compared."""
+
+    POSE = "pose"
+    JACOBIAN = "jacobian"
+    MASS_MATRIX = "mass matrix"
+    BIAS = "bias force"
+    GRAVITY = "gravity force"
+    INERTIA = "link inertia"
+    UNIT_QUATERNIONS = "unit quaternions"
+    FILE = "file"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Worst:
+    """Where the worst error was found."""
+
+    where: str
+    """Frame, joint or link."""
+    q: tuple[float, ...]
+    """Joint vector, rad and m; empty where it does not depend on one."""
+    sample: int | None = None
+    """Index of the configuration among the samples."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One quantity of one engine, compared with its reference."""
+
+    engine: str
+    quantity: Quantity
+    ok: bool | None
+    """None: not checked, and ``reason`` says why."""
+    reference: str = "table"
+    samples: int = 0
+    frames: int | None = None
+    """Number of frames compared; for poses."""
+    max_position_error: float | None = None
+    """m; for poses."""
+    max_rotation_error: float | None = None
+    """rad; for poses."""
+    max_error: float | None = None
+    """For everything but poses; relative for dynamics."""
+    tolerance: float | None = None
+    """As given. For positions and the linear part of a Jacobian it is multiplied by the larger of 1 m and the
+    reach."""
+    reason: str | None = None
+    worst: Worst | None = None
+    seconds: float = field(default=0.0, compare=False)
+    """Time that the comparison took; not part of what is reported as a result."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry of the ``engines`` list, without what does not apply."""
+        entry: dict[str, Any] = {"engine": self.engine, "quantity": self.quantity.value}
+        for key, value in (
+            ("reference", self.reference if self.ok is not None else None),
+            ("samples", self.samples or None),
+            ("frames", self.frames),
+            ("max_position_error", self.max_position_error),
+            ("max_rotation_error", self.max_rotation_error),
+            ("max_error", self.max_error),
+            ("tolerance", self.tolerance),
+        ):
+            if value is not None:
+                entry[key] = _finite(value)
+        entry["ok"] = self.ok
+        if self.reason is not None:
+            entry["reason"] = self.reason
+        if self.ok is False and self.worst is not None:
+            entry["worst"] = {
+                "where": self.worst.where,
+                "q": list(self.worst.q),
+                "sample": self.worst.sample,
+            }
+        return entry
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotReport:
+    """All checks of a robot."""
+
+    name: str
+    samples: int
+    reach: float
+    """m."""
+    checks: tuple[Check, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing that was checked fell short."""
+        return all(check.ok is not False for check in self.checks)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry of the ``robots`` list."""
+        return {
+            "name": self.name,
+            "ok": self.ok,
+            "samples": self.samples,
+            "reach": self.reach,
+            "engines": [check.to_json() for check in self.checks],
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValidationReport:
+    """All robots of a validation."""
+
+    robots: tuple[RobotReport, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether every robot holds."""
+        return all(robot.ok for robot in self.robots)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what ``dh2sim validate --json`` prints."""
+        return {"ok": self.ok, "robots": [robot.to_json() for robot in self.robots]}
+
+
+def _finite(value: object) -> object:
+    """JSON has no NaN and no infinity: they become text."""
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return str(value)
+    return value
