@@ -1,0 +1,152 @@
+#!/usr/bin/env python3
+"""Write docs/robot-file.md, the reference of robot files, from their schema.
+
+    python scripts/robot_file_reference.py            write it
+    python scripts/robot_file_reference.py --check    exit 1 if it is not what the schema says
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from dh2sim.robot.schema import json_schema
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "robot-file.md"
+
+INTRODUCTION = """\
+<!-- Written by scripts/robot_file_reference.py from the schema. Do not edit. -->
+# The robot file
+
+One YAML file describes a robot: its DH table, and whatever else is known of it. The smallest one that works:
+
+```yaml
+name: planar
+convention: standard
+joints:
+  - {type: revolute, a: 1.0}
+  - {type: revolute, a: 0.7}
+```
+
+Everything that is left out is estimated or assumed, and `dh2sim info` says what. `dh2sim schema > robot.schema.json`
+writes the JSON Schema of this page; with `# yaml-language-server: $schema=robot.schema.json` on a robot file's first
+line, editors complete and check it while you type.
+
+## Numbers
+
+A number may be an arithmetic expression in a string over `parameters` and `pi`: `+ - * / **`, parentheses, and
+`sqrt sin cos tan asin acos atan atan2`. The functions take and return radians, whatever the file's angle unit is; in a
+file in degrees write `atan2(3, 4) * 180 / pi`. NaN and infinity are errors.
+
+## Units
+
+Lengths and angles are in the file's units (`units`; m and rad by default): `a`, `alpha`, `d`, `theta`, poses, limits,
+configurations, `com`, `radius`. Everything else is SI. Every export is in m and rad.
+
+## What is filled in
+
+| left out | becomes |
+|---|---|
+| position limits | ±π for a revolute joint; for a prismatic one ± what the rest of the robot reaches |
+| velocity limits | π rad/s, 1 m/s |
+| effort limits | what lifts twice the arm's weight, stretched out, at 10 rad/s² or m/s² |
+| shapes | cylinders and capsules along d and a, as thick as suits the robot's own size, or `radius` |
+| mass, com, inertia | those of the shapes, solid, of 1000 kg/m³ or `density`; what is given wins |
+| actuator gains | those that make each joint critically damped at 100 rad/s in the configuration `home` |
+
+Assumed velocity and effort limits are written to the URDF, which must have some, and not to the MJCF.
+
+## Errors
+
+Whatever is wrong in a file is told at once, a line each: `file:line:column: path: what was found and what is
+allowed`. Unknown keys, duplicate names, limits the wrong way round, inertias that no body can have, vectors of the
+wrong length, cycles in `parameters` and the like are errors, never warnings. A file may have at most 1 MB.
+"""
+
+TITLES = {
+    "UnitsEntry": "`units`",
+    "PoseEntry": "`tool`",
+    "BaseEntry": "`base`",
+    "JointEntry": "`joints`: a row of the table",
+    "LimitsEntry": "`joints[].limits`",
+    "DynamicsEntry": "`joints[].dynamics`",
+    "LinkEntry": "`joints[].link`",
+    "InertiaEntry": "`joints[].link.inertia`",
+    "MeshEntry": "`mesh`, of a link or the base",
+    "ActuatorEntry": "`actuators`, and `joints[].actuator`",
+}
+
+
+def page() -> str:
+    """Return the page."""
+    schema = json_schema()
+    return INTRODUCTION + "\n".join(["", *_section("Top level", schema, schema), *_sections(schema)])
+
+
+def _sections(schema: dict[str, Any]) -> Iterator[str]:
+    for name, title in TITLES.items():
+        yield from _section(title, schema["$defs"][name], schema)
+
+
+def _section(title: str, entry: dict[str, Any], schema: dict[str, Any]) -> Iterator[str]:
+    yield f"## {title}\n"
+    yield f"{entry.get('description', '')}\n"
+    yield "| key | value | meaning |"
+    yield "|---|---|---|"
+    for key, value in entry["properties"].items():
+        required = " (required)" if key in entry.get("required", ()) else ""
+        yield f"| `{key}`{required} | {_kind(value, schema)} | {value.get('description', '')} |"
+    yield ""
+
+
+def _kind(value: dict[str, Any], schema: dict[str, Any]) -> str:
+    if "$ref" in value:
+        target = schema["$defs"][value["$ref"].rsplit("/", 1)[1]]
+        return " \\| ".join(f"`{name}`" for name in target["enum"]) if "enum" in target else "mapping"
+    kind = value.get("type")
+    if kind == ["number", "string"]:
+        text = "number"
+        if "exclusiveMinimum" in value:
+            text += f" > {value['exclusiveMinimum']:g}"
+        elif "minimum" in value:
+            text += f" >= {value['minimum']:g}"
+        return text + _default(value)
+    if kind == "array":
+        least, most = value.get("minItems"), value.get("maxItems")
+        count = f"{least}" if least == most else f"{least} to {most}" if most else ""
+        item = "mappings" if "$ref" in value.get("items", {}) else "numbers"
+        return f"list of {count} {item}".replace("  ", " ") + _default(value)
+    if kind == "object":
+        return "mapping of names to " + (
+            "lists of numbers" if value["additionalProperties"].get("type") == "array" else "numbers"
+        )
+    return {"string": "text", "boolean": "`true` \\| `false`"}[str(kind)] + _default(value)
+
+
+def _default(value: dict[str, Any]) -> str:
+    default = value.get("default")
+    if default in (None, "", {}):
+        return ""
+    if isinstance(default, bool):
+        return f", default `{str(default).lower()}`"
+    shown = [f"{x:g}" for x in default] if isinstance(default, list) else f"{default:g}"
+    return f", default `[{', '.join(shown)}]`" if isinstance(shown, list) else f", default {shown}"
+
+
+def main() -> int:
+    """Write or check the page; return the exit status."""
+    text = page()
+    if sys.argv[1:] == ["--check"]:
+        if not PAGE.exists() or PAGE.read_text(encoding="utf-8") != text:
+            print(f"{PAGE}: not what the schema says; run scripts/robot_file_reference.py", file=sys.stderr)
+            return 1
+        print(f"{PAGE.name}: up to date")
+        return 0
+    PAGE.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
