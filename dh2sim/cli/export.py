@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sys
+import textwrap
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.running import FELL_SHORT, build_all
+from dh2sim.cli.running import DONE, FELL_SHORT, build_all, complain
+from dh2sim.errors import Dh2simError, OutputError
 
 if TYPE_CHECKING:
     from dh2sim.export.render import Format
@@ -19,7 +22,7 @@ if TYPE_CHECKING:
 def export(
     robots: Annotated[
         list[str],
-        typer.Argument(metavar="ROBOT...", help="Robot files, or names of robots that come with dh2sim."),
+        typer.Argument(metavar="ROBOT", help="Robot files, or names of robots that come with dh2sim."),
     ],
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Where to write; every robot gets a folder of its own.")
@@ -41,12 +44,12 @@ def export(
 ) -> int:
     """Write a robot as URDF and MJCF, and verify them against its table.
 
-    Every pose that MuJoCo reads from the written files is compared with the textbook product of the table before the
-    files are put in place. Files are written all together or not at all.
+    The poses that MuJoCo reads from the written files are compared with the textbook product of the table before the
+    files are put in place. The files of a robot are written all together or not at all.
 
     \b
     Examples:
-      dh2sim export stanford.yaml
+      dh2sim export stanford
       dh2sim export my_arm.yaml --out build --format urdf
       dh2sim export robots/*.yaml --check        # in CI: are the files up to date?
     """
@@ -56,10 +59,17 @@ def export(
         return _check(models, out, wanted, dh_frames=not no_dh_frames)
     from dh2sim.export.run import export_robot
 
+    status = DONE
     for model in models:
-        report = export_robot(model, out, formats=wanted, dh_frames=not no_dh_frames, verified=not no_verify)
-        _tell(report, model)
-    return 0
+        try:
+            report = export_robot(model, out, formats=wanted, dh_frames=not no_dh_frames, verified=not no_verify)
+        except OutputError:
+            raise  # the next robot would fare no better
+        except Dh2simError as error:
+            status = max(status, complain(error))
+        else:
+            _tell(report, out, model)
+    return status
 
 
 def _formats(names: list[str] | None) -> list[Format]:
@@ -92,31 +102,31 @@ def _check(models: list[RobotModel], out: Path, formats: list[Format], *, dh_fra
     return status
 
 
-def _tell(report: ExportReport, model: RobotModel) -> None:
+def _tell(report: ExportReport, out: Path, model: RobotModel) -> None:
     """Print a table of files with their errors, then what was lost, estimated and assumed."""
-    width = max(len(str(file.path)) for file in report.files)
+    folder = out / report.name
     errors = {check.format.value: check for check in report.verified}
-    print(f"{report.name}")
-    print(f"  {'file':{width}}  {'size':>9}  {'worst pose error against the table':34}")
+    lines = [("file", "size", "worst pose error", "")]
     for file in report.files:
-        kind = {".urdf": "urdf", ".xml": "mjcf"}.get(file.path.suffix, "") if file.path.name != "scene.xml" else ""
-        check = errors.get(kind)
-        told = "" if check is None else f"{check.position_error:.1e} m  {check.rotation_error:.1e} rad"
-        if kind and check is None:
-            told = "not verified"
-        state = "" if file.changed else "  (unchanged)"
-        print(f"  {file.path!s:{width}}  {file.size:>7} B  {told}{state}".rstrip())
+        name = file.path.relative_to(folder).as_posix()
+        kind = {f"{report.name}.urdf": "urdf", f"{report.name}.xml": "mjcf"}.get(name)
+        check = errors.get(kind or "")
+        told = "not verified" if kind else ""
+        if check is not None:
+            told = f"{check.position_error:.1e} m, {check.rotation_error:.1e} rad"
+        lines.append((name, f"{file.size:,} B", told, "" if file.changed else "unchanged"))
+    widths = [max(len(line[i]) for line in lines) for i in range(3)]
+    print(f"{report.name}: {folder}")
+    for name, size, told, state in lines:
+        print(f"  {name:{widths[0]}}  {size:>{widths[1]}}  {told:{widths[2]}}  {state}".rstrip())
     _list("not carried over", report.losses)
-    _list("estimated", _estimated(model))
+    _list("estimated from the shapes", _estimated(model))
     _list("assumed", _assumed(model))
 
 
-def _list(title: str, lines: list[str] | tuple[str, ...]) -> None:
-    import textwrap
-
+def _list(title: str, lines: Iterable[str]) -> None:
     for line in lines:
-        lead = f"  {title}: "
-        print(textwrap.fill(line, 100, initial_indent=lead, subsequent_indent="    "))
+        print(textwrap.fill(f"{title}: {line}", 80, initial_indent="  ", subsequent_indent="    "))
 
 
 def _estimated(model: RobotModel) -> list[str]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dh2sim.cli.running import load_all
+from dh2sim.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -22,7 +23,7 @@ def fk(
     ],
     q: Annotated[
         list[str] | None,
-        typer.Argument(metavar="Q...", help="Joint coordinates in m and rad; expressions such as -pi/2 are allowed."),
+        typer.Argument(metavar="Q", help="Joint coordinates in m and rad; expressions such as -pi/2 are allowed."),
     ] = None,
     frame: Annotated[str, typer.Option(help="tool0, base_link, dh_0 … dh_n or link_1 … link_n.")] = "tool0",
     degrees: Annotated[
@@ -47,13 +48,15 @@ def fk(
 
     [spec] = load_all([robot])
     pose = frame_pose(build_chain(spec), frame, _joint_vector(spec, q or [], degrees=degrees))
+    if not bool(abs(pose).max() < math.inf):
+        raise ConfigurationError(f"{spec.name}: the pose of {frame} is too far away for a number to tell")
     if as_json:
         print(json.dumps({"robot": spec.name, "frame": frame, "pose": pose.tolist()}))
         return
     unit = 180 / math.pi if degrees else 1.0
     print(f"{spec.name}: pose of {frame} in base_link")
     for row in pose:
-        print("  " + " ".join(f"{value + 0.0:14.9f}" for value in row))
+        print("  " + " ".join(f"{_rounded(value):14.9f}" for value in row))
     print("position    " + _numbers(pose[:3, 3]) + " m")
     angles = [float(angle) * unit for angle in rpy_from_rotation(pose[:3, :3])]
     print("rpy         " + _numbers(angles) + (" deg" if degrees else " rad"))
@@ -61,32 +64,45 @@ def fk(
 
 
 def _numbers(values: Iterable[float]) -> str:
-    return " ".join(f"{round(float(value), 9) + 0.0:.9f}" for value in values)
+    return " ".join(f"{_rounded(value):.9f}" for value in values)
+
+
+def _rounded(value: float) -> float:
+    """To what is printed, so that there is no -0.000000000."""
+    return round(float(value), 9) + 0.0
 
 
 def _joint_vector(spec: RobotSpec, texts: list[str], *, degrees: bool) -> list[float]:
-    from dh2sim.errors import ConfigurationError
     from dh2sim.robot.expressions import ExpressionError, evaluate
 
-    if len(texts) <= 1 and (not texts or texts[0] in spec.configurations):
-        name = texts[0] if texts else "home"
-        if name in spec.configurations:
-            return [float(value) for value in spec.configurations[name]]
-        return [0.0] * len(spec.moving_rows)
+    if not texts:
+        return [float(x) for x in spec.configurations.get("home", [0.0] * len(spec.moving_rows))]
+    if len(texts) == 1 and texts[0] in spec.configurations:
+        return [float(x) for x in spec.configurations[texts[0]]]
     for text in texts:
         if text.startswith("--"):
-            raise typer.BadParameter(f"no such option: {text}")
+            raise ConfigurationError(f"fk has no option '{text}'. Options: --frame, --degrees, --json, --help")
     moving = spec.moving_rows
     if len(texts) != len(moving):
-        names = ", ".join(
-            f"{row.name} ({'m' if not row.type.turns else 'deg' if degrees else 'rad'})" for row in moving
-        )
-        raise ConfigurationError(f"{spec.name} has {len(moving)} joint coordinates, got {len(texts)}: {names}")
+        raise ConfigurationError(_wrong_count(spec, texts, degrees=degrees))
     values = []
     for row, text in zip(moving, texts, strict=True):
         try:
             value = evaluate(text, {})
         except ExpressionError as error:
-            raise ConfigurationError(f"{row.name}: '{text}' is no number: {error}") from None
+            raise ConfigurationError(f"{row.name}: {error}") from None
         values.append(math.radians(value) if degrees and row.type.turns else value)
     return values
+
+
+def _wrong_count(spec: RobotSpec, texts: list[str], *, degrees: bool) -> str:
+    from dh2sim.robot.words import did_you_mean, listed
+
+    moving = spec.moving_rows
+    names = ", ".join(f"{row.name} ({'m' if not row.type.turns else 'deg' if degrees else 'rad'})" for row in moving)
+    count = "1 joint coordinate" if len(moving) == 1 else f"{len(moving) or 'no'} joint coordinates"
+    told = f"{spec.name} has {count}, got {len(texts)}" + (f": {names}" if names else "")
+    if len(texts) > 1 or not texts[0].isidentifier():
+        return told
+    hint = did_you_mean(texts[0], spec.configurations)
+    return f"{spec.name} has no configuration '{texts[0]}'.{hint} Configurations: {listed(spec.configurations)}"

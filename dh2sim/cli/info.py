@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dh2sim.cli.running import build_all
+from dh2sim.cli.tables import print_whole
 
 if TYPE_CHECKING:
     from dh2sim.model.robot_model import JointModel, RobotModel
@@ -30,7 +31,7 @@ def info(
     """
     [model] = build_all([robot])
     if as_json:
-        print(json.dumps(as_dict(model), indent=2, ensure_ascii=False))
+        print(json.dumps(as_dict(model), indent=2))
     else:
         _print(model)
 
@@ -92,11 +93,12 @@ def _print(model: RobotModel) -> None:
 
     console = Console(highlight=False)
     spec = model.spec
-    console.print(Text.assemble((spec.name, "bold"), f"  {' '.join(spec.description.split())}"))
+    description = " ".join(spec.description.split())
+    console.print(Text.assemble((spec.name, "bold"), f"  {description}" if description else ""))
     if spec.source:
         console.print(Text(f"Source: {' '.join(spec.source.split())}", "dim"))
-    console.print(_dh_table(model))
-    console.print(_frame_table(model))
+    for table in (_dh_table(model), _frame_table(model)):
+        print_whole(table)
     console.print(f"reach at most {model.reach:.4g} m, moving mass {model.mass:.4g} kg")
     for line in _remarks(model):
         console.print(Text(line))
@@ -114,7 +116,7 @@ def _dh_table(model: RobotModel) -> Any:
     title = "mixed conventions" if mixed else f"{spec.rows[0].convention.value} convention"
     table = Table(box=box.SIMPLE_HEAD, title=f"DH table, {title}", title_justify="left", pad_edge=False)
     for column in ("i", "joint", "type", *(("convention",) if mixed else ())):
-        table.add_column(column)
+        table.add_column(column, no_wrap=True)
     for column in (f"{a}\nm", f"{alpha}\ndeg", "d i\nm", "theta i\ndeg", "limits"):
         table.add_column(column, justify="right", no_wrap=True)
     for i, (row, joint) in enumerate(zip(spec.rows, model.joints, strict=True), start=1):
@@ -158,7 +160,10 @@ def _frame_table(model: RobotModel) -> Any:
     from dh2sim.kinematics.forward import forward_kinematics, frame_poses
     from dh2sim.kinematics.transforms import rpy_from_rotation
 
-    home = "home" if "home" in model.spec.configurations else "zero"
+    if "home" in model.spec.configurations:
+        home = "home"
+    else:
+        home = "zero moved inside the limits" if any(model.home) else "zero"
     table = Table(box=box.SIMPLE_HEAD, title=f"Frames in base_link at {home}", title_justify="left", pad_edge=False)
     table.add_column("frame")
     for column in ("x\nm", "y\nm", "z\nm", "roll\ndeg", "pitch\ndeg", "yaw\ndeg"):

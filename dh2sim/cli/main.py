@@ -1,70 +1,40 @@
-"""The ``dh2sim`` program."""
+"""The ``dh2sim`` program, from its start to its end; what it can do is imported when it runs."""
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
-from dh2sim.cli.export import export
-from dh2sim.cli.fk import fk
-from dh2sim.cli.info import info
-from dh2sim.cli.robots import list_robots
-from dh2sim.cli.running import guarded
-from dh2sim.cli.schema import schema
-from dh2sim.cli.validate import validate
-
-HELP = """\
-From a Denavit-Hartenberg table to a simulated robot that provably matches it.
-
-\b
-  dh2sim list                        the robots that come with it
-  dh2sim info stanford               its table, frames, mass and reach
-  dh2sim export stanford             write URDF and MJCF to generated/stanford/
-  dh2sim validate stanford           check every engine against the table
-  dh2sim fk stanford 0.3 -0.7 0.5 1.1 0.6 -0.4
-
-ROBOT is the path of a robot file, or the name of a robot that comes with dh2sim.
-Exit status: 0 done, 1 a check fell short, 2 bad input or usage, 130 interrupted.
-"""
-
-# Plain help texts: importing rich for them would double the time that --help takes.
-app = typer.Typer(
-    help=HELP,
-    add_completion=False,
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-)
-
-
-def _show_version(wanted: bool) -> None:
-    if wanted:
-        from importlib.metadata import version
-
-        typer.echo(f"dh2sim {version('dh2sim')}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    """Hold the options of the program itself."""
-
-
-app.command()(guarded(export))
-app.command()(guarded(validate))
-# a negative number is no option
-app.command(context_settings={"ignore_unknown_options": True})(guarded(fk))
-app.command()(guarded(info))
-app.command("list")(guarded(list_robots))
-app.command()(guarded(schema))
+import io
+import os
+import signal
+import sys
+from types import FrameType
 
 
 def main() -> None:
     """Run the command line; does not return."""
-    app()
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        _prepare_streams()
+        from dh2sim.cli.app import app
+
+        app()
+    except KeyboardInterrupt:  # outside of any command: those tell it themselves
+        sys.stderr.write("dh2sim: interrupted\n")
+        raise SystemExit(130) from None
+    finally:
+        # Python takes a while to end; a Ctrl-C meanwhile ends it at once, without a traceback
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _terminate(number: int, _frame: FrameType | None) -> None:
+    """End in good order: temporary folders are removed. The status is the one that a shell gives to such an end."""
+    raise SystemExit(128 + number)
+
+
+def _prepare_streams() -> None:
+    """Make sure that there are streams to write to, and that they can write every character in some way."""
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")

@@ -6,7 +6,7 @@ import functools
 import os
 import sys
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, ParamSpec
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 from dh2sim.errors import Dh2simError, MismatchError, RobotFileError
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from dh2sim.robot.spec import RobotSpec
 
 P = ParamSpec("P")
+T = TypeVar("T")
+R = TypeVar("R")
 
 DONE, FELL_SHORT, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -27,49 +29,41 @@ def guarded(command: Callable[P, int | None]) -> Callable[P, None]:
         try:
             status = command(*args, **kwargs) or DONE
             sys.stdout.flush()
-        except MismatchError as error:
-            status = complain(error, FELL_SHORT)
         except Dh2simError as error:
-            status = complain(error, BAD_INPUT)
+            status = complain(error)
         except BrokenPipeError:
             # whoever read our output has had enough; a second complaint at exit is not wanted either
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             status = DONE
         except OSError as error:
             where = f"{error.filename}: " if error.filename else ""
-            status = complain(f"{where}{error.strerror or error}", BAD_INPUT)
+            status = complain(f"{where}{error.strerror or error}")
+        except MemoryError:
+            status = complain("there is not enough memory for that")
         except KeyboardInterrupt:
-            status = complain("interrupted", INTERRUPTED)
+            complain("interrupted")
+            status = INTERRUPTED
         raise SystemExit(status)
 
     return run
 
 
-def complain(error: object, status: int) -> int:
-    """Print an error and return the exit status; problems of robot files stand on lines of their own."""
+def complain(error: object) -> int:
+    """Print an error and return its exit status; problems of robot files stand on lines of their own."""
     text = str(error) if isinstance(error, RobotFileError) else f"dh2sim: {error}"
     print(text, file=sys.stderr)
-    return status
+    return FELL_SHORT if isinstance(error, MismatchError) else BAD_INPUT
 
 
 def load_all(robots: Sequence[str]) -> list[RobotSpec]:
     """Read robot files, and tell the errors of all of them at once.
 
     Raises:
-        RobotFileError: some are wrong.
-        Dh2simError: one is not found or cannot be read; raised after the others' errors were printed.
+        Dh2simError: files are wrong, not found or cannot be read; the last error, after the others were printed.
     """
     from dh2sim.robot.load import load_robot
 
-    specs: list[RobotSpec] = []
-    errors: list[Dh2simError] = []
-    for robot in robots:
-        try:
-            specs.append(load_robot(robot))
-        except Dh2simError as error:
-            errors.append(error)
-    _raise_all(errors)
-    return specs
+    return _all(load_robot, robots)
 
 
 def build_all(robots: Sequence[str]) -> list[RobotModel]:
@@ -81,24 +75,28 @@ def build_all(robots: Sequence[str]) -> list[RobotModel]:
     from dh2sim.model.build import build_model
 
     specs = load_all(robots)
-    names = [spec.name for spec in specs]
-    for name in names:
-        if names.count(name) > 1:
-            raise Dh2simError(f"two of the robots are named '{name}', and would be written to the same folder")
-    models: list[RobotModel] = []
+    first: dict[str, str] = {}
+    for robot, spec in zip(robots, specs, strict=True):
+        if spec.name in first:
+            raise Dh2simError(
+                f"{first[spec.name]} and {robot}: both robots are named '{spec.name}', but every robot has a folder "
+                "of its name to itself"
+            )
+        first[spec.name] = robot
+    return _all(build_model, specs)
+
+
+def _all(make: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    """Apply a function to all items; print all errors but the last, and raise that."""
+    made: list[R] = []
     errors: list[Dh2simError] = []
-    for spec in specs:
+    for item in items:
         try:
-            models.append(build_model(spec))
+            made.append(make(item))
         except Dh2simError as error:
             errors.append(error)
-    _raise_all(errors)
-    return models
-
-
-def _raise_all(errors: list[Dh2simError]) -> None:
-    """Print all errors but the last, and raise that."""
-    for error in errors[:-1]:
-        complain(error, BAD_INPUT)
+    for earlier in errors[:-1]:
+        complain(earlier)
     if errors:
         raise errors[-1]
+    return made

@@ -16,4 +16,4 @@ def schema() -> None:
 
     from dh2sim.robot.schema import json_schema
 
-    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    print(json.dumps(json_schema(), indent=2))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,22 +12,25 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.running import FELL_SHORT, build_all
-from dh2sim.errors import OutputError
+from dh2sim.cli.running import FELL_SHORT, build_all, complain
+from dh2sim.cli.tables import print_whole
+from dh2sim.errors import Dh2simError, OutputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rich.table import Table
+
     from dh2sim.model.robot_model import RobotModel
-    from dh2sim.validate.report import Check, ValidationReport
+    from dh2sim.validate.report import Check, RobotReport, ValidationReport
 
 
 def validate(
     robots: Annotated[
         list[str],
-        typer.Argument(metavar="ROBOT...", help="Robot files, or names of robots that come with dh2sim."),
+        typer.Argument(metavar="ROBOT", help="Robot files, or names of robots that come with dh2sim."),
     ],
-    samples: Annotated[int, typer.Option(min=1, help="Random configurations, inside the limits.")] = 1000,
+    samples: Annotated[int, typer.Option(min=1, max=10**8, help="Random configurations, inside the limits.")] = 1000,
     seed: Annotated[int, typer.Option(min=0, help="Of the random configurations.")] = 0,
     tolerance: Annotated[
         float,
@@ -57,12 +61,12 @@ def validate(
         raise typer.BadParameter(f"{tolerance} is not between 0 and 1", param_hint="--tolerance")
     models = build_all(robots)
     if folder is not None:
-        _require_files(models, folder)
+        _require_folders(robots, models, folder)
     from dh2sim.validate.junit import to_junit
     from dh2sim.validate.report import ValidationReport
     from dh2sim.validate.run import engine_samples, validate_robot
 
-    with _progress(len(models) * engine_samples(samples)) as advance:
+    with _warnings_told(), _progress(sum(engine_samples(samples, len(model.joints)) for model in models)) as advance:
         report = ValidationReport(
             robots=tuple(
                 validate_robot(
@@ -88,11 +92,16 @@ def validate(
     return 0 if report.ok else FELL_SHORT
 
 
-def _require_files(models: list[RobotModel], folder: Path) -> None:
-    for model in models:
-        if not (folder / model.name).is_dir():
-            advice = f"write it with 'dh2sim export {model.name} --out {folder}'"
-            raise OutputError(f"there is no folder '{folder / model.name}'; {advice}")
+def _require_folders(robots: list[str], models: list[RobotModel], folder: Path) -> None:
+    missing = [
+        f"there is no folder '{folder / model.name}'; write it with 'dh2sim export {robot} --out {folder}'"
+        for robot, model in zip(robots, models, strict=True)
+        if not (folder / model.name).is_dir()
+    ]
+    for text in missing[:-1]:
+        complain(text)
+    if missing:
+        raise Dh2simError(missing[-1])
 
 
 def _write(path: Path, text: str) -> None:
@@ -100,6 +109,19 @@ def _write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise OutputError(f"cannot write '{path}': {error.strerror or error}") from error
+
+
+@contextmanager
+def _warnings_told() -> Iterator[None]:
+    """Print MuJoCo's warnings, which it would append to a file in the current folder."""
+    import mujoco
+
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: print(f"dh2sim: MuJoCo warns: {text}", file=sys.stderr))
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 @contextmanager
@@ -122,57 +144,68 @@ def _progress(total: int) -> Iterator[Callable[[int], None]]:
 
 
 def _print(report: ValidationReport) -> None:
-    from rich import box
     from rich.console import Console
-    from rich.table import Table
     from rich.text import Text
-
-    from dh2sim.validate.junit import failure_text
 
     console = Console(highlight=False)
     for robot in report.robots:
-        verdict = (
-            Text("matches its table", "bold green") if robot.ok else Text("DOES NOT match its table", "bold red")
-        )
+        verdict = ("matches its table", "bold green") if robot.ok else ("DOES NOT match its table", "bold red")
         console.print(Text.assemble((robot.name, "bold"), " ", verdict))
-        table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
-        table.add_column("engine", no_wrap=True)
-        table.add_column("compared", no_wrap=True)
-        table.add_column("samples", justify="right", no_wrap=True)
-        table.add_column("worst error", justify="right", no_wrap=True)
-        table.add_column("limit", justify="right", no_wrap=True)
-        table.add_column("", no_wrap=True)
-        for check in robot.checks:
-            mark = {
-                True: Text("ok", "green"),
-                False: Text("FAILED", "bold red"),
-                None: Text("skipped", "yellow"),
-            }
-            if check.max_position_error is not None and check.max_rotation_error is not None:
-                worst = f"{check.max_position_error:.1e} m {check.max_rotation_error:.1e} rad"
-            else:
-                worst = "" if check.max_error is None else f"{check.max_error:.1e}"
-            table.add_row(
-                check.engine,
-                _compared(check),
-                f"{check.samples:,}" if check.samples else "",
-                worst,
-                "" if check.tolerance is None else f"{check.tolerance:.0e}",
-                mark[check.ok],
+        print_whole(_table(robot))
+        for remark, style in _remarks(robot):
+            wrapped = textwrap.wrap(
+                remark,
+                console.width,
+                initial_indent="  ",
+                subsequent_indent="    ",
+                break_long_words=False,
+                break_on_hyphens=False,
             )
-        console.print(table)
-        for check in robot.checks:
-            if check.ok is False:
-                lead = Text(f"  {check.engine}, {check.quantity.value}: ", "red")
-                console.print(lead + Text(failure_text(check)), soft_wrap=True)
-            elif check.ok is None:
-                console.print(Text(f"  {check.engine}: {check.reason}", "yellow"), soft_wrap=True)
+            console.print(Text("\n".join(wrapped), style), soft_wrap=True)
         if not robot.ok:
             console.print()
-    failed = [robot.name for robot in report.robots if not robot.ok]
     if len(report.robots) > 1:
-        count = len(report.robots)
-        console.print(f"{count - len(failed)} of {count} robots match their tables.")
+        matching = sum(robot.ok for robot in report.robots)
+        console.print(f"{matching} of {len(report.robots)} robots match their tables.")
+
+
+def _table(robot: RobotReport) -> Table:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("engine", no_wrap=True)
+    table.add_column("compared", no_wrap=True)
+    for column in ("samples", "worst error", "limit"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    marks = {True: Text("ok", "green"), False: Text("FAILED", "bold red"), None: Text("skipped", "yellow")}
+    for check in robot.checks:
+        if check.max_position_error is not None and check.max_rotation_error is not None:
+            worst = f"{check.max_position_error:.1e} m {check.max_rotation_error:.1e} rad"
+        else:
+            worst = "" if check.max_error is None else f"{check.max_error:.1e}"
+        table.add_row(
+            check.engine,
+            _compared(check),
+            f"{check.samples:,}" if check.samples else "",
+            worst,
+            "" if check.tolerance is None else f"{check.tolerance:.0e}",
+            marks[check.ok],
+        )
+    return table
+
+
+def _remarks(robot: RobotReport) -> Iterator[tuple[str, str]]:
+    """What did not hold or was not checked, each with its colour."""
+    from dh2sim.validate.junit import failure_text
+
+    for check in robot.checks:
+        if check.ok is False:
+            yield f"{check.engine}, {check.quantity.value}: {failure_text(check)}", "red"
+        elif check.ok is None:
+            yield f"{check.engine}: {check.reason}", "yellow"
 
 
 def _compared(check: Check) -> str:

@@ -63,8 +63,10 @@ class MujocoEngine:
         """Poses of ``frames`` in the world, where base_link stands; see ``PoseEngine``.
 
         Raises:
-            EngineError: a simulation failed.
+            EngineError: a coordinate is so large, or no number, that MuJoCo would silently take another.
         """
+        if not (np.abs(q) <= mujoco.mjMAXVAL).all():
+            raise EngineError(f"{self._path}: MuJoCo takes joint coordinates up to {mujoco.mjMAXVAL!r} only")
         poses = np.zeros((len(q), len(self._ids), 4, 4))
         poses[:, :, 3, 3] = 1.0
         if len(q) == 0:

@@ -39,14 +39,14 @@ class PinocchioEngine:
             raise EngineError(f"{path}: pinocchio refuses the file: {' '.join(str(error).split())}") from error
         model = self._model
         self._data: Any = model.createData()
-        found = [name for name in model.names if name != "universe"]
+        found = list(model.names)[1:]  # the first one is the world
         require_joints(str(path), found, joints)
-        self._joints = [model.joints[model.getJointId(name)] for name in joints]
+        self._joints = [model.joints[1 + found.index(name)] for name in joints]
         self._dofs = np.array([joint.idx_v for joint in self._joints], dtype=int)
-        self.frames = present_frames(
-            str(path), [frame.name for frame in model.frames], rows, dh_frames_required=False
-        )
-        self._ids = [model.getFrameId(name) for name in self.frames]
+        links = [frame.name for frame in model.frames if frame.type == pinocchio.FrameType.BODY]
+        self.frames = present_frames(str(path), links, rows, dh_frames_required=False)
+        # a joint may bear the name of a link
+        self._ids = [model.getFrameId(name, pinocchio.FrameType.BODY) for name in self.frames]
 
     def frame_poses(self, q: Array) -> Array:
         """Poses of ``frames`` in base_link; see ``PoseEngine``."""

@@ -45,6 +45,9 @@ class YourdfpyEngine:
         poses = np.empty((len(q), len(self.frames), 4, 4))
         for k, row in enumerate(q):
             self._urdf.update_cfg(np.array(row[self._order], dtype=np.float64))
+            T, before = np.eye(4), "base_link"
             for i, frame in enumerate(self.frames):
-                poses[k, i] = self._urdf.get_transform(frame, "base_link")
+                # from frame to frame: the time for a long way through its scene graph grows with the cube of the way
+                T = T @ self._urdf.get_transform(frame, before)
+                poses[k, i], before = T, frame
         return poses

@@ -28,7 +28,7 @@ def losses(model: RobotModel, formats: Collection[Format]) -> list[str]:
 
 
 def _urdf(model: RobotModel) -> Iterable[str]:
-    if any(_said(row.actuator) for row in model.spec.rows):
+    if any(_said(row.actuator) for row in model.spec.moving_rows):
         yield "actuators and their gains"
     armature = [row.name for row in model.spec.rows if row.dynamics.armature]
     if armature:
@@ -38,7 +38,9 @@ def _urdf(model: RobotModel) -> Iterable[str]:
     if tuple(float(g) for g in model.spec.gravity) != STANDARD_GRAVITY:
         yield "gravity"
     if model.excluded:
-        yield f"{len(model.excluded)} pairs of links that must not collide ('dh2sim info' lists them as in an SRDF)"
+        count = len(model.excluded)
+        pairs = "1 pair" if count == 1 else f"{count} pairs"
+        yield f"{pairs} of links that do not collide ('dh2sim info' lists them, as in an SRDF)"
 
 
 def _mjcf(model: RobotModel) -> Iterable[str]:
@@ -52,4 +54,6 @@ def _mjcf(model: RobotModel) -> Iterable[str]:
 
 
 def _said(actuator: ActuatorSpec) -> bool:
-    return actuator.type is not ActuatorType.POSITION or actuator.kp is not None or actuator.kv is not None
+    """Whether the robot file drives the joint in a way of its own; 'none' is what a URDF has anyway."""
+    of_its_own = actuator.type in (ActuatorType.VELOCITY, ActuatorType.MOTOR)
+    return of_its_own or actuator.kp is not None or actuator.kv is not None

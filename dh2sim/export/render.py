@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from enum import StrEnum
 
+from dh2sim.errors import ModelError
 from dh2sim.formats.mjcf import to_mjcf
 from dh2sim.formats.scene import to_scene
 from dh2sim.formats.urdf import to_urdf
@@ -30,12 +31,16 @@ def render(model: RobotModel, formats: Collection[Format], *, dh_frames: bool = 
         Contents by path relative to the robot's folder, with forward slashes.
 
     Raises:
-        ModelError: a format cannot hold the robot.
+        ModelError: a format cannot hold the robot, or its name is that of another file.
     """
     files: dict[str, bytes] = {}
     if Format.URDF in formats:
         files[f"{model.name}.urdf"] = to_urdf(model, dh_frames=dh_frames).encode()
     if Format.MJCF in formats:
+        if model.name.lower() == "scene":
+            raise ModelError(
+                f"{model.name}: its MJCF and the scene around it would both be scene.xml; rename the robot"
+            )
         files[f"{model.name}.xml"] = to_mjcf(model).encode()
         files["scene.xml"] = to_scene(model).encode()
     for link in model.all_links:

@@ -54,7 +54,7 @@ def export_robot(
     dh_frames: bool = True,
     verified: bool = True,
 ) -> ExportReport:
-    """Write a robot's files to ``out``/<name>/, all of them or none.
+    """Write a robot's files to ``out``/<name>/, all of them or none; a file that is the same already is left alone.
 
     Args:
         model: the robot.
@@ -76,12 +76,12 @@ def export_robot(
     target = out / model.name
     with staged(out, model.name, files) as folder:
         checks = verify(model, folder, formats) if verified else []
-        changed = {relative: _read(target / relative) != data for relative, data in files.items()}
-        put_in_place(folder, target, files)
+        changed = [relative for relative, data in files.items() if not _holds(target / relative, data)]
+        put_in_place(folder, target, changed)
     return ExportReport(
         name=model.name,
         files=tuple(
-            ExportedFile(path=target / relative, size=len(data), changed=changed[relative])
+            ExportedFile(path=target / relative, size=len(data), changed=relative in changed)
             for relative, data in files.items()
         ),
         verified=tuple(checks),
@@ -100,23 +100,31 @@ def drift(
     found = []
     for relative, expected in render(model, formats, dh_frames=dh_frames).items():
         path = out / model.name / relative
-        actual = _read(path)
-        if actual is None:
+        try:
+            actual = path.read_bytes()
+        except FileNotFoundError:
             found.append(Drift(path=path, what="missing"))
-        elif actual != expected:
-            found.append(Drift(path=path, what=_difference(actual, expected)))
+        except OSError as error:
+            found.append(Drift(path=path, what=f"unreadable: {error.strerror or error}"))
+        else:
+            if actual != expected:
+                found.append(Drift(path=path, what=_difference(actual, expected)))
     return found
 
 
-def _read(path: Path) -> bytes | None:
+def _holds(path: Path, data: bytes) -> bool:
     try:
-        return path.read_bytes()
+        return path.read_bytes() == data
     except OSError:
-        return None
+        return False
 
 
 def _difference(actual: bytes, expected: bytes) -> str:
+    if b"\0" in expected:
+        return "differs"
     ours, theirs = actual.splitlines(), expected.splitlines()
+    if ours == theirs:
+        return "differs in its line ends"
     for line, (a, b) in enumerate(zip(ours, theirs, strict=False), start=1):
         if a != b:
             return f"differs from line {line}"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dh2sim.errors import MismatchError
+from dh2sim.errors import EngineError, MismatchError
 from dh2sim.export.render import Format
 from dh2sim.kinematics.comparison import pose_errors
 from dh2sim.kinematics.sampling import random_configurations
@@ -57,7 +57,11 @@ def verify(model: RobotModel, folder: Path, formats: Collection[Format]) -> list
     results = []
     for format_ in formats:
         path = folder / f"{model.name}.{'urdf' if format_ is Format.URDF else 'xml'}"
-        engine = MujocoEngine(path, names, len(model.joints))
+        try:
+            engine = MujocoEngine(path, names, len(model.joints))
+        except EngineError as error:
+            told = str(error).replace(str(path), path.name)  # the temporary folder is nobody's business
+            raise EngineError(f"{model.name}: {told}; nothing was written") from error
         reference = table if len(engine.frames) > 1 else table[:, -1:]
         position, rotation = pose_errors(engine.frame_poses(q), reference)
         result = Verified(

@@ -5,12 +5,14 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 
 from dh2sim.errors import ModelError
+from dh2sim.formats.mjcf_control import add_actuators, add_keyframes, add_sensors
+from dh2sim.formats.mjcf_sites import add_site, needs_body, placed
 from dh2sim.formats.xml import child, document, number, numbers, provenance
-from dh2sim.kinematics.transforms import compose, quaternion_from_rotation
+from dh2sim.kinematics.transforms import compose
 from dh2sim.model.mass import MassProperties
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
-from dh2sim.robot.spec import ActuatorType, JointType
+from dh2sim.robot.spec import JointType
 from dh2sim.typing import Array
 
 TIMESTEP = 0.002
@@ -31,9 +33,10 @@ def to_mjcf(model: RobotModel) -> str:
     Raises:
         ModelError: the robot has more bodies than MuJoCo can read back.
     """
-    if 1 + len(model.links) > MOST_BODIES:
+    nested = 1 + len(model.links) + any(needs_body(T, model.links[-1].inertial) for _, T in _last_frames(model))
+    if nested > MOST_BODIES:
         raise ModelError(
-            f"{model.name}: {len(model.links)} rows make {1 + len(model.links)} nested bodies with base_link; MuJoCo "
+            f"{model.name}: {len(model.links)} rows make {nested} nested bodies with base_link; MuJoCo "
             f"reads at most {MOST_BODIES}. Split the chain, or export it as URDF only (--format urdf)"
         )
     mujoco = ET.Element("mujoco", model=model.name)
@@ -49,14 +52,14 @@ def to_mjcf(model: RobotModel) -> str:
     materials = _assets(mujoco, model)
     _bodies(mujoco, model, materials)
     _contact(mujoco, model)
-    _actuators(mujoco, model)
-    _sensors(mujoco, model)
-    _keyframes(mujoco, model)
+    add_actuators(mujoco, model)
+    add_sensors(mujoco, model)
+    add_keyframes(mujoco, model)
     return document(mujoco, provenance(model))
 
 
 def _defaults(mujoco: ET.Element, model: RobotModel) -> None:
-    outer = child(child(mujoco, "default"), "default", class_=model.name)
+    outer = child(child(mujoco, "default"), "default", class_=_class(model))
     child(outer, "joint", axis=numbers([0, 0, 1]))
     child(outer, "site", group="4", size=number(0.02 * _site_scale(model)), rgba="0.9 0.9 0.1 1")
     visual = child(outer, "default", class_=f"{model.name}_visual")
@@ -65,6 +68,11 @@ def _defaults(mujoco: ET.Element, model: RobotModel) -> None:
     child(collision, "geom", group="1")
     hidden = child(outer, "default", class_=f"{model.name}_collision")
     child(hidden, "geom", group="3")
+
+
+def _class(model: RobotModel) -> str:
+    """Name of the robot's default class; MuJoCo has a class main already."""
+    return "main_robot" if model.name == "main" else model.name
 
 
 def _site_scale(model: RobotModel) -> float:
@@ -95,31 +103,30 @@ def _assets(mujoco: ET.Element, model: RobotModel) -> dict[Color, str]:
 
 
 def _bodies(mujoco: ET.Element, model: RobotModel, materials: dict[Color, str]) -> None:
-    body = child(child(mujoco, "worldbody"), "body", name=model.base.name, childclass=model.name)
+    body = child(child(mujoco, "worldbody"), "body", name=model.base.name, childclass=_class(model))
     _geoms(body, model, model.base, model.chain.T_base_link_dh0, materials)
-    _site(body, "dh_0", model.chain.T_base_link_dh0)
+    add_site(body, "dh_0", model.chain.T_base_link_dh0, None)
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
-        body = child(body, "body", name=link.name, **_placed(joint.joint.T_parent_joint))
+        body = child(body, "body", name=link.name, **placed(joint.joint.T_parent_joint))
         if link.inertial is not None:
             _inertial(body, link.inertial)
         if joint.joint.type is not JointType.FIXED:
             _joint(body, joint)
         _geoms(body, model, link, joint.joint.T_joint_dh, materials)
-        _site(body, f"dh_{i}", joint.joint.T_joint_dh)
-    _site(body, "tool0", compose(model.joints[-1].joint.T_joint_dh, model.chain.T_dhn_tool0))
+        frames = [(f"dh_{i}", joint.joint.T_joint_dh)] if i < len(model.links) else _last_frames(model)
+        for name, T in frames:
+            add_site(body, name, T, link.inertial)
 
 
-def _placed(T: Array) -> dict[str, str]:
-    return {"pos": numbers(T[:3, 3]), "quat": numbers(quaternion_from_rotation(T[:3, :3]))}
+def _last_frames(model: RobotModel) -> list[tuple[str, Array]]:
+    """Names of the last DH frame and of tool0, and their poses in the last link."""
+    T = model.joints[-1].joint.T_joint_dh
+    return [(f"dh_{len(model.links)}", T), ("tool0", compose(T, model.chain.T_dhn_tool0))]
 
 
 def _moved(T: Array) -> dict[str, str]:
-    """As ``_placed``, without what is the identity."""
-    return {name: text for name, text in _placed(T).items() if text not in ("0.0 0.0 0.0", "1.0 0.0 0.0 0.0")}
-
-
-def _site(body: ET.Element, name: str, T: Array) -> None:
-    child(body, "site", name=name, **_placed(T))
+    """As ``placed``, without what is the identity."""
+    return {name: text for name, text in placed(T).items() if text not in ("0.0 0.0 0.0", "1.0 0.0 0.0 0.0")}
 
 
 def _inertial(body: ET.Element, properties: MassProperties) -> None:
@@ -160,18 +167,22 @@ def _geoms(
             class_=f"{model.name}_visual",
             mesh=link.name,
             material=material,
-            **_placed(T_link_dh),
+            **placed(T_link_dh),
         )
     kind = "shape" if link.mesh is None else "collision"
+    # the base does not move: it needs no mass, and so MuJoCo gives it no principal frame of its own
+    weight = {"mass": "0"} if link is model.base else {}
     for shape in link.shapes:
         color = link.joint_color if shape.part is ShapePart.JOINT else link.color
-        _geom(body, f"{model.name}_{kind}", shape, materials[color])
+        _geom(body, f"{model.name}_{kind}", shape, materials[color], weight)
 
 
-def _geom(body: ET.Element, class_: str, shape: Shape, material: str) -> None:
+def _geom(body: ET.Element, class_: str, shape: Shape, material: str, weight: dict[str, str]) -> None:
     kind = "capsule" if shape.kind is ShapeKind.CAPSULE else "cylinder"
     size = numbers([shape.radius, 0.5 * shape.length])
-    child(body, "geom", class_=class_, type=kind, size=size, material=material, **_moved(shape.T_link_shape))
+    child(
+        body, "geom", class_=class_, type=kind, size=size, material=material, **weight, **_moved(shape.T_link_shape)
+    )
 
 
 def _contact(mujoco: ET.Element, model: RobotModel) -> None:
@@ -179,81 +190,3 @@ def _contact(mujoco: ET.Element, model: RobotModel) -> None:
         contact = child(mujoco, "contact")
         for pair in model.excluded:
             child(contact, "exclude", body1=pair.link1, body2=pair.link2)
-
-
-def _actuators(mujoco: ET.Element, model: RobotModel) -> None:
-    driven = [joint for joint in model.moving_joints if joint.actuator.type is not ActuatorType.NONE]
-    if not driven:
-        return
-    actuators = child(mujoco, "actuator")
-    for joint in driven:
-        name = f"{joint.name}_{joint.actuator.type.value}"
-        match joint.actuator.type:
-            case ActuatorType.POSITION:
-                gains = {"kp": number(joint.actuator.kp), "kv": number(joint.actuator.kv)}
-            case ActuatorType.VELOCITY:
-                gains = {"kv": number(joint.actuator.kv)}
-            case _:
-                gains = {}
-        element = child(actuators, joint.actuator.type.value, name=name, joint=joint.name, **gains)
-        control = control_range(joint)
-        if control is not None:
-            element.set("ctrlrange", numbers(control))
-        if "effort" not in joint.assumed:
-            element.set("forcerange", numbers([-joint.effort, joint.effort]))
-
-
-def control_range(joint: JointModel) -> tuple[float, float] | None:
-    """Range of a joint's control, from its limits: rad or m, their rate, N·m or N; None where it is unlimited."""
-    match joint.actuator.type:
-        case ActuatorType.POSITION:
-            return None if joint.range is None else (joint.range.lower, joint.range.upper)
-        case ActuatorType.VELOCITY:
-            return -joint.velocity, joint.velocity
-        case ActuatorType.MOTOR:
-            return -joint.effort, joint.effort
-        case ActuatorType.NONE:
-            return None
-
-
-def _sensors(mujoco: ET.Element, model: RobotModel) -> None:
-    sensors = child(mujoco, "sensor")
-    for suffix, tag in (("position", "jointpos"), ("velocity", "jointvel"), ("torque", "jointactuatorfrc")):
-        for joint in model.moving_joints:
-            child(sensors, tag, name=f"{joint.name}_{suffix}", joint=joint.name)
-    child(sensors, "framepos", name="tool0_position", objtype="site", objname="tool0")
-    child(sensors, "framequat", name="tool0_orientation", objtype="site", objname="tool0")
-
-
-def _keyframes(mujoco: ET.Element, model: RobotModel) -> None:
-    if not model.spec.configurations or not model.moving_joints:
-        return
-    keyframe = child(mujoco, "keyframe")
-    for name, q in model.spec.configurations.items():
-        controls = holding_controls(model, name)
-        key = child(keyframe, "key", name=name, qpos=numbers(q))
-        if controls:
-            key.set("ctrl", numbers(controls))
-
-
-def holding_controls(model: RobotModel, configuration: str) -> list[float]:
-    """Controls, one an actuator, with which the robot stands still in a named configuration.
-
-    A position actuator is asked for a little more than the joint's position, so that its pull balances gravity.
-    Clipped to the control's range.
-    """
-    controls = []
-    q, loads = model.spec.configurations[configuration], model.holding[configuration]
-    for joint, position, load in zip(model.moving_joints, q, loads, strict=True):
-        match joint.actuator.type:
-            case ActuatorType.POSITION:
-                control = float(position) + (load / joint.actuator.kp if joint.actuator.kp else 0.0)
-            case ActuatorType.VELOCITY:
-                control = 0.0
-            case ActuatorType.MOTOR:
-                control = load
-            case ActuatorType.NONE:
-                continue
-        allowed = control_range(joint)
-        controls.append(control if allowed is None else min(max(control, allowed[0]), allowed[1]))
-    return controls

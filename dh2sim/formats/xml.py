@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
@@ -9,8 +10,12 @@ from dh2sim.model.robot_model import JointModel, LinkModel, RobotModel
 
 
 def number(value: float) -> str:
-    """Text that reads back as the same double; minus zero is written as zero."""
-    return repr(float(value) + 0.0)
+    """Text that reads back as the same double; minus zero is written as zero.
+
+    So are the doubles below 2.3e-308, the subnormal ones: MuJoCo takes them for numbers that are too large.
+    """
+    value = float(value)
+    return repr(0.0 if abs(value) < sys.float_info.min else value)
 
 
 def numbers(values: Iterable[float]) -> str:
@@ -31,12 +36,15 @@ def document(root: ET.Element, header: Iterable[str]) -> str:
 
 
 def _comment(text: str) -> str:
-    """XML forbids two hyphens in a row in a comment, and control characters anywhere."""
+    """XML forbids two hyphens in a row in a comment, and control characters and lone surrogates anywhere."""
     while "--" in text:
         text = text.replace("--", "- -")
     if text.endswith("-"):
         text += " "
-    return "".join(c if c in "\n\t" or (ord(c) >= 0x20 and ord(c) not in (0xFFFE, 0xFFFF)) else " " for c in text)
+    return "".join(
+        c if c in "\n\t" or (c >= " " and not "\ud800" <= c <= "\udfff" and c not in "\ufffe\uffff") else " "
+        for c in text
+    )
 
 
 def provenance(model: RobotModel) -> list[str]:

@@ -75,7 +75,7 @@ def build_model(spec: RobotSpec) -> RobotModel:
     seen = iter(seen_inertias(chain, bodies, home))
     reach = reach_bound(chain, spec.rows)
     joints = tuple(
-        _joint(row, joint, limit, next(seen) if row.type.moves else 0.0, _load_bound(i, chain, links, spec))
+        _joint(row, joint, limit, next(seen) if row.type.moves else 0.0, _load_bound(i, chain, links, ranges, spec))
         for i, (row, joint, limit) in enumerate(zip(spec.rows, chain.joints, ranges, strict=True))
     )
     return RobotModel(
@@ -177,15 +177,21 @@ def _actuator(actuator: ActuatorSpec, inertia: float) -> ActuatorModel:
     return ActuatorModel(type=actuator.type, kp=kp, kv=kv, assumed=assumed)
 
 
-def _load_bound(i: int, chain: KinematicChain, links: Sequence[LinkModel], spec: RobotSpec) -> float:
+def _load_bound(
+    i: int,
+    chain: KinematicChain,
+    links: Sequence[LinkModel],
+    ranges: Sequence[PositionRange | None],
+    spec: RobotSpec,
+) -> float:
     """Upper bound of what gravity asks of joint ``i`` in any pose, N·m or N."""
     g = math.sqrt(math.fsum(float(x) * float(x) for x in spec.gravity)) or 9.81
     terms, distance = [], 0.0
-    for joint, row, link in zip(chain.joints[i:], spec.rows[i:], links[i:], strict=True):
+    for joint, limit, link in zip(chain.joints[i:], ranges[i:], links[i:], strict=True):
         if joint is not chain.joints[i]:
             distance += _length(joint.T_parent_joint[:3, 3])
-            if row.type is JointType.PRISMATIC and row.limits.position is not None:
-                distance += max(abs(x) for x in row.limits.position)
+            if joint.type is JointType.PRISMATIC and limit is not None:
+                distance += max(abs(limit.lower), abs(limit.upper))
         if link.inertial is not None:
             arm = distance + _length(link.inertial.com) if spec.rows[i].type.turns else 1.0
             terms.append(link.inertial.mass * g * arm)

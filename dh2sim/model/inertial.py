@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dh2sim.kinematics.chain import Joint
-from dh2sim.model.mass import MassProperties, combine, in_frame, of_shape
+from dh2sim.model.mass import MassProperties, combine, in_frame, made_possible, of_shape
 from dh2sim.model.shapes import Shape
 from dh2sim.robot.spec import LinkSpec
 from dh2sim.typing import read_only
@@ -44,7 +44,8 @@ def link_inertial(
         com = in_dh.com
     if link.inertia is not None:
         inertia = in_dh.inertia
-    return MassProperties(mass=mass, com=com, inertia=inertia), tuple(k for k, v in given.items() if v is None)
+    body = MassProperties(mass=mass, com=com, inertia=made_possible(inertia))
+    return body, tuple(k for k, v in given.items() if v is None)
 
 
 def _estimate(link: LinkSpec, shapes: tuple[Shape, ...]) -> MassProperties:

@@ -43,12 +43,16 @@ def assumed_travel(chain: KinematicChain, rows: Sequence[Row]) -> float:
 
 
 def _limited_reach(chain: KinematicChain, rows: Sequence[Row]) -> float:
-    lengths = [_length(joint.T_parent_joint[:3, 3]) for joint in chain.joints]
-    lengths += [_length(chain.joints[-1].T_joint_dh[:3, 3]), _length(chain.T_dhn_tool0[:3, 3])]
-    for row in rows:
+    lengths: list[float] = []  # from base_link to the joint at hand
+    reached = [_length(chain.T_base_link_dh0[:3, 3])]
+    for joint, row in zip(chain.joints, rows, strict=True):
+        lengths.append(_length(joint.T_parent_joint[:3, 3]))
         if row.type is JointType.PRISMATIC and row.limits.position is not None:
             lengths.append(max(abs(row.limits.position[0]), abs(row.limits.position[1])))
-    return math.fsum(lengths)
+        # a DH frame may stand farther out than the next joint, where conventions are mixed
+        reached.append(math.fsum([*lengths, _length(joint.T_joint_dh[:3, 3])]))
+    tool = [_length(chain.joints[-1].T_joint_dh[:3, 3]), _length(chain.T_dhn_tool0[:3, 3])]
+    return max(*reached, math.fsum([*lengths, *tool]))
 
 
 def position_range(row: Row, chain: KinematicChain, rows: Sequence[Row]) -> PositionRange | None:

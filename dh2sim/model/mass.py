@@ -12,6 +12,9 @@ from dataclasses import dataclass
 from dh2sim.model.shapes import Shape, ShapeKind
 from dh2sim.typing import Array, read_only
 
+ROUNDING = (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
+"""By which shares of its trace an inertia may be mended: numbers in robot files are rounded."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MassProperties:
@@ -79,6 +82,35 @@ def rotate_tensor(T: Array, tensor: Array) -> Array:
         for j in range(i, 3):
             out[i][j] = out[j][i] = RA[i][0] * R[j][0] + RA[i][1] * R[j][1] + RA[i][2] * R[j][2] + 0.0
     return read_only(out)
+
+
+def made_possible(inertia: Array) -> Array:
+    """The inertia, shape (3, 3), of a body of which no two principal moments make less than the third.
+
+    A flat body has A + B = C, which is A + B < C after rounding, and then MuJoCo refuses the file. The second moments
+    of mass, tr(I)/2 E - I, are what must be positive; a multiple of E is added where they are not, no greater than
+    it takes.
+    """
+    trace = float(inertia[0, 0]) + float(inertia[1, 1]) + float(inertia[2, 2])
+    for share in ROUNDING:
+        extra = share * trace
+        moments = [
+            [(0.5 * (trace + extra) if i == j else 0.0) - float(inertia[i, j]) for j in range(3)] for i in range(3)
+        ]
+        if min(_pivots(moments)) > 0.1 * ROUNDING[1] * trace:
+            return read_only(
+                [[float(inertia[i, j]) + (extra if i == j else 0.0) for j in range(3)] for i in range(3)]
+            )
+    return inertia
+
+
+def _pivots(A: list[list[float]]) -> list[float]:
+    """Pivots of a symmetric matrix, up to the first that is not positive; all are where it is positive definite."""
+    first = A[0][0]
+    if first <= 0.0:
+        return [first]
+    b, c, d = (A[i][j] - A[0][i] * A[0][j] / first for i, j in ((1, 1), (1, 2), (2, 2)))
+    return [first, b] if b <= 0.0 else [first, b, d - c * c / b]
 
 
 def in_frame(T: Array, body: MassProperties) -> MassProperties:

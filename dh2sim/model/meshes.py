@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 
 MOST_FACES = 200_000
 """MuJoCo refuses an STL file with more."""
+FEWEST_CORNERS = 4
+"""MuJoCo refuses a mesh with fewer."""
+LEAST_AREA = 1e-12
+"""m²: of a smaller surface MuJoCo cannot tell the centre."""
 STL_HEADER, STL_FACE = 84, 50
 """Bytes of a binary STL file: before the faces, and for each."""
 
@@ -39,8 +43,8 @@ def load_mesh(mesh: MeshSpec, link_name: str) -> MeshAsset:
         link_name: names the exported file.
 
     Raises:
-        MeshError: it cannot be read, holds no faces, holds numbers that are not finite, or too many faces; the text
-            names the row of the robot file.
+        MeshError: it cannot be read, holds no faces or too many, fewer than four corners, no area, or numbers that
+            are not finite; the text names the row of the robot file.
     """
     try:
         original = mesh.file.read_bytes()
@@ -73,8 +77,19 @@ def _check(surface: trimesh.Trimesh, mesh: MeshSpec) -> None:
             f"{mesh.location}: the mesh '{mesh.file}' holds {faces} faces; MuJoCo reads at most {MOST_FACES}. "
             "Simplify it, for instance with Blender's Decimate or trimesh's simplify_quadric_decimation"
         )
-    if not np.isfinite(surface.vertices).all():
+    corners = np.asarray(surface.vertices)[np.unique(surface.faces)]
+    if not (np.abs(corners) <= np.finfo(np.float32).max).all():  # STL files hold single precision
         raise MeshError(f"{mesh.location}: the mesh '{mesh.file}' holds coordinates that are no finite numbers")
+    if len(np.unique(corners.astype(np.float32), axis=0)) < FEWEST_CORNERS:
+        raise MeshError(
+            f"{mesh.location}: the mesh '{mesh.file}' has fewer than {FEWEST_CORNERS} corners; MuJoCo refuses it"
+        )
+    area = float(surface.area) * mesh.scale**2
+    if not area >= LEAST_AREA:
+        raise MeshError(
+            f"{mesh.location}: the mesh '{mesh.file}' has an area of {area:.3g} m² with scale {mesh.scale!r}; MuJoCo "
+            f"needs at least {LEAST_AREA!r}"
+        )
 
 
 def _words(error: Exception) -> str:

@@ -83,7 +83,7 @@ def pose_with_z(origin: list[float], z: list[float]) -> Array:
     other = [0.0, 0.0, 0.0]
     other[smallest] = 1.0
     if z[2] == 1.0:
-        x, y = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]
+        x, y = [1.0, 0.0, -z[0]], [0.0, 1.0, -z[1]]  # components too small to show in z[2]
     else:
         y = _cross(z, other)
         norm = math.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])

@@ -34,12 +34,6 @@ def check(root: Node, names: Mapping[str, float], report: Report) -> None:
     _check_actuators(root, rows, report)
 
 
-def _at_key(root: Node, loc: Loc, report: Report, message: str) -> None:
-    entry = root.entry(*loc)
-    if entry is not None:
-        report.add(entry.line, entry.column, loc, message)
-
-
 def _check_names(rows: Sequence[RowView], report: Report) -> None:
     """Joint names are unique, and none is one that the exports need."""
     first: dict[str, RowView] = {}
@@ -81,7 +75,7 @@ def _check_configurations(root: Node, rows: Sequence[RowView], names: Mapping[st
     if node is None or not isinstance(node.value, dict):
         return
     moving = [row for row in rows if row.type is not JointType.FIXED]
-    countable = root.at("joints") is not None and all(row.type is not None for row in rows)
+    countable = bool(rows) and all(row.type is not None for row in rows)
     for name, entry in node.value.items():
         if problem := name_problem(name, "the name of a configuration"):
             report.add(entry.line, entry.column, ("configurations",), problem)
@@ -92,7 +86,7 @@ def _check_configurations(root: Node, rows: Sequence[RowView], names: Mapping[st
         if len(values.value) != len(moving):
             joints = listed(row.name or f"joints[{row.index}]" for row in moving)
             expected = f"expected {len(moving)} numbers, one for each moving row ({joints})"
-            message = f"{expected}, found {len(values.value)}"
+            message = f"{expected}, found a list of {len(values.value)}"
             report.add(values.line, values.column, loc, message)
             continue
         for index, (value, row) in enumerate(zip(values.value, moving, strict=True)):
@@ -130,6 +124,7 @@ def _actuator_type(node: Node | None, inherited: ActuatorType | None) -> Actuato
 
 def _check_gains(root: Node, loc: Loc, kind: ActuatorType | None, report: Report) -> None:
     for gain, kinds in _TAKEN_BY.items():
-        if kind is not None and kind not in kinds:
+        entry = root.entry(*loc, gain)
+        if entry is not None and kind is not None and kind not in kinds:
             message = f"an actuator of type '{kind}' takes no {gain}; {gain} is for {' and '.join(kinds)}"
-            _at_key(root, (*loc, gain), report, message)
+            report.add(entry.line, entry.column, (*loc, gain), message)

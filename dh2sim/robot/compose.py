@@ -137,6 +137,8 @@ class _Composer:
     def _scalar(self, event: ScalarEvent) -> Node:
         plain = event.style is None
         node = self._node(event, resolve_plain(event.value) if plain else event.value)
+        if plain and not event.value and self._stack and (key := self._stack[-1].key):
+            node.line, node.column = key[1].line, key[1].column  # ruamel's mark may be lines further down
         if not plain and (found := NOT_PRINTABLE.search(event.value)):
             self._fail(event, f"control character U+{ord(found.group()):04X} is not allowed")
         return node

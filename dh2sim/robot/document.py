@@ -69,7 +69,7 @@ def check_size(size: int, report: Report) -> None:
 
 
 def decode(data: bytes, report: Report) -> str:
-    """Return the text of a file, or raise what is wrong with its size or its characters.
+    """Return the text of a file, every line ended by a line feed.
 
     Raises:
         RobotFileError: Too large, not UTF-8, a control character, or a line that is too long.
@@ -77,7 +77,7 @@ def decode(data: bytes, report: Report) -> str:
     check_size(len(data), report)
     data = data.removeprefix(codecs.BOM_UTF8)
     try:
-        text = data.decode()
+        text = data.decode().replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         before = data[: error.start].decode()
         _fail_at(report, before, len(before), f"not UTF-8: byte 0x{data[error.start]:02x}")

@@ -145,7 +145,7 @@ def _mesh_file(value: object, info: ValidationInfo) -> Path:
     except (OSError, ValueError):
         exists = False
     if not exists:
-        _fail(f"there is no file {shown(text)} in {directory}")
+        _fail(f"there is no file {shown(text)} in {directory.absolute()}")
     return path.absolute()
 
 

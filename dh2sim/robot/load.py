@@ -74,7 +74,9 @@ def _find(given: str) -> tuple[Path, str]:
     path = Path(given)
     if given and os.path.lexists(given):
         if path.is_dir():
-            raise Dh2simError(f"{given}: is a folder, not a robot file")
+            named = given in builtin_robots()
+            hint = f"; '{given}.yaml' is the robot that comes with dh2sim" if named else ""
+            raise Dh2simError(f"{given}: is a folder, not a robot file{hint}")
         return path, given
     builtin = builtin_path(given)
     if builtin is not None:

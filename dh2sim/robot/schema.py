@@ -216,7 +216,7 @@ def _tidied(schema: Any) -> Any:
     tidied = {
         key: _tidied(value)
         for key, value in schema.items()
-        if not (key == "title" and isinstance(value, str)) and not (key == "default" and value is None)
+        if value is not None and not (key == "title" and isinstance(value, str))
     }
     match tidied.pop("anyOf", None):
         case [inner, {"type": "null"}]:

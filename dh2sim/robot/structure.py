@@ -69,8 +69,8 @@ def _note(details: ErrorDetails, root: Node, report: Report) -> None:
             if parent is not None and not parent.wrong:
                 report.add(parent.line, parent.column, loc[:-1], f"missing key '{loc[-1]}'")
         case _:
-            node = root.at(*loc)
-            if node is not None and not node.wrong:
+            node = root.at(*loc) or parent or root
+            if not node.wrong:
                 report.add(node.line, node.column, loc, _message(details, node))
 
 

@@ -35,7 +35,7 @@ class Units:
         return math.radians(angle) if self.angle is AngleUnit.DEG else angle
 
     def metres(self, length: float) -> float:
-        """Return a length of the file in m; 431.8 mm is the double nearest to 0.4318 m."""
+        """Return a length of the file in m; dividing by a power of ten rounds only once."""
         match self.length:
             case LengthUnit.M:
                 return length

@@ -20,24 +20,24 @@ TOLERANCE = 1e-9
 def check_inertias(engine: MujocoEngine, model: RobotModel) -> Check:
     """Compare mass, centre of mass and inertia of every link in a file with the model's.
 
-    Errors are relative: to the mass, to the reach, and to the inertia's trace.
+    Errors are relative: to the mass, to the reach, and to the inertia's trace. A link without mass must have none.
     """
-    worst, where = 0.0, ""
+    errors: list[tuple[float, str]] = []
     for link in model.links:
-        if link.inertial is None:
-            continue
         try:
-            body, found = link.inertial, engine.mass_properties(link.name)
+            found = engine.mass_properties(link.name)
         except EngineError as refusal:
             return Check(engine=engine.name, quantity=Quantity.INERTIA, ok=False, reason=str(refusal))
-        errors = [
-            abs(found.mass - body.mass) / body.mass,
-            float(np.max(np.abs(found.com - body.com))) / max(1.0, model.reach),
-            float(np.max(np.abs(found.inertia - body.inertia))) / float(np.trace(body.inertia)),
+        body = link.inertial
+        if body is None:
+            errors.append((found.mass, link.name))
+            continue
+        errors += [
+            (abs(found.mass - body.mass) / body.mass, link.name),
+            (float(np.max(np.abs(found.com - body.com))) / max(1.0, model.reach), link.name),
+            (float(np.max(np.abs(found.inertia - body.inertia))) / float(np.trace(body.inertia)), link.name),
         ]
-        error = float(np.max(errors))
-        if not error <= worst:
-            worst, where = error, link.name
+    worst, where = errors[int(np.argmax([error for error, _ in errors]))]  # a NaN is worse than any number
     return Check(
         engine=engine.name,
         quantity=Quantity.INERTIA,

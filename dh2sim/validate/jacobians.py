@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -58,6 +59,7 @@ def check_jacobian(
     q: Array,
     tolerance: float,
     reach: float,
+    joints: Sequence[str],
     *,
     differences: bool = False,
 ) -> Check:
@@ -69,14 +71,14 @@ def check_jacobian(
         q: joint vectors, rad and m, shape (N, n).
         tolerance: allowed error of an angular entry, and of a linear one as a share of max(1 m, reach).
         reach: m.
+        joints: names of the n joints, for the report.
         differences: whether the reference was made by central differences.
     """
     error = np.abs(engine.jacobian(q) - reference)
     error[:, :3] /= max(1.0, reach)
-    flat = error.reshape(len(q), -1)
-    worst = int(np.argmax(flat.max(axis=1))) if flat.size else 0
-    largest = float(flat.max()) if flat.size else 0.0
-    joint = int(np.argmax(error[worst].max(axis=0))) + 1 if flat.size else 0
+    by_joint = error.max(axis=1)  # (N, n)
+    worst, joint = divmod(int(np.argmax(by_joint)), len(joints))  # a NaN is worse than any number
+    largest = float(by_joint[worst, joint])
     return Check(
         engine=engine.name,
         quantity=Quantity.JACOBIAN,
@@ -85,5 +87,5 @@ def check_jacobian(
         samples=len(q),
         max_error=largest,
         tolerance=tolerance,
-        worst=Worst(where=f"column {joint}", q=tuple(q[worst].tolist()), sample=worst),
+        worst=Worst(where=joints[joint], q=tuple(q[worst].tolist()), sample=worst),
     )

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 
 from dh2sim.validate.report import Check, ValidationReport
+
+_UNWRITABLE = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def to_junit(report: ValidationReport) -> str:
@@ -22,9 +25,9 @@ def to_junit(report: ValidationReport) -> str:
                 time=f"{check.seconds:.3f}",
             )
             if check.ok is None:
-                ET.SubElement(case, "skipped", message=check.reason or "")
+                ET.SubElement(case, "skipped", message=_writable(check.reason or ""))
             elif not check.ok:
-                ET.SubElement(case, "failure", message=failure_text(check))
+                ET.SubElement(case, "failure", message=_writable(failure_text(check)))
     ET.indent(root)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 
@@ -51,3 +54,8 @@ def _counts(checks: list[Check] | tuple[Check, ...]) -> dict[str, str]:
         "failures": str(sum(check.ok is False for check in checks)),
         "skipped": str(sum(check.ok is None for check in checks)),
     }
+
+
+def _writable(text: str) -> str:
+    """Replace what XML cannot hold: control characters, and bytes of file names that are no text."""
+    return _UNWRITABLE.sub("?", text)

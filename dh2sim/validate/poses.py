@@ -50,8 +50,9 @@ def check_poses(
 
     def compare(start: int) -> tuple[float, float, float, int, int]:
         part = q[start : start + size]
-        position, rotation = pose_errors(engine.frame_poses(part), _reference(spec, part, engine.frames))
-        badness = np.maximum(position / scale, rotation)
+        with np.errstate(all="ignore"):  # a file may hold anything; what is not finite fails
+            position, rotation = pose_errors(engine.frame_poses(part), _reference(spec, part, engine.frames))
+            badness = np.maximum(position / scale, rotation)
         # a NaN is worse than any number: argmax finds it, and no comparison with a tolerance holds for it
         worst = int(np.argmax(badness))
         sample, frame = divmod(worst, len(engine.frames))

@@ -13,26 +13,32 @@ TOLERANCE = 1e-12
 
 def check_unit_quaternions(path: Path) -> Check:
     """Check that every quaternion in a file has length 1."""
-    worst, where, unreadable = 0.0, "", ""
-    for element in ET.parse(path).iter():
+    try:
+        elements = list(ET.parse(path).iter())
+    except ET.ParseError as error:
+        return _check(False, reason=f"{path}: no well-formed XML, though MuJoCo takes it: {error}")
+    errors: list[tuple[float, str]] = []
+    for element in elements:
         text = element.get("quat")
         if text is None:
             continue
         name = f"{element.tag} {element.get('name', '')}".strip()
         try:
-            error = abs(math.sqrt(math.fsum(float(x) ** 2 for x in text.split())) - 1.0)
+            errors.append((abs(math.hypot(*map(float, text.split())) - 1.0), name))
         except ValueError:
-            unreadable = name
-            continue
-        if not error <= worst:
-            worst, where = error, name
+            return _check(False, reason=f"{path}: the quaternion of {name} is no list of numbers")
+    worst, where = max(errors, key=lambda error: math.inf if math.isnan(error[0]) else error[0], default=(0.0, ""))
+    return _check(worst <= TOLERANCE, worst=worst, where=where)
+
+
+def _check(ok: bool, *, worst: float | None = None, where: str = "", reason: str | None = None) -> Check:
     return Check(
         engine="mjcf-file",
         quantity=Quantity.UNIT_QUATERNIONS,
-        ok=bool(worst <= TOLERANCE) and not unreadable,
+        ok=ok,
         reference="1",
         max_error=worst,
         tolerance=TOLERANCE,
-        reason=f"{unreadable}: its quaternion is no list of numbers" if unreadable else None,
+        reason=reason,
         worst=Worst(where=where, q=()),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,17 +25,25 @@ from dh2sim.validate.poses import check_poses
 from dh2sim.validate.quaternions import check_unit_quaternions
 from dh2sim.validate.report import Check, Quantity, RobotReport
 
-SLOW_SAMPLES = 1000
-"""At most so many configurations are asked of engines that loop in Python."""
+SLOW_ROWS = 8000
+"""Engines that loop in Python are asked for at most so many rows of tables: 1000 configurations of 8 rows."""
 JACOBIAN_SAMPLES = 200
 DYNAMICS_SAMPLES = 20
 
 Advance = Callable[[int], None]
+Mover = MujocoEngine | PinocchioEngine
+"""An engine that knows velocities and masses."""
+Engine = TypeVar("Engine", bound=MujocoEngine | PinocchioEngine | YourdfpyEngine)
 
 
-def engine_samples(samples: int) -> int:
-    """How many poses ``validate_robot`` compares in all, for a progress bar."""
-    return 3 * samples + 2 * min(samples, SLOW_SAMPLES)
+def slow_samples(samples: int, rows: int) -> int:
+    """How many of the configurations are asked of engines that loop in Python."""
+    return min(samples, max(1, SLOW_ROWS // max(8, rows)))
+
+
+def engine_samples(samples: int, rows: int) -> int:
+    """How many configurations ``validate_robot`` compares in all engines together, for a progress bar."""
+    return 3 * samples + 2 * slow_samples(samples, rows)
 
 
 def validate_robot(
@@ -50,7 +59,7 @@ def validate_robot(
 
     Args:
         model: the robot.
-        samples: number of random configurations inside the limits.
+        samples: number of random configurations inside the limits, at least 1.
         seed: of the configurations.
         tolerance: allowed angle, rad, and distance as a share of max(1 m, reach).
         folder: where the robot's files stand; None to export them afresh.
@@ -76,62 +85,85 @@ def _validate(
     lower, upper = sampling_limits(model)
     q = random_configurations(lower, upper, samples, seed)
     library = LibraryEngine(model.chain)
-    checks: list[Check] = []
-    engines: list[MujocoEngine | PinocchioEngine | YourdfpyEngine] = []
     mjcf, urdf = folder / f"{model.name}.xml", folder / f"{model.name}.urdf"
-    names = [joint.name for joint in model.moving_joints]
-    for name, path, make in (
-        ("mujoco-mjcf", mjcf, MujocoEngine),
-        ("mujoco-urdf", urdf, MujocoEngine),
-        ("yourdfpy", urdf, YourdfpyEngine),
-        ("pinocchio", urdf, PinocchioEngine),
-    ):
-        if not path.is_file():
-            checks.append(_failed(name, f"{path}: no such file; write it with 'dh2sim export'"))
-            continue
-        try:
-            engines.append(make(path, names, len(model.joints)))
-        except ImportError as error:
-            checks.append(_absent(name, error))
-        except EngineError as error:
-            checks.append(_failed(name, str(error)))
-    poses = [check_poses(library, model.spec, q, tolerance, model.reach, threads=0, advance=advance)]
+    engines, unread = _read(model, mjcf, urdf)
+
+    def poses(engine: Mover | YourdfpyEngine) -> list[Check]:
+        quick = isinstance(engine, MujocoEngine)
+        some, threads = (q, 0) if quick else (q[: slow_samples(len(q), len(model.joints))], 1)
+        return [check_poses(engine, model.spec, some, tolerance, model.reach, threads=threads, advance=advance)]
+
+    checks = [check_poses(library, model.spec, q, tolerance, model.reach, threads=0, advance=advance)]
     for engine in engines:
-        some = q if isinstance(engine, MujocoEngine) else q[:SLOW_SAMPLES]
-        threads = 0 if isinstance(engine, MujocoEngine) else 1
-        poses.append(check_poses(engine, model.spec, some, tolerance, model.reach, threads=threads, advance=advance))
-    if mjcf.is_file() and any(engine.name == "mujoco-mjcf" for engine in engines):
-        poses.append(check_unit_quaternions(mjcf))
+        checks += _asked(engine, Quantity.POSE, poses)
+    if any(engine.name == "mujoco-mjcf" for engine in engines):
+        checks.append(check_unit_quaternions(mjcf))
     movers = [engine for engine in engines if not isinstance(engine, YourdfpyEngine)]
     return RobotReport(
         name=model.name,
         samples=samples,
         reach=model.reach,
         checks=(
-            *poses,
             *checks,
+            *unread,
             *_jacobians(model, library, movers, q[:JACOBIAN_SAMPLES], tolerance),
             *_dynamics(model, movers, q[:DYNAMICS_SAMPLES], seed),
         ),
     )
 
 
+def _read(model: RobotModel, mjcf: Path, urdf: Path) -> tuple[list[Mover | YourdfpyEngine], list[Check]]:
+    """Let every engine read its file; of those that do not, say why."""
+    engines: list[Mover | YourdfpyEngine] = []
+    unread: list[Check] = []
+    names = [joint.name for joint in model.moving_joints]
+    for name, path, make, package in (
+        ("mujoco-mjcf", mjcf, MujocoEngine, "mujoco"),
+        ("mujoco-urdf", urdf, MujocoEngine, "mujoco"),
+        ("yourdfpy", urdf, YourdfpyEngine, "yourdfpy"),
+        ("pinocchio", urdf, PinocchioEngine, "pin"),
+    ):
+        if not path.is_file():
+            reason = f"{path}: no such file; write it with 'dh2sim export'"
+            unread.append(Check(engine=name, quantity=Quantity.FILE, ok=False, reason=reason))
+            continue
+        try:
+            with np.errstate(all="ignore"):
+                engines.append(make(path, names, len(model.joints)))
+        except ImportError as error:
+            reason = f"not installed ({error}); pip install {package}"
+            unread.append(Check(engine=name, quantity=Quantity.POSE, ok=None, reason=reason))
+        except EngineError as error:
+            unread.append(Check(engine=name, quantity=Quantity.FILE, ok=False, reason=str(error)))
+    return engines, unread
+
+
 def _jacobians(
-    model: RobotModel,
-    library: LibraryEngine,
-    engines: list[MujocoEngine | PinocchioEngine],
-    q: Array,
-    tolerance: float,
+    model: RobotModel, library: LibraryEngine, engines: list[Mover], q: Array, tolerance: float
 ) -> list[Check]:
     if q.shape[1] == 0:
         return []
-    differences = table_jacobian(model.spec, q)
+    names = [joint.name for joint in model.moving_joints]
     own = library.jacobian(q)
-    checks = [check_jacobian(library, differences, q, DIFFERENCE_TOLERANCE, model.reach, differences=True)]
-    return checks + [check_jacobian(engine, own, q, tolerance, model.reach) for engine in engines]
+    checks = [
+        check_jacobian(
+            library,
+            table_jacobian(model.spec, q),
+            q,
+            DIFFERENCE_TOLERANCE,
+            model.reach,
+            names,
+            differences=True,
+        )
+    ]
+    for engine in engines:
+        checks += _asked(
+            engine, Quantity.JACOBIAN, lambda engine: [check_jacobian(engine, own, q, tolerance, model.reach, names)]
+        )
+    return checks
 
 
-def _dynamics(model: RobotModel, engines: list[MujocoEngine | PinocchioEngine], q: Array, seed: int) -> list[Check]:
+def _dynamics(model: RobotModel, engines: list[Mover], q: Array, seed: int) -> list[Check]:
     checks = [check_inertias(engine, model) for engine in engines if isinstance(engine, MujocoEngine)]
     if q.shape[1] == 0 or not engines or engines[0].name != "mujoco-mjcf":
         return checks
@@ -140,13 +172,23 @@ def _dynamics(model: RobotModel, engines: list[MujocoEngine | PinocchioEngine], 
     reference = engines[0].dynamic_terms(q, velocity, gravity)
     names = [joint.name for joint in model.moving_joints]
     for engine in engines[1:]:
-        checks += check_dynamics(engine.name, engine.dynamic_terms(q, velocity, gravity), reference, names, q)
+        checks += _asked(
+            engine,
+            Quantity.MASS_MATRIX,
+            lambda engine: check_dynamics(
+                engine.name, engine.dynamic_terms(q, velocity, gravity), reference, names, q
+            ),
+        )
     return checks
 
 
-def _failed(engine: str, reason: str) -> Check:
-    return Check(engine=engine, quantity=Quantity.FILE, ok=False, reason=reason)
-
-
-def _absent(engine: str, error: ImportError) -> Check:
-    return Check(engine=engine, quantity=Quantity.POSE, ok=None, reason=f"not installed ({error})")
+def _asked(engine: Engine, quantity: Quantity, question: Callable[[Engine], list[Check]]) -> list[Check]:
+    """Ask an engine; one that breaks down over a file, in whatever way, has failed on it."""
+    try:
+        with np.errstate(all="ignore"):  # a file may hold anything; what is not finite fails
+            return question(engine)
+    except MemoryError:
+        raise
+    except Exception as error:
+        reason = f"{engine.name} broke down: {type(error).__name__}: {' '.join(str(error).split())}"
+        return [Check(engine=engine.name, quantity=quantity, ok=False, reason=reason)]

@@ -1,0 +1,67 @@
+"""The commands of the ``dh2sim`` program."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from dh2sim.cli.export import export
+from dh2sim.cli.fk import fk
+from dh2sim.cli.info import info
+from dh2sim.cli.robots import list_robots
+from dh2sim.cli.running import guarded
+from dh2sim.cli.schema import schema
+from dh2sim.cli.validate import validate
+
+HELP = """\
+From a Denavit-Hartenberg table to a simulated robot that provably matches it.
+
+\b
+Examples:
+  dh2sim list                        the robots that come with it
+  dh2sim info stanford               its table, frames, mass and reach
+  dh2sim export stanford             write URDF and MJCF to generated/stanford/
+  dh2sim validate stanford           check every engine against the table
+  dh2sim fk stanford 0.3 -0.7 0.5 1.1 0.6 -0.4
+
+ROBOT is the path of a robot file, or the name of a robot that comes with dh2sim.
+
+Exit status: 0 done, 1 a check fell short, 2 bad input or usage, 130 interrupted.
+"""
+
+# Plain help texts: importing rich for them would double the time that --help takes.
+app = typer.Typer(
+    help=HELP,
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"dh2sim {version('dh2sim')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Hold the options of the program itself."""
+
+
+app.command(short_help="Write URDF and MJCF, verified against the table.")(guarded(export))
+app.command(short_help="Check every engine against the table.")(guarded(validate))
+# a negative number is no option
+app.command(context_settings={"ignore_unknown_options": True}, short_help="Print the pose of a frame.")(guarded(fk))
+app.command(short_help="Print the table, frames, mass and reach.")(guarded(info))
+app.command("list", short_help="List the robots that come with dh2sim.")(guarded(list_robots))
+app.command(short_help="Print the JSON Schema of robot files.")(guarded(schema))
