@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 """Write docs/robot-file.md, the reference of robot files, from their schema.
 
-    python scripts/robot_file_reference.py            write it
-    python scripts/robot_file_reference.py --check    exit 1 if it is not what the schema says
+Called without arguments it writes the page; with ``--check`` it exits with 1 if the page is not what the schema says.
 """
 
 from __future__ import annotations
@@ -37,8 +36,8 @@ line, editors complete and check it while you type.
 ## Numbers
 
 A number may be an arithmetic expression in a string over `parameters` and `pi`: `+ - * / **`, parentheses, and
-`sqrt sin cos tan asin acos atan atan2`. The functions take and return radians, whatever the file's angle unit is; in a
-file in degrees write `atan2(3, 4) * 180 / pi`. NaN and infinity are errors.
+`sqrt sin cos tan asin acos atan atan2`. The functions take and return radians, whatever the file's angle unit is: in
+a file in degrees write `atan2(3, 4) * 180 / pi`. NaN and infinity are errors.
 
 ## Units
 
@@ -97,7 +96,7 @@ def _section(title: str, entry: dict[str, Any], schema: dict[str, Any]) -> Itera
     yield "|---|---|---|"
     for key, value in entry["properties"].items():
         required = " (required)" if key in entry.get("required", ()) else ""
-        yield f"| `{key}`{required} | {_kind(value, schema)} | {value.get('description', '')} |"
+        yield f"| `{key}`{required} | {_kind(value, schema)} | {value.get('description', '').replace('<', '&lt;')} |"
     yield ""
 
 

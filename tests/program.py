@@ -1,0 +1,64 @@
+"""The dh2sim program as tests call it: in this process, or in one of its own."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+
+from dh2sim.cli.app import app
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """How a run ended."""
+
+    status: int
+    out: str
+    err: str
+
+
+def dh2sim(*arguments: str | Path) -> Outcome:
+    """Run a command line in this process."""
+    out, err = io.StringIO(), io.StringIO()
+    status: object = None
+    with redirect_stdout(out), redirect_stderr(err):
+        try:
+            app([str(argument) for argument in arguments], prog_name="dh2sim")
+        except SystemExit as end:
+            status = end.code
+    assert isinstance(status, int), f"not an exit status: {status!r}"
+    return Outcome(status=status, out=out.getvalue(), err=err.getvalue())
+
+
+def environment(**variables: str) -> dict[str, str]:
+    """This process's environment with some variables changed."""
+    return {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **variables}
+
+
+def dh2sim_process(
+    *arguments: str | Path, cwd: Path | None = None, variables: dict[str, str] | None = None
+) -> Outcome:
+    """Run a command line in a process of its own."""
+    done = subprocess.run(
+        [sys.executable, "-m", "dh2sim", *map(str, arguments)],
+        cwd=cwd,
+        env=environment(**(variables or {})),
+        capture_output=True,
+        encoding="utf-8",
+        errors="surrogateescape",
+        timeout=120,
+        check=False,
+    )
+    return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder, by its path in it; hidden ones too."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()
+    }

@@ -1,0 +1,77 @@
+"""What the README shows is what happens."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from dh2sim.robot.load import parse_robot
+from tests.program import dh2sim_process
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
+
+
+def shown_commands() -> list[tuple[str, str]]:
+    """Every ``$ dh2sim …`` of the page, with what it shows below."""
+    found = [block.split("\n", 1) for block in blocks("console")]
+    return [(command.removeprefix("$ "), output) for command, output in found]
+
+
+def without_rounding_noise(text: str) -> list[str]:
+    """The lines of a text; the digits of numbers like 6.7e-16 depend on the machine."""
+    return [" ".join(line.split()) for line in re.sub(r"\d\.\de-\d\d", "#e-#", text).splitlines()]
+
+
+@pytest.mark.parametrize(("command", "output"), shown_commands(), ids=[command for command, _ in shown_commands()])
+def test_commands_print_what_the_readme_shows(command: str, output: str, tmp_path: Path) -> None:
+    program, *arguments = command.split()
+    assert program == "dh2sim"
+    if "my_arm.yaml" in arguments:
+        (tmp_path / "my_arm.yaml").write_text(wrong_robot(), encoding="utf-8")
+    done = dh2sim_process(*arguments, cwd=tmp_path, variables={"COLUMNS": "80"})
+    printed = without_rounding_noise(done.out + done.err)
+    # a first export of the page's folder writes what later ones leave as it is
+    assert [line.replace(" unchanged", "") for line in printed] == without_rounding_noise(output)
+
+
+def wrong_robot() -> str:
+    """The page's robot file with the two mistakes whose messages it shows."""
+    [text] = blocks("yaml")[:1]
+    return text.replace("alpha: 90,", "alfa: 90,").replace("[0.1, 1.2]", "[1.2, 0.1]")
+
+
+def test_there_are_commands_to_check() -> None:
+    assert [command.split()[1] for command, _ in shown_commands()] == ["export", "validate", "fk", "info"]
+
+
+def test_the_robot_file_of_the_readme_is_right() -> None:
+    spec = parse_robot(blocks("yaml")[0])
+    assert (spec.name, len(spec.rows)) == ("my_arm", 3)
+
+
+def test_the_python_of_the_readme_runs() -> None:
+    [code] = blocks("python")
+    names: dict[str, object] = {}
+    exec(compile(code, "README.md", "exec"), names)
+    assert str(names["urdf"]).startswith("<?xml")
+    shapes = [getattr(names[name], "shape", None) for name in ("T_base_tool", "T_base_dh", "J")]
+    assert shapes == [(1000, 4, 4), (1000, 7, 4, 4), (1000, 6, 6)]
+
+
+def test_every_link_of_the_pages_leads_somewhere() -> None:
+    for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]:
+        text = page.read_text(encoding="utf-8")
+        for target, anchor in re.findall(r"\]\((?!https?:)([^)#\s]*)#?([^)\s]*)\)", text):
+            place = (page.parent / target) if target else page
+            assert place.exists(), f"{page.name}: {target}"
+            if anchor:
+                headings = re.findall(r"^#+ (.*)$", place.read_text(encoding="utf-8"), flags=re.MULTILINE)
+                slugs = {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+                assert anchor in slugs, f"{page.name}: {target}#{anchor}"
