@@ -33,9 +33,7 @@ angles: SearchStrategy[float] = st.sampled_from(
 ) | st.floats(-math.pi, math.pi, allow_subnormal=False)
 """Angles, rad: right ones, odd ones, any."""
 
-lengths: SearchStrategy[float] = st.sampled_from([0.0, 0.4318, -0.15]) | st.floats(
-    -1.0, 1.0, allow_subnormal=False
-)
+lengths: SearchStrategy[float] = st.sampled_from([0.0, 0.4318, -0.15]) | st.floats(-1.0, 1.0, allow_subnormal=False)
 """Lengths, m."""
 
 names: SearchStrategy[str] = st.from_regex(r"[A-Za-z][A-Za-z0-9_-]{0,11}", fullmatch=True)
@@ -77,9 +75,7 @@ def link_specs(draw: DrawFn) -> LinkSpec:
         case "com":
             return LinkSpec(mass=draw(st.floats(0.1, 30.0)), com=draw(vectors(lengths)))
         case _:
-            return LinkSpec(
-                mass=draw(st.floats(0.1, 30.0)), com=draw(vectors(lengths)), inertia=draw(inertias())
-            )
+            return LinkSpec(mass=draw(st.floats(0.1, 30.0)), com=draw(vectors(lengths)), inertia=draw(inertias()))
 
 
 @st.composite
@@ -111,9 +107,7 @@ def rows(draw: DrawFn, name: str, types: SearchStrategy[JointType] | None = None
         theta=draw(angles),
         flip=moves and draw(st.booleans()),
         limits=draw(limits_for(joint_type)),
-        dynamics=Dynamics(damping=0.1, friction=0.05, armature=0.01)
-        if moves and draw(st.booleans())
-        else Dynamics(),
+        dynamics=Dynamics(damping=0.1, friction=0.05, armature=0.01) if moves and draw(st.booleans()) else Dynamics(),
         link=draw(link_specs()),
     )
 
@@ -158,9 +152,7 @@ def joint_vectors_for(draw: DrawFn, spec: RobotSpec) -> Array:
 
 
 @st.composite
-def robots_with_joint_vectors(
-    draw: DrawFn, *, max_rows: int = 12, must_move: bool = True
-) -> tuple[RobotSpec, Array]:
+def robots_with_joint_vectors(draw: DrawFn, *, max_rows: int = 12, must_move: bool = True) -> tuple[RobotSpec, Array]:
     """A robot, and 1 to 4 joint vectors for it, shape (count, n)."""
     spec = draw(robot_specs(max_rows=max_rows, must_move=must_move))
     drawn = draw(st.lists(joint_vectors_for(spec), min_size=1, max_size=4))

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from dh2sim.robot.load import parse_robot
+from scripts.update_readme import wrong_robot
 from tests.program import dh2sim_process
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -34,17 +35,11 @@ def test_commands_print_what_the_readme_shows(command: str, output: str, tmp_pat
     program, *arguments = command.split()
     assert program == "dh2sim"
     if "my_arm.yaml" in arguments:
-        (tmp_path / "my_arm.yaml").write_text(wrong_robot(), encoding="utf-8")
+        (tmp_path / "my_arm.yaml").write_text(wrong_robot(README), encoding="utf-8")
     done = dh2sim_process(*arguments, cwd=tmp_path, variables={"COLUMNS": "80"})
     printed = without_rounding_noise(done.out + done.err)
     # a first export of the page's folder writes what later ones leave as it is
     assert [line.replace(" unchanged", "") for line in printed] == without_rounding_noise(output)
-
-
-def wrong_robot() -> str:
-    """The page's robot file with the two mistakes whose messages it shows."""
-    [text] = blocks("yaml")[:1]
-    return text.replace("alpha: 90,", "alfa: 90,").replace("[0.1, 1.2]", "[1.2, 0.1]")
 
 
 def test_there_are_commands_to_check() -> None:

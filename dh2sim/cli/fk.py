@@ -42,12 +42,15 @@ def fk(
       dh2sim fk stanford --degrees 45 60 0.2 45 0 -60
       dh2sim fk stanford home --frame dh_3 --json
     """
+    import numpy as np
+
     from dh2sim.kinematics.chain import build_chain
     from dh2sim.kinematics.frames import frame_pose
     from dh2sim.kinematics.transforms import quaternion_from_rotation, rpy_from_rotation
 
     [spec] = load_all([robot])
-    pose = frame_pose(build_chain(spec), frame, _joint_vector(spec, q or [], degrees=degrees))
+    with np.errstate(all="ignore"):
+        pose = frame_pose(build_chain(spec), frame, _joint_vector(spec, q or [], degrees=degrees))
     if not bool(abs(pose).max() < math.inf):
         raise ConfigurationError(f"{spec.name}: the pose of {frame} is too far away for a number to tell")
     if as_json:
@@ -74,6 +77,7 @@ def _rounded(value: float) -> float:
 
 def _joint_vector(spec: RobotSpec, texts: list[str], *, degrees: bool) -> list[float]:
     from dh2sim.robot.expressions import ExpressionError, evaluate
+    from dh2sim.robot.words import shown
 
     if not texts:
         return [float(x) for x in spec.configurations.get("home", [0.0] * len(spec.moving_rows))]
@@ -81,7 +85,7 @@ def _joint_vector(spec: RobotSpec, texts: list[str], *, degrees: bool) -> list[f
         return [float(x) for x in spec.configurations[texts[0]]]
     for text in texts:
         if text.startswith("--"):
-            raise ConfigurationError(f"fk has no option '{text}'. Options: --frame, --degrees, --json, --help")
+            raise ConfigurationError(f"fk has no option {shown(text)}. Options: --frame, --degrees, --json, --help")
     moving = spec.moving_rows
     if len(texts) != len(moving):
         raise ConfigurationError(_wrong_count(spec, texts, degrees=degrees))
@@ -96,7 +100,7 @@ def _joint_vector(spec: RobotSpec, texts: list[str], *, degrees: bool) -> list[f
 
 
 def _wrong_count(spec: RobotSpec, texts: list[str], *, degrees: bool) -> str:
-    from dh2sim.robot.words import did_you_mean, listed
+    from dh2sim.robot.words import did_you_mean, listed, shown
 
     moving = spec.moving_rows
     names = ", ".join(f"{row.name} ({'m' if not row.type.turns else 'deg' if degrees else 'rad'})" for row in moving)
@@ -105,4 +109,4 @@ def _wrong_count(spec: RobotSpec, texts: list[str], *, degrees: bool) -> str:
     if len(texts) > 1 or not texts[0].isidentifier():
         return told
     hint = did_you_mean(texts[0], spec.configurations)
-    return f"{spec.name} has no configuration '{texts[0]}'.{hint} Configurations: {listed(spec.configurations)}"
+    return f"{spec.name} has no configuration {shown(texts[0])}.{hint} Configurations: {listed(spec.configurations)}"

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dh2sim.cli.console import make_console, print_whole
 from dh2sim.cli.running import build_all
-from dh2sim.cli.tables import print_whole
 
 if TYPE_CHECKING:
     from dh2sim.model.robot_model import JointModel, RobotModel
@@ -88,10 +88,9 @@ def _row_dict(row: Row, joint: JointModel) -> dict[str, Any]:
 
 
 def _print(model: RobotModel) -> None:
-    from rich.console import Console
     from rich.text import Text
 
-    console = Console(highlight=False)
+    console = make_console()
     spec = model.spec
     description = " ".join(spec.description.split())
     console.print(Text.assemble((spec.name, "bold"), f"  {description}" if description else ""))

@@ -2,32 +2,72 @@
 
 from __future__ import annotations
 
+import _thread
+import gc
 import io
 import os
 import signal
 import sys
+import threading
+from collections.abc import Callable
 from types import FrameType
 
 
 def main() -> None:
     """Run the command line; does not return."""
-    signal.signal(signal.SIGTERM, _terminate)
+    interruptions: list[int] = []
+
+    def interrupt(number: int, _frame: FrameType | None) -> None:
+        interruptions.append(number)
+        raise KeyboardInterrupt
+
+    _handle(signal.SIGINT, interrupt)
+    _handle(signal.SIGTERM, _terminate)
+    sys.unraisablehook = _unraisable
     try:
         _prepare_streams()
+        _prepare_imports()
         from dh2sim.cli.app import app
 
         app()
-    except KeyboardInterrupt:  # outside of any command: those tell it themselves
+    except BaseException:
+        # modules that are interrupted while they are imported make all sorts of errors of it
+        if not interruptions:
+            raise
         sys.stderr.write("dh2sim: interrupted\n")
         raise SystemExit(130) from None
     finally:
         # Python takes a while to end; a Ctrl-C meanwhile ends it at once, without a traceback
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        _handle(signal.SIGINT, signal.SIG_DFL)
+
+
+def _handle(kind: signal.Signals, handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
+    """Handle a signal, unless whoever started the program has it ignored, as 'nohup' does."""
+    if signal.getsignal(kind) is not signal.SIG_IGN:
+        signal.signal(kind, handler)
 
 
 def _terminate(number: int, _frame: FrameType | None) -> None:
     """End in good order: temporary folders are removed. The status is the one that a shell gives to such an end."""
     raise SystemExit(128 + number)
+
+
+def _unraisable(error: sys.UnraisableHookArgs) -> None:
+    """Interrupt once more where an interruption came to nothing, as in a callback of the garbage collector."""
+    if isinstance(error.exc_value, KeyboardInterrupt):
+        threading.Timer(0.01, _thread.interrupt_main).start()
+    else:
+        sys.__unraisablehook__(error)
+
+
+def _prepare_imports() -> None:
+    """Make imports quick: much of the time of a short command goes there.
+
+    Whatever they make is kept, so that looking for garbage in it finds none; long commands look again. And pydantic
+    need not look through everything that is installed for plugins, of which none is wanted here.
+    """
+    gc.disable()
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 
 def _prepare_streams() -> None:

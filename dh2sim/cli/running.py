@@ -41,8 +41,7 @@ def guarded(command: Callable[P, int | None]) -> Callable[P, None]:
         except MemoryError:
             status = complain("there is not enough memory for that")
         except KeyboardInterrupt:
-            complain("interrupted")
-            status = INTERRUPTED
+            status = INTERRUPTED  # of which ``main`` tells
         raise SystemExit(status)
 
     return run

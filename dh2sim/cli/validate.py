@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import sys
 import textwrap
@@ -12,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dh2sim.cli.console import make_console, print_whole
 from dh2sim.cli.running import FELL_SHORT, build_all, complain
-from dh2sim.cli.tables import print_whole
 from dh2sim.errors import Dh2simError, OutputError
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ def validate(
     from dh2sim.validate.report import ValidationReport
     from dh2sim.validate.run import engine_samples, validate_robot
 
+    gc.enable()
     with _warnings_told(), _progress(sum(engine_samples(samples, len(model.joints)) for model in models)) as advance:
         report = ValidationReport(
             robots=tuple(
@@ -144,10 +146,9 @@ def _progress(total: int) -> Iterator[Callable[[int], None]]:
 
 
 def _print(report: ValidationReport) -> None:
-    from rich.console import Console
     from rich.text import Text
 
-    console = Console(highlight=False)
+    console = make_console()
     for robot in report.robots:
         verdict = ("matches its table", "bold green") if robot.ok else ("DOES NOT match its table", "bold red")
         console.print(Text.assemble((robot.name, "bold"), " ", verdict))

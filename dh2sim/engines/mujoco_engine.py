@@ -125,6 +125,8 @@ class MujocoEngine:
         """Mass matrix (without armature), bias and gravity terms; see ``DynamicsEngine``."""
         model = self._model
         model.opt.gravity[:] = gravity
+        # left out here rather than taken off the result, where it would take digits with it
+        model.dof_armature[:] = 0.0
         data = mujoco.MjData(model)
         n = len(self._dofs)
         mass, bias, load = np.zeros((len(q), n, n)), np.zeros((len(q), n)), np.zeros((len(q), n))
@@ -136,7 +138,7 @@ class MujocoEngine:
             mujoco.mj_forward(model, data)
             load[k] = data.qfrc_bias[self._dofs]
             mujoco.mj_fullM(model, data, full)
-            mass[k] = (full - np.diag(model.dof_armature))[order]
+            mass[k] = full[order]
             data.qvel[self._dofs] = velocity[k]
             mujoco.mj_forward(model, data)
             bias[k] = data.qfrc_bias[self._dofs]

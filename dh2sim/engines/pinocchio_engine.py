@@ -32,6 +32,8 @@ class PinocchioEngine:
         """
         import pinocchio
 
+        if not hasattr(pinocchio, "buildModelFromUrdf"):
+            raise ImportError("another package of that name is; the one wanted comes with 'pip install pin'")
         self._pin: Any = pinocchio
         try:
             self._model: Any = pinocchio.buildModelFromUrdf(str(path))
@@ -68,7 +70,7 @@ class PinocchioEngine:
                 self._ids[-1],
                 self._pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
             )
-            result[k] = jacobian[:, self._dofs]
+            result[k] = np.reshape(jacobian, (6, -1))[:, self._dofs]  # a single column comes as a flat array
         return result
 
     def dynamic_terms(self, q: Array, velocity: Array, gravity: Array) -> DynamicTerms:

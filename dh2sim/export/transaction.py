@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
 import tempfile
-import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import FrameType
 
 from dh2sim.errors import OutputError
+from dh2sim.export.signals import signals_deferred
 
 
 @contextmanager
@@ -34,7 +32,7 @@ def staged(out: Path, name: str, files: Mapping[str, bytes]) -> Iterator[Path]:
     folder: Path | None = None
     try:
         try:
-            with _signals_deferred():
+            with signals_deferred():
                 made += _make_folder(out)
                 folder = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=out))
             for relative, data in files.items():
@@ -45,7 +43,7 @@ def staged(out: Path, name: str, files: Mapping[str, bytes]) -> Iterator[Path]:
             raise OutputError(f"cannot write to '{out}': {error.strerror or error}; nothing was changed") from error
         yield folder / "new"
     finally:
-        with _signals_deferred():
+        with signals_deferred():
             if folder is not None:
                 shutil.rmtree(folder, ignore_errors=True)
             _remove_empty(made)
@@ -68,7 +66,7 @@ def put_in_place(staging: Path, target: Path, files: Iterable[str]) -> None:
     finals = {relative: target / relative for relative in files}
     made: list[Path] = []
     moved: list[str] = []
-    with _signals_deferred():
+    with signals_deferred():
         try:
             for relative, final in finals.items():
                 made += _make_folder(final.parent)
@@ -120,24 +118,3 @@ def _remove_empty(folders: list[Path]) -> None:
     for folder in reversed(folders):
         with suppress(OSError):
             folder.rmdir()
-
-
-@contextmanager
-def _signals_deferred() -> Iterator[None]:
-    """Hold back SIGINT and SIGTERM; Python lets only the main thread do so."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    arrived: list[int] = []
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        arrived.append(number)
-
-    previous = {kind: signal.signal(kind, note) for kind in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for kind, handler in previous.items():
-            signal.signal(kind, signal.SIG_DFL if handler is None else handler)  # None: set by something not Python
-        for number in arrived:
-            signal.raise_signal(number)

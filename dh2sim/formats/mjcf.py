@@ -108,8 +108,7 @@ def _bodies(mujoco: ET.Element, model: RobotModel, materials: dict[Color, str]) 
     add_site(body, "dh_0", model.chain.T_base_link_dh0, None)
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
         body = child(body, "body", name=link.name, **placed(joint.joint.T_parent_joint))
-        if link.inertial is not None:
-            _inertial(body, link.inertial)
+        _inertial(body, link.inertial)
         if joint.joint.type is not JointType.FIXED:
             _joint(body, joint)
         _geoms(body, model, link, joint.joint.T_joint_dh, materials)
@@ -129,7 +128,10 @@ def _moved(T: Array) -> dict[str, str]:
     return {name: text for name, text in placed(T).items() if text not in ("0.0 0.0 0.0", "1.0 0.0 0.0 0.0")}
 
 
-def _inertial(body: ET.Element, properties: MassProperties) -> None:
+def _inertial(body: ET.Element, properties: MassProperties | None) -> None:
+    if properties is None:  # without this MuJoCo takes the body's place in its parent for its principal frame
+        child(body, "inertial", pos=numbers([0, 0, 0]), mass=number(0), diaginertia=numbers([0, 0, 0]))
+        return
     I = properties.inertia  # noqa: E741
     inertial = child(body, "inertial", pos=numbers(properties.com), mass=number(properties.mass))
     if I[0, 1] == I[0, 2] == I[1, 2] == 0.0:

@@ -16,6 +16,8 @@ from dh2sim.typing import Array
 
 NEAR = 1e-5
 """Frames that differ by less may be one frame to MuJoCo; m, and components of a rotation matrix."""
+NOISE = 1e-15
+"""Frames that differ by less may as well be one."""
 
 
 def placed(T: Array) -> dict[str, str]:
@@ -41,23 +43,22 @@ def add_site(body: ET.Element, name: str, T: Array, inertial: MassProperties | N
 def needs_body(T: Array, inertial: MassProperties | None) -> bool:
     """Whether MuJoCo may take a site with pose ``T`` in a link for another frame that is only near it."""
     position, R = T[:3, 3], T[:3, :3]
-    aligned = bool((identity()[:3, :3] == R).all())
-    if _near(R, identity()[:3, :3]) and not (aligned and (not position.any() or not _near(position, 0.0))):
+    turned, moved = _gap(R, identity()[:3, :3]), _gap(position, 0.0)
+    if NOISE < turned < NEAR:
         return True
-    if inertial is None:
-        return False
-    if aligned:
-        return bool(position.any()) and _near(position, inertial.com) and bool((position != inertial.com).any())
-    return _along_principal_axes(R, inertial.inertia)
+    if turned <= NOISE:
+        return NOISE < moved < NEAR or (inertial is not None and NOISE < _gap(position, inertial.com) < NEAR)
+    return inertial is not None and _along_principal_axes(R, inertial.inertia)
 
 
 def _along_principal_axes(R: Array, tensor: Array) -> bool:
     """Whether the axes of ``R`` are almost principal ones of a tensor that is not diagonal as it is written."""
     if tensor[0, 1] == tensor[0, 2] == tensor[1, 2] == 0.0:
         return False
-    turned = rotate_tensor(R.T, tensor)
-    return _near(turned - turned * identity()[:3, :3], 0.0, float(tensor[0, 0] + tensor[1, 1] + tensor[2, 2]))
+    own = rotate_tensor(R.T, tensor)
+    trace = float(tensor[0, 0] + tensor[1, 1] + tensor[2, 2])
+    return max(abs(float(own[i, j])) for i, j in ((0, 1), (0, 2), (1, 2))) < NEAR * trace
 
 
-def _near(a: Array, b: Array | float, scale: float = 1.0) -> bool:
-    return bool((abs(a - b) < NEAR * scale).all())
+def _gap(a: Array, b: Array | float) -> float:
+    return float(abs(a - b).max())

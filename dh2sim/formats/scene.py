@@ -141,7 +141,7 @@ def _pedestal(world: ET.Element, model: RobotModel, floor: float) -> None:
 def _camera(world: ET.Element, extent: _Extent) -> None:
     norm = math.sqrt(sum(x * x for x in VIEW_DIRECTION))
     back = [x / norm for x in VIEW_DIRECTION]
-    distance = 0.9 * extent.radius / math.sin(math.radians(FIELD_OF_VIEW / 2))
+    distance = extent.radius / math.sin(math.radians(FIELD_OF_VIEW / 2))
     across = math.hypot(back[0], back[1])
     right = [-back[1] / across, back[0] / across, 0.0]
     up = [back[1] * right[2] - back[2] * right[1], back[2] * right[0] - back[0] * right[2], across]

@@ -27,10 +27,10 @@ def to_urdf(model: RobotModel, *, dh_frames: bool = True) -> str:
 
     Returns:
         The text of the file. Mesh file names are relative to it: ``meshes/link_1.stl``. The ``mujoco`` element, which
-        other readers ignore, makes MuJoCo keep the fixed links as bodies.
+        other readers ignore, makes MuJoCo keep the fixed links as bodies and give no mass to the base.
     """
     robot = ET.Element("robot", name=model.name)
-    child(child(robot, "mujoco"), "compiler", fusestatic="false")
+    child(child(robot, "mujoco"), "compiler", fusestatic="false", inertiafromgeom="false")
     materials = _materials(model)
     for color, name in materials.items():
         child(child(robot, "material", name=name), "color", rgba=numbers(color))

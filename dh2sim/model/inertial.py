@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dh2sim.kinematics.chain import Joint
-from dh2sim.model.mass import MassProperties, combine, in_frame, made_possible, of_shape
+from dh2sim.model.mass import MassProperties, at_least, combine, in_frame, made_possible, of_shape
 from dh2sim.model.shapes import Shape
 from dh2sim.robot.spec import LinkSpec
 from dh2sim.typing import read_only
 
 ASSUMED_DENSITY = 1000.0
 """kg/m³: what a hollow arm with its motors weighs is nearer to water than to aluminium."""
+
+LEAST_MASS = 1e-9
+"""kg, and"""
+LEAST_INERTIA = 1e-14
+"""kg·m²: estimates are no smaller. MuJoCo refuses moving bodies of less than 1e-15."""
 
 
 def link_inertial(
@@ -30,8 +35,8 @@ def link_inertial(
     if not shapes and all(value is None for value in given.values()):
         return None, ()
     estimate = _estimate(link, shapes)
-    mass = estimate.mass if link.mass is None else link.mass
-    com, inertia = estimate.com, read_only(estimate.inertia * (mass / estimate.mass))
+    mass = max(estimate.mass, LEAST_MASS) if link.mass is None else link.mass
+    com, inertia = estimate.com, at_least(read_only(estimate.inertia * (mass / estimate.mass)), LEAST_INERTIA)
     in_dh = in_frame(
         joint.T_joint_dh,
         MassProperties(

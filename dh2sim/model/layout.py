@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.transforms import compose
+from dh2sim.model.limits import NO_LENGTH
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart, along_z, between, pose_with_z
 from dh2sim.robot.spec import JointType
 from dh2sim.typing import Array, read_only
@@ -59,7 +60,7 @@ def link_scale(chain: KinematicChain, travels: Sequence[tuple[float, float]]) ->
     ]
     lengths.append(_norm(compose(chain.joints[-1].T_joint_dh, chain.T_dhn_tool0)[:3, 3]))
     largest = max(lengths)
-    counted = [length for length in lengths if length > 1e-3 * largest]
+    counted = [length for length in lengths if length > max(1e-3 * largest, NO_LENGTH)]
     return math.fsum(counted) / len(counted) if counted else 1.0
 
 

@@ -14,6 +14,9 @@ ASSUMED_TURN_RATE = math.pi
 ASSUMED_SLIDE_RATE = 1.0
 """m/s, where it gives none of a joint that slides."""
 
+NO_LENGTH = 1e-9
+"""m: what is shorter is rounding, as 0.3 * cos(pi / 2) is, and no measure of a robot's size."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PositionRange:
@@ -39,7 +42,8 @@ def assumed_travel(chain: KinematicChain, rows: Sequence[Row]) -> float:
 
     It is what the rest of the robot reaches, or 1 m if that is nothing.
     """
-    return _limited_reach(chain, rows) or 1.0
+    reach = _limited_reach(chain, rows)
+    return reach if reach > NO_LENGTH else 1.0
 
 
 def _limited_reach(chain: KinematicChain, rows: Sequence[Row]) -> float:

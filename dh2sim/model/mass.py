@@ -104,6 +104,13 @@ def made_possible(inertia: Array) -> Array:
     return inertia
 
 
+def at_least(inertia: Array, least: float) -> Array:
+    """The inertia, shape (3, 3), or where a principal moment may be below ``least``, that much more of all three."""
+    if min(_pivots(inertia.tolist())) >= least:
+        return inertia
+    return read_only([[float(inertia[i, j]) + (least if i == j else 0.0) for j in range(3)] for i in range(3)])
+
+
 def _pivots(A: list[list[float]]) -> list[float]:
     """Pivots of a symmetric matrix, up to the first that is not positive; all are where it is positive definite."""
     first = A[0][0]

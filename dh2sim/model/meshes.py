@@ -93,5 +93,5 @@ def _check(surface: trimesh.Trimesh, mesh: MeshSpec) -> None:
 
 
 def _words(error: Exception) -> str:
-    text = " ".join(str(error).split())
+    text = " ".join((error.strerror if isinstance(error, OSError) and error.strerror else str(error)).split())
     return text or type(error).__name__

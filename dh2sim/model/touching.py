@@ -93,7 +93,8 @@ def _overlaps(chain: KinematicChain, shapes: Sequence[Sequence[Shape]], q: Array
 def segment_distance(a: Array, b: Array, starts: Array, ends: Array) -> Array:
     """Distance, m, shape (k,), of the segment from a to b, shape (3,) each, to k segments, shape (k, 3) each.
 
-    Neither may be of zero length. (Ericson, Real-Time Collision Detection, 5.1.9.)
+    Neither may be of zero length; those that are parallel to within 1e-6 rad count as parallel. (Ericson, Real-Time
+    Collision Detection, 5.1.9.)
     """
     d1, d2 = b - a, ends - starts
     between = a - starts

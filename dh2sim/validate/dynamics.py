@@ -15,6 +15,12 @@ from dh2sim.validate.report import Check, Quantity, Worst
 
 TOLERANCE = 1e-9
 """Relative."""
+LEAST_INERTIA = 1e-6
+"""Least inertia that errors are relative to, as a share of the robot's mass at its reach."""
+LEAST_FORCE = 1e-3
+"""Least force that errors are relative to, as a share of the robot's weight at its reach."""
+LEAST_LEVER = 0.1
+"""m; least reach in both."""
 
 
 def check_inertias(engine: MujocoEngine, model: RobotModel) -> Check:
@@ -50,7 +56,7 @@ def check_inertias(engine: MujocoEngine, model: RobotModel) -> Check:
 
 
 def check_dynamics(
-    engine: str, terms: DynamicTerms, reference: DynamicTerms, names: Sequence[str], q: Array
+    engine: str, terms: DynamicTerms, reference: DynamicTerms, model: RobotModel, q: Array
 ) -> list[Check]:
     """Compare an engine's dynamic terms with those of MuJoCo on the MJCF.
 
@@ -58,19 +64,22 @@ def check_dynamics(
         engine: the engine's name.
         terms: what it computed for the N states.
         reference: what MuJoCo computed from the MJCF.
-        names: of the n joints.
+        model: the robot.
         q: joint vectors of the states, shape (N, n).
 
     Returns:
         A check for each of the three terms. Entries of the mass matrix are relative to sqrt(M_ii M_jj), forces to the
         greatest force that the same joint sees in any of the states, so that light wrists count like heavy shoulders.
+        Where these are next to nothing, beside what the robot's weight at its reach would make of them, rounding is
+        all there is: they count as ``LEAST_INERTIA`` and ``LEAST_FORCE`` of that.
     """
+    lever = max(model.reach, LEAST_LEVER)
     diagonal = np.sqrt(np.einsum("kii->ki", reference.mass_matrix))
+    diagonal = np.maximum(diagonal, np.sqrt(LEAST_INERTIA * model.mass) * lever)
     mass = np.abs(terms.mass_matrix - reference.mass_matrix) / (diagonal[:, :, None] * diagonal[:, None, :])
-    force = np.abs(reference.bias).max(axis=0)
-    # a joint that never feels a force: noise counts against a thousandth of what the others feel
-    force = np.maximum(force, 1e-3 * force.max(initial=0.0))
-    force = np.where(force > 0.0, force, np.square(diagonal).max(axis=0))
+    weight = model.mass * (1.0 + float(np.linalg.norm(model.spec.gravity)))  # 1 m/s^2 for what the motion makes
+    force = np.maximum(np.abs(reference.bias).max(axis=0), LEAST_FORCE * weight * lever)
+    names = [joint.name for joint in model.moving_joints]
     return [
         _check(engine, Quantity.MASS_MATRIX, mass.max(axis=2), names, q),
         _check(engine, Quantity.BIAS, np.abs(terms.bias - reference.bias) / force, names, q),

@@ -14,6 +14,7 @@ from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
 from dh2sim.errors import EngineError
 from dh2sim.export.run import export_robot
+from dh2sim.export.signals import signals_deferred
 from dh2sim.export.verify import sampling_limits
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.robot_model import RobotModel
@@ -128,7 +129,8 @@ def _read(model: RobotModel, mjcf: Path, urdf: Path) -> tuple[list[Mover | Yourd
             unread.append(Check(engine=name, quantity=Quantity.FILE, ok=False, reason=reason))
             continue
         try:
-            with np.errstate(all="ignore"):
+            # an import that is interrupted would pass for an engine that is not installed
+            with signals_deferred(), np.errstate(all="ignore"):
                 engines.append(make(path, names, len(model.joints)))
         except ImportError as error:
             reason = f"not installed ({error}); pip install {package}"
@@ -170,13 +172,12 @@ def _dynamics(model: RobotModel, engines: list[Mover], q: Array, seed: int) -> l
     velocity = np.random.default_rng(seed).uniform(-1.0, 1.0, q.shape)
     gravity = model.spec.gravity
     reference = engines[0].dynamic_terms(q, velocity, gravity)
-    names = [joint.name for joint in model.moving_joints]
     for engine in engines[1:]:
         checks += _asked(
             engine,
             Quantity.MASS_MATRIX,
             lambda engine: check_dynamics(
-                engine.name, engine.dynamic_terms(q, velocity, gravity), reference, names, q
+                engine.name, engine.dynamic_terms(q, velocity, gravity), reference, model, q
             ),
         )
     return checks

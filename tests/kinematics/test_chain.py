@@ -46,9 +46,7 @@ def spoil(wrong: Row, change: str) -> Row:
         case "flip":
             return dataclasses.replace(wrong, flip=not wrong.flip)
         case "convention":
-            return dataclasses.replace(
-                wrong, convention=STANDARD if wrong.convention is MODIFIED else MODIFIED
-            )
+            return dataclasses.replace(wrong, convention=STANDARD if wrong.convention is MODIFIED else MODIFIED)
         case _:
             return dataclasses.replace(wrong, **{change: -getattr(wrong, change)})
 
@@ -82,9 +80,7 @@ def test_the_link_part_of_a_standard_row_goes_in_front_of_the_next_joint() -> No
 def test_a_modified_row_has_its_dh_frame_at_the_joint() -> None:
     one = row("one", "prismatic", MODIFIED, a=0.3, alpha=ODD, d=0.1, theta=0.2)
     (joint,) = build_chain(RobotSpec(name="r", rows=(one,))).joints
-    np.testing.assert_allclose(
-        joint.T_parent_joint, row_matrix(one, np.zeros(1))[:, :, 0], rtol=0, atol=1e-15
-    )
+    np.testing.assert_allclose(joint.T_parent_joint, row_matrix(one, np.zeros(1))[:, :, 0], rtol=0, atol=1e-15)
     np.testing.assert_array_equal(joint.T_joint_dh, np.eye(4))
 
 

@@ -13,12 +13,8 @@ from dh2sim.typing import Array
 from tests.strategies import angles, lengths, vectors
 
 
-@given(
-    vectors(lengths), vectors(angles), vectors(lengths), st.floats(0.0, math.pi), st.sampled_from(range(3))
-)
-def test_errors_are_the_distance_and_the_angle(
-    p: Array, rpy: Array, shift: Array, angle: float, axis: int
-) -> None:
+@given(vectors(lengths), vectors(angles), vectors(lengths), st.floats(0.0, math.pi), st.sampled_from(range(3)))
+def test_errors_are_the_distance_and_the_angle(p: Array, rpy: Array, shift: Array, angle: float, axis: int) -> None:
     turn = [0.0, 0.0, 0.0]
     turn[axis] = angle
     T = pose_from_rpy(p, rpy)

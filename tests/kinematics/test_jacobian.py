@@ -62,9 +62,7 @@ def test_a_flipped_joint_flips_its_column() -> None:
         for flip in (False, True)
     )
     q = np.array([0.4, -0.2])
-    np.testing.assert_allclose(
-        geometric_jacobian(flipped, -q), -geometric_jacobian(plain, q), rtol=0, atol=1e-15
-    )
+    np.testing.assert_allclose(geometric_jacobian(flipped, -q), -geometric_jacobian(plain, q), rtol=0, atol=1e-15)
 
 
 def test_jacobian_of_what_is_no_joint_vector_is_refused() -> None:

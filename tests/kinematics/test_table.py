@@ -121,8 +121,6 @@ def test_table_poses_refuse_a_wrong_shape(q: object) -> None:
 def test_the_oracle_imports_nothing_of_what_it_judges() -> None:
     tree = ast.parse(Path(table.__file__).read_text(encoding="utf-8"))
     imported = {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    imported |= {
-        alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names
-    }
+    imported |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     ours = {name for name in imported if name.startswith("dh2sim")}
     assert ours == {"dh2sim.errors", "dh2sim.robot.spec", "dh2sim.typing"}

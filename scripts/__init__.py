@@ -1,0 +1,1 @@
+"""What keeps the project: checks, measurements, and what makes its pages and pictures."""

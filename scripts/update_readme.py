@@ -1,0 +1,81 @@
+#!/usr/bin/env python3
+"""Bring the README up to date: what its commands print, and the accuracy table.
+
+Every block that begins with ``$ dh2sim …`` is run anew, in an empty folder and 80 columns wide. The accuracy table is
+the worst pose error of every engine on every robot, over 1000 configurations; its last digits depend on the machine.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from dh2sim import build_model, load_robot
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.validate.report import Quantity, RobotReport
+from dh2sim.validate.run import validate_robot
+
+README = Path(__file__).resolve().parent.parent / "README.md"
+CONSOLE = re.compile(r"^```console\n\$ (.*?)\n.*?^```", flags=re.MULTILINE | re.DOTALL)
+TABLE = re.compile(r"(<!-- accuracy: begin -->\n).*(<!-- accuracy: end -->)", flags=re.DOTALL)
+ROBOT_FILE = re.compile(r"^```yaml\n(name: my_arm\n.*?)^```", flags=re.MULTILINE | re.DOTALL)
+MISTAKES = (("alpha: 90,", "alfa: 90,"), ("[0.1, 1.2]", "[1.2, 0.1]"))
+"""What is wrong in the robot file whose errors the page shows."""
+
+
+def wrong_robot(text: str) -> str:
+    """The page's robot file, with the mistakes in it."""
+    found = ROBOT_FILE.search(text)
+    assert found is not None
+    robot = found.group(1)
+    for right, wrong in MISTAKES:
+        assert right in robot
+        robot = robot.replace(right, wrong)
+    return robot
+
+
+def run(command: str, folder: Path) -> str:
+    """What a command prints, its errors behind its results."""
+    program, *arguments = command.split()
+    assert program == "dh2sim"
+    done = subprocess.run(
+        [sys.executable, "-m", "dh2sim", *arguments],
+        cwd=folder,
+        env={**os.environ, "COLUMNS": "80"},
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+    return done.stdout + done.stderr
+
+
+def accuracy() -> str:
+    """The accuracy table, as Markdown."""
+    reports = [validate_robot(build_model(load_robot(name)), samples=1000) for name in builtin_robots()]
+    engines = [check.engine for check in reports[0].checks if check.quantity is Quantity.POSE]
+    lines = [f"| robot | reach | {' | '.join(engines)} |", f"|---|---:|{'---:|' * len(engines)}"]
+    return "".join(f"{line}\n" for line in [*lines, *(_line(report, engines) for report in reports)])
+
+
+def _line(report: RobotReport, engines: list[str]) -> str:
+    errors = {check.engine: check for check in report.checks if check.quantity is Quantity.POSE}
+    cells = [f"{errors[engine].max_position_error:.0e}" for engine in engines]
+    return f"| {report.name} | {report.reach:.3g} m | {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Rewrite the page."""
+    text = README.read_text(encoding="utf-8")
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "my_arm.yaml").write_text(wrong_robot(text), encoding="utf-8")
+        text = CONSOLE.sub(lambda found: f"```console\n$ {found[1]}\n{run(found[1], folder)}```", text)
+    README.write_text(TABLE.sub(lambda found: found[1] + accuracy() + found[2], text), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

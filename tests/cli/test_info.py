@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from dh2sim import build_chain, build_model, forward_kinematics, frame_poses, load_robot
+from tests.export.robots import ODD, RICH, write
+from tests.program import dh2sim
+from tests.robots.samples import NAMES
+
+FLIPPED = """\
+name: flipped
+description: "[bold]Not markup[/bold]"
+convention: standard
+units: {angle: deg}
+joints:
+  - {type: revolute, a: 0.1, alpha: -90, d: 0.3, theta: 30, flip: true, limits: {position: [10, 20]}}
+  - {type: prismatic, d: -0.5}
+  - {type: continuous, theta: -45}
+  - {type: fixed, d: 0.25, theta: 15}
+"""
+
+
+def test_json_tells_all_in_si_units(tmp_path: Path) -> None:
+    robot = write(tmp_path, RICH)
+    run = dh2sim("info", robot, "--json")
+    assert (run.status, run.err) == (0, "")
+    told = json.loads(run.out)
+    chain, home = build_chain(load_robot(robot)), [0.3, -0.4]
+    frames = {f"dh_{i}": T.tolist() for i, T in enumerate(frame_poses(chain, home))}
+    assert told["frames_at_home"] == {**frames, "tool0": forward_kinematics(chain, home).tolist()}
+    assert told["configurations"] == {"home": home, "up": [1.0, 1.0]}
+    assert [told[key] for key in ("name", "home", "reach")] == ["rich", home, 0.7]
+    assert told["rows"][0] == {
+        "joint": "joint_1",
+        "type": "revolute",
+        "convention": "standard",
+        "a": 0.4,
+        "alpha": 0.0,
+        "d": 0.0,
+        "theta": 0.0,
+        "flip": False,
+        "limits": {"position": [-2.0, 2.0], "velocity": 3.0, "effort": 80.0, "assumed": []},
+    }
+    assert [link["estimated"] for link in told["links"]] == [["inertia"], ["mass", "com", "inertia"]]
+    assert told["links"][0]["mass"] == 4.0
+    assert told["mass"] == sum(link["mass"] for link in told["links"])
+    assert told["disabled_collisions"] == [
+        {"link1": "base_link", "link2": "link_1", "reason": "Adjacent"},
+        {"link1": "link_1", "link2": "link_2", "reason": "Adjacent"},
+    ]
+
+
+def test_the_table_reads_as_in_a_textbook(tmp_path: Path) -> None:
+    robot = write(tmp_path, FLIPPED)
+    lines = dh2sim("info", robot).out.splitlines()
+    travel = build_model(load_robot(robot)).joints[1].range
+    assert travel is not None
+    assert lines[0] == "flipped  [bold]Not markup[/bold]"
+    assert lines[1].strip() == "DH table, standard convention"
+    assert [line.split() for line in lines[3:5]] == [
+        ["a", "i", "alpha", "i", "d", "i", "theta", "i"],
+        ["i", "joint", "type", "m", "deg", "m", "deg", "limits"],
+    ]
+    assert [" ".join(line.split()) for line in lines[6:10]] == [
+        "1 joint_1 revolute 0.1 -90 0.3 30 - θ1* 10 … 20°",
+        f"2 joint_2 prismatic 0 0 d2* - 0.5 0 ({travel.lower:.6g} … {travel.upper:.6g} m)",
+        "3 joint_3 continuous 0 0 0 θ3* - 45 none",
+        "4 joint_4 fixed 0 0 0.25 15",
+    ]
+    assert "Limits in parentheses are assumed." in lines
+
+
+def test_a_modified_table_names_its_indices_and_a_mixed_one_each_rows_convention(tmp_path: Path) -> None:
+    modified = dh2sim("info", "puma560").out
+    assert "DH table, modified convention" in modified
+    assert ["a", "i-1", "alpha", "i-1", "d", "i", "theta", "i"] in [line.split() for line in modified.splitlines()]
+    mixed = dh2sim("info", write(tmp_path, ODD)).out
+    assert "DH table, mixed conventions" in mixed
+    rows = [line.split()[:4] for line in mixed.splitlines() if line.split()[:1] in (["1"], ["2"], ["3"])]
+    assert rows == [
+        ["1", "one", "revolute", "standard"],
+        ["2", "two", "prismatic", "modified"],
+        ["3", "three", "fixed", "modified"],
+    ]
+
+
+def test_nothing_of_a_wide_table_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    name = "a_joint_with_a_name_that_goes_on_and_on_and_on"
+    out = dh2sim("info", write(tmp_path, ODD.replace("one,", f"{name},"))).out
+    assert name in out
+    assert "37.2996" in out
+    assert "-143.239 … 154.699°" in out
+
+
+@pytest.mark.parametrize(
+    ("text", "title"),
+    [
+        (RICH, "Frames in base_link at home"),
+        (ODD, "Frames in base_link at zero"),
+        (FLIPPED, "Frames in base_link at zero moved inside the limits"),
+    ],
+    ids=["home", "zero", "moved"],
+)
+def test_the_configuration_of_the_frames_is_named(tmp_path: Path, text: str, title: str) -> None:
+    lines = dh2sim("info", write(tmp_path, text)).out.splitlines()
+    assert title in [line.strip() for line in lines]
+
+
+def test_what_was_estimated_and_assumed_is_told(tmp_path: Path) -> None:
+    lines = dh2sim("info", write(tmp_path, RICH)).out.splitlines()
+    assert lines[-6:] == [
+        "Estimated from the shapes, not measured: inertia of link_1.",
+        "Estimated from the shapes, not measured: mass, com, inertia of link_2.",
+        "Assumed, not given: effort limits of elbow.",
+        "Pairs of links that do not collide, as in an SRDF:",
+        '  <disable_collisions link1="base_link" link2="link_1" reason="Adjacent"/>',
+        '  <disable_collisions link1="link_1" link2="link_2" reason="Adjacent"/>',
+    ]
+    assert lines[-7].startswith("reach at most 0.7 m, moving mass ")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_eighty_columns_hold_all_that_is_told_of_a_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for arguments in (["info", name], ["export", name], ["export", name], ["validate", name, "--samples", "20"]):
+        run = dh2sim(*arguments)
+        assert (run.status, run.err) == (0, "")
+        assert max(len(line) for line in run.out.splitlines()) <= 80, arguments

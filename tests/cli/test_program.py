@@ -1,0 +1,159 @@
+"""What holds for every command."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from dh2sim.robot.catalog import builtin_robots
+from tests.export.robots import small, write
+from tests.program import Outcome, dh2sim, dh2sim_process, environment
+
+COMMANDS = ("export", "validate", "fk", "info", "list", "schema")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("option", ["--help", "-h"])
+def test_the_help_of_every_command_has_an_example(command: str, option: str) -> None:
+    run = dh2sim(command, option)
+    assert (run.status, run.err) == (0, "")
+    assert run.out.startswith(f"Usage: dh2sim {command} ")
+    examples = run.out.split("\n  Examples:\n")[1]
+    assert examples.startswith(f"    dh2sim {command}")
+    assert max(len(line) for line in run.out.splitlines()) <= 81
+
+
+def test_the_help_of_the_program_lists_every_command_whole() -> None:
+    run = dh2sim("--help")
+    assert (run.status, run.err) == (0, "")
+    listed = run.out.split("Commands:\n")[1].splitlines()
+    assert [line.split()[0] for line in listed] == list(COMMANDS)
+    assert all(line.endswith(".") and not line.endswith("...") for line in listed)
+    assert "Exit status: 0 done, 1 a check fell short, 2 bad input or usage, 130" in run.out
+
+
+def test_every_example_of_the_programs_help_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    lines = dh2sim("--help").out.split("Examples:\n")[1].split("\n\n")[0].splitlines()
+    for line in lines:
+        command = line.split("  ")[2].removeprefix("dh2sim ").split()
+        run = dh2sim(*command, *(["--samples", "10"] if command[0] == "validate" else []))
+        assert (run.status, run.err) == (0, ""), line
+    assert len(lines) == 5
+    assert [path.name for path in tmp_path.iterdir()] == ["generated"]
+
+
+def test_without_arguments_the_help_is_shown() -> None:
+    run = dh2sim()
+    assert run.status == 2
+    assert "Usage: dh2sim [OPTIONS] COMMAND [ARGS]..." in run.out + run.err
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    assert dh2sim("--version") == Outcome(status=0, out=f"dh2sim {version('dh2sim')}\n", err="")
+
+
+def test_the_package_runs_as_a_module() -> None:
+    assert dh2sim_process("--version") == dh2sim("--version")
+    assert dh2sim_process("fk", "stanford", "zero") == dh2sim("fk", "stanford", "zero")
+    run = dh2sim_process("fk", "stanfrd")
+    assert (run.status, run.out) == (2, "")
+    assert run.err == dh2sim("fk", "stanfrd").err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["nonsense"],
+        ["--nonsense"],
+        ["fk"],
+        ["info"],
+        ["export"],
+        ["validate"],
+        ["info", "stanford", "rpr"],
+        ["info", "stanford", "--degrees"],
+        ["list", "stanford"],
+        ["fk", "stanford", "--frame"],
+        ["validate", "stanford", "--samples", "0"],
+        ["validate", "stanford", "--samples", "many"],
+        ["validate", "stanford", "--samples", "1000000000000"],
+        ["validate", "stanford", "--seed", "-1"],
+        ["validate", "stanford", "--tolerance", "nan"],
+        ["validate", "stanford", "--tolerance", "0"],
+        ["validate", "stanford", "--tolerance", "1"],
+        ["export", "stanford", "--format", "sdf"],
+    ],
+    ids=" ".join,
+)
+def test_wrong_usage_is_told_on_standard_error_and_exits_with_2(arguments: list[str]) -> None:
+    run = dh2sim(*arguments)
+    assert (run.status, run.out) == (2, "")
+    assert "rror: " in run.err
+    assert "Traceback" not in run.err
+
+
+def test_list_names_every_robot_with_its_joints() -> None:
+    run = dh2sim("list")
+    assert (run.status, run.err) == (0, "")
+    lines = run.out.splitlines()
+    assert tuple(line.split()[0] for line in lines) == builtin_robots()
+    assert "stanford                  RRPRRR    Stanford arm, six joints, the third one slides" in lines
+
+
+def test_schema_prints_a_json_schema_that_any_editor_can_read() -> None:
+    run = dh2sim("schema")
+    assert (run.status, run.err) == (0, "")
+    assert run.out.isascii()
+    schema = json.loads(run.out)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert set(schema["required"]) == {"name", "convention", "joints"}
+
+
+def _shell(script: str, **variables: str) -> Outcome:
+    done = subprocess.run(
+        ["sh", "-c", script],
+        env=environment(DH2SIM=f"{sys.executable} -m dh2sim", **variables),
+        capture_output=True,
+        encoding="utf-8",
+        timeout=120,
+        check=False,
+    )
+    return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
+
+
+@pytest.mark.parametrize("command", ["schema", "info stanford", "fk stanford --json"])
+def test_a_reader_that_has_had_enough_is_no_error(command: str) -> None:
+    run = _shell(f"{{ $DH2SIM {command}; echo $? >&2; }} | head -c 1")
+    assert (run.status, len(run.out)) == (0, 1)
+    assert run.err == "0\n"
+    assert _shell(f"{{ sleep 0.2; $DH2SIM {command}; echo $? >&2; }} | true").err == "0\n"
+
+
+@pytest.mark.parametrize("command", ["list", "schema", "fk stanford", "info stanford", "export rpr --check"])
+def test_a_program_without_standard_output_or_error_does_its_work(command: str, tmp_path: Path) -> None:
+    expected = 1 if command.startswith("export") else 0
+    for closed in (">&-", "2>&-", ">&- 2>&-"):
+        run = _shell(f"cd {tmp_path} && $DH2SIM {command} {closed}")
+        assert run.status == expected
+        assert "Traceback" not in run.err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_results_that_cannot_be_written_are_an_error() -> None:
+    run = _shell("$DH2SIM list >/dev/full")
+    assert run == Outcome(status=2, out="", err="dh2sim: No space left on device\n")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
+def test_a_terminal_that_knows_few_characters_is_written_to_all_the_same(tmp_path: Path, encoding: str) -> None:
+    robot = write(tmp_path, small() + "description: été θ 臂\n")
+    for options in ([], ["--json"]):
+        run = dh2sim_process("info", robot, *options, variables={"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"})
+        assert (run.status, run.err) == (0, "")
+    assert json.loads(dh2sim_process("info", robot, "--json").out)["description"] == "été θ 臂"

@@ -1,0 +1,121 @@
+"""How a robot is named on the command line, and what is said of files that are wrong."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from dh2sim.robot.catalog import builtin_robots
+from tests.export.robots import small, write
+from tests.program import Outcome, dh2sim
+
+COMMANDS = ("export", "validate", "fk", "info")
+KNOWN = f"Robots that come with dh2sim: {', '.join(builtin_robots())}"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [("stanfrd", " Did you mean 'stanford'?"), ("stanfrd.yaml", " Did you mean 'stanford'?"), ("xyzzy", "")],
+)
+def test_a_robot_that_is_unknown_is_told_with_those_that_are(command: str, name: str, hint: str) -> None:
+    message = f"dh2sim: there is no file and no robot named '{name}'.{hint} {KNOWN}\n"
+    assert dh2sim(command, name) == Outcome(status=2, out="", err=message)
+
+
+def test_a_built_in_robot_is_named_with_and_without_its_ending() -> None:
+    assert dh2sim("fk", "stanford") == dh2sim("fk", "stanford.yaml")
+
+
+@pytest.mark.parametrize("name", ["stanford", "stanford.yaml"])
+def test_a_path_that_exists_wins_over_a_built_in_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(write(tmp_path, small("mine")), tmp_path / name)
+    run = dh2sim("fk", name)
+    assert run.status == 0
+    assert run.out.startswith("mine: pose of tool0 in base_link\n")
+
+
+def test_two_robots_of_one_name_are_refused(tmp_path: Path) -> None:
+    left, right = write(tmp_path, small("arm"), "left"), write(tmp_path, small("arm"), "right")
+    message = f"{left} and {right}: both robots are named 'arm', but every robot has a folder of its name to itself"
+    for command in ("export", "validate"):
+        run = dh2sim(command, left, "stanford", right)
+        assert run == Outcome(status=2, out="", err=f"dh2sim: {message}\n")
+    assert {path.name for path in tmp_path.iterdir()} == {"left.yaml", "right.yaml"}
+
+
+WRONG = """\
+name: wrong
+convention: standrad
+joints:
+  - {type: revolute, alfa: 1}
+  - {type: revolute, a: two}
+"""
+PROBLEMS = (
+    "2:13: convention: expected one of standard, modified, found 'standrad'. Did you mean 'standard'?",
+    "4:22: joints[0]: unknown key 'alfa'. Did you mean 'alpha'?",
+    "5:25: joints[1].a: unknown name 'two'.",
+)
+
+
+def _places(text: str) -> list[str]:
+    return [":".join(line.split(":")[:3]) for line in text.splitlines()]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_error_of_a_file_is_told_with_its_place(tmp_path: Path, command: str) -> None:
+    file = write(tmp_path, WRONG)
+    run = dh2sim(command, file)
+    assert (run.status, run.out) == (2, "")
+    assert _places(run.err) == [f"{file}:{':'.join(problem.split(':')[:2])}" for problem in PROBLEMS]
+    assert [line.split(": ")[1] for line in run.err.splitlines()] == ["convention", "joints[0]", "joints[1].a"]
+
+
+@pytest.mark.parametrize("command", ["export", "validate"])
+def test_all_wrong_files_are_told_at_once(tmp_path: Path, command: str) -> None:
+    files = [write(tmp_path, WRONG, name) for name in ("first", "second")]
+    run = dh2sim(command, files[0], "xyzzy", files[1], "stanford")
+    assert (run.status, run.out) == (2, "")
+    lines = run.err.splitlines()
+    assert [line.split(":")[0] for line in lines] == [str(files[0])] * 3 + ["dh2sim"] + [str(files[1])] * 3
+
+
+def test_meshes_of_all_robots_that_cannot_be_used_are_told_at_once(tmp_path: Path) -> None:
+    (tmp_path / "broken.stl").write_bytes(b"no mesh")
+    files = [
+        write(tmp_path, small(name).replace("alpha: 0.651,", "alpha: 0.651, link: {mesh: {file: broken.stl}},"))
+        for name in ("left", "right")
+    ]
+    run = dh2sim("export", *files, "--out", tmp_path / "made")
+    assert (run.status, run.out) == (2, "")
+    assert [line.split(":")[:4] for line in run.err.splitlines()] == [
+        ["dh2sim", f" {file}", "4", run.err.splitlines()[0].split(":")[3]] for file in files
+    ]
+    assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize(
+    ("data", "what"),
+    [(b"", "1:1"), (b"\xff\xfe\xfa", "1:1"), (b"[1, 2]", "1:1"), (b"a: [", ""), (b"\x00\x01", "")],
+)
+def test_a_file_that_is_no_robot_file_is_no_traceback(tmp_path: Path, data: bytes, what: str) -> None:
+    file = tmp_path / "file.yaml"
+    file.write_bytes(data)
+    run = dh2sim("info", file)
+    assert (run.status, run.out) == (2, "")
+    assert run.err.startswith(f"{file}:{what}")
+
+
+def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+    link = tmp_path / "loop.yaml"
+    link.symlink_to(link)
+    run = dh2sim("info", link)
+    assert (run.status, run.out) == (2, "")
+    assert run.err.startswith(f"dh2sim: {link}: cannot be read: ")
+    run = dh2sim("info", tmp_path)
+    assert (run.status, run.err) == (2, f"dh2sim: {tmp_path}: is a folder, not a robot file\n")

@@ -1,0 +1,97 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.export.robots import small, write
+from tests.program import Outcome, contents, dh2sim
+
+ADVICE = "dh2sim: some files are not what the robot files say; write them with 'dh2sim export'\n"
+
+
+@pytest.fixture
+def exported(tmp_path: Path) -> Path:
+    """A folder that holds robot.yaml and its export in made/."""
+    assert dh2sim("export", write(tmp_path, small(), "robot"), "--out", tmp_path / "made").status == 0
+    return tmp_path
+
+
+def _check(folder: Path, *options: str) -> Outcome:
+    before = contents(folder)
+    run = dh2sim("export", folder / "robot.yaml", "--out", folder / "made", "--check", *options)
+    assert contents(folder) == before, "a check writes nothing"
+    return run
+
+
+def test_files_that_are_current_pass(exported: Path) -> None:
+    assert _check(exported) == Outcome(status=0, out="small: up to date\n", err="")
+
+
+@pytest.mark.parametrize("name", ["small.urdf", "small.xml", "scene.xml"])
+def test_a_changed_byte_is_found_in_its_file_and_line(exported: Path, name: str) -> None:
+    path = exported / "made" / "small" / name
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[9] = lines[9].replace(b"e", b"E", 1)
+    path.write_bytes(b"".join(lines))
+    assert _check(exported) == Outcome(status=1, out=f"small: {path}: differs from line 10\n", err=ADVICE)
+
+
+def test_a_file_cut_short_is_found(exported: Path) -> None:
+    path = exported / "made" / "small" / "small.xml"
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:7]))
+    assert _check(exported) == Outcome(status=1, out=f"small: {path}: differs from line 8\n", err=ADVICE)
+
+
+def test_line_ends_that_were_converted_are_found(exported: Path) -> None:
+    path = exported / "made" / "small" / "small.urdf"
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    assert _check(exported) == Outcome(status=1, out=f"small: {path}: differs in its line ends\n", err=ADVICE)
+
+
+def test_a_missing_file_is_found(exported: Path) -> None:
+    path = exported / "made" / "small" / "scene.xml"
+    path.unlink()
+    assert _check(exported) == Outcome(status=1, out=f"small: {path}: missing\n", err=ADVICE)
+
+
+def test_what_cannot_be_read_is_told_apart_from_what_is_missing(exported: Path) -> None:
+    path = exported / "made" / "small" / "scene.xml"
+    path.unlink()
+    path.mkdir()
+    assert _check(exported) == Outcome(status=1, out=f"small: {path}: unreadable: Is a directory\n", err=ADVICE)
+
+
+def test_a_robot_never_exported_misses_all_its_files(exported: Path) -> None:
+    (exported / "made").rename(exported / "away")
+    folder = exported / "made" / "small"
+    assert _check(exported) == Outcome(
+        status=1,
+        out="".join(f"small: {folder / name}: missing\n" for name in ("small.urdf", "small.xml", "scene.xml")),
+        err=ADVICE,
+    )
+
+
+def test_a_changed_robot_file_makes_all_its_files_differ(exported: Path) -> None:
+    write(exported, small(length=0.41), "robot")
+    run = _check(exported)
+    assert run.status == 1
+    assert [line.rsplit(": ", 1)[1] for line in run.out.splitlines()] == [
+        "differs from line 3",
+        "differs from line 2",
+        "differs from line 2",
+    ]
+
+
+def test_only_the_formats_asked_for_are_compared(exported: Path) -> None:
+    (exported / "made" / "small" / "small.xml").unlink()
+    assert _check(exported, "--format", "urdf") == Outcome(status=0, out="small: up to date\n", err="")
+    assert _check(exported, "--format", "mjcf").status == 1
+
+
+def test_a_urdf_with_dh_frames_is_not_one_without(exported: Path) -> None:
+    path = exported / "made" / "small" / "small.urdf"
+    run = _check(exported, "--no-dh-frames")
+    assert run.status == 1
+    assert run.out.startswith(f"small: {path}: differs from line ")
+    assert run.out.count("\n") == 1

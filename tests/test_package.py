@@ -1,0 +1,113 @@
+"""The package's public names, and what importing and running it costs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import dh2sim
+from tests.program import environment
+
+PUBLIC = {
+    "Dh2simError",
+    "KinematicChain",
+    "RobotFileError",
+    "RobotModel",
+    "RobotSpec",
+    "build_chain",
+    "build_model",
+    "forward_kinematics",
+    "frame_poses",
+    "geometric_jacobian",
+    "load_robot",
+    "parse_robot",
+    "to_mjcf",
+    "to_scene",
+    "to_urdf",
+}
+HEAVY = {"numpy", "mujoco", "pydantic", "ruamel", "rich", "trimesh", "yourdfpy", "pinocchio", "scipy", "lxml"}
+
+MODULES = """
+import sys
+from contextlib import redirect_stdout
+{code}
+print(*sorted({{name.partition(".")[0] for name, module in sys.modules.items() if module is not None}}))
+"""
+RUN = """
+import io
+from dh2sim.cli.app import app
+with redirect_stdout(io.StringIO()):
+    try:
+        app({arguments})
+    except SystemExit as end:
+        assert not end.code, end.code
+"""
+
+
+def _imported(code: str) -> set[str]:
+    """The top-level packages that are loaded when some code has run in a fresh interpreter."""
+    done = subprocess.run(
+        [sys.executable, "-c", MODULES.format(code=code)],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    return set(done.stdout.split())
+
+
+def test_the_public_names_are_those_promised() -> None:
+    assert set(dh2sim.__all__) == PUBLIC
+    assert set(dir(dh2sim)) == PUBLIC
+    assert dh2sim.__all__ == sorted(dh2sim.__all__)
+
+
+@pytest.mark.parametrize("name", sorted(PUBLIC))
+def test_a_public_name_is_documented_and_knows_its_home(name: str) -> None:
+    value = getattr(dh2sim, name)
+    assert value.__name__ == name
+    assert value.__doc__
+    assert value.__module__.startswith("dh2sim.")
+
+
+def test_a_name_that_there_is_not_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError) as caught:
+        getattr(dh2sim, "to_sdf")  # noqa: B009
+    assert str(caught.value) == "module 'dh2sim' has no attribute 'to_sdf'"
+
+
+def test_the_package_is_typed() -> None:
+    assert (Path(dh2sim.__file__).parent / "py.typed").is_file()
+
+
+def test_importing_the_package_imports_nothing_but_itself() -> None:
+    before = _imported("") | sys.stdlib_module_names
+    assert _imported("import dh2sim") - before == {"dh2sim"}
+
+
+@pytest.mark.parametrize(
+    ("code", "allowed"),
+    [
+        ("import dh2sim; dh2sim.Dh2simError", set()),
+        ("import dh2sim.cli.app", set()),
+        (RUN.format(arguments=["--help"]), set()),
+        (RUN.format(arguments=["export", "--help"]), {"pydantic"}),  # typer's own need, for types
+        (RUN.format(arguments=["validate", "--help"]), {"pydantic"}),
+        (RUN.format(arguments=["--version"]), set()),
+        (RUN.format(arguments=["fk", "rpr", "home"]), {"numpy", "pydantic", "ruamel"}),
+    ],
+)
+def test_light_work_imports_nothing_heavy(code: str, allowed: set[str]) -> None:
+    assert _imported(code) & HEAVY <= allowed
+
+
+def test_an_export_imports_neither_mesh_library_nor_other_engines(tmp_path: Path) -> None:
+    arguments = ["export", "stanford", "--out", str(tmp_path)]
+    assert not _imported(RUN.format(arguments=arguments)) & {"trimesh", "yourdfpy", "pinocchio", "scipy", "rich"}
+    assert "mujoco" in _imported(RUN.format(arguments=arguments))
+    for options in (["--no-verify"], ["--check"]):
+        assert "mujoco" not in _imported(RUN.format(arguments=[*arguments, *options]))
