@@ -37,6 +37,7 @@ def main() -> None:
         sys.stderr.write("dh2sim: interrupted\n")
         raise SystemExit(130) from None
     finally:
+        gc.freeze()  # the process ends: nobody needs what a last look for garbage would free
         # Python takes a while to end; a Ctrl-C meanwhile ends it at once, without a traceback
         _handle(signal.SIGINT, signal.SIG_DFL)
 

@@ -11,7 +11,7 @@ import numpy as np
 from dh2sim.errors import EngineError, MismatchError
 from dh2sim.export.render import Format
 from dh2sim.kinematics.comparison import pose_errors
-from dh2sim.kinematics.sampling import random_configurations
+from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
@@ -19,7 +19,6 @@ from dh2sim.typing import Array
 TOLERANCE = 1e-12
 """Of rotations in rad, and of positions as a share of the larger of 1 m and the reach."""
 SAMPLES = 32
-SEED = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +41,7 @@ def sampling_limits(model: RobotModel) -> tuple[Array, Array]:
 
 
 def verify(model: RobotModel, folder: Path, formats: Collection[Format]) -> list[Verified]:
-    """Compare all frames of the files in ``folder`` with the table at random configurations.
+    """Compare all frames of the files in ``folder`` with the table at scattered configurations.
 
     Raises:
         EngineError: MuJoCo refuses a file.
@@ -51,7 +50,7 @@ def verify(model: RobotModel, folder: Path, formats: Collection[Format]) -> list
     from dh2sim.engines.mujoco_engine import MujocoEngine  # only exports that verify pay for MuJoCo
 
     lower, upper = sampling_limits(model)
-    q = random_configurations(lower, upper, SAMPLES, SEED)
+    q = scattered_configurations(lower, upper, SAMPLES)
     table = np.concatenate([table_frame_poses(model.spec, q), table_tool_pose(model.spec, q)[:, None]], axis=1)
     names = [joint.name for joint in model.moving_joints]
     results = []

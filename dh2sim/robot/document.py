@@ -13,7 +13,8 @@ from dh2sim.robot.scalars import Scalar
 MAX_BYTES: Final = 1_000_000
 MAX_LINE: Final = 100_000
 
-NOT_PRINTABLE: Final = re.compile(r"[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+NOT_PRINTABLE: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\udfff\ufffe\uffff]")
+"""What YAML allows nowhere. (Its complement, the printable characters, takes ten times as long to compile.)"""
 
 
 class Entry(NamedTuple):

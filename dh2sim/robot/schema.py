@@ -38,7 +38,8 @@ ActuatorTypeField: TypeAlias = Annotated[ActuatorType, one_of(ActuatorType)]
 
 
 class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+    # built when the whole is first used, and then once: robot files are read by commands that should be quick
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, defer_build=True)
 
 
 class UnitsEntry(_Model):
@@ -163,10 +164,10 @@ class JointEntry(_Model):
         default=0.0, description="theta_i, in the file's angle unit; a revolute coordinate adds to it."
     )
     flip: Flag = Field(default=False, description="True: the joint coordinate subtracts instead.")
-    limits: LimitsEntry = Field(default=LimitsEntry(), description="Limits, in the file's units.")
-    dynamics: DynamicsEntry = Field(default=DynamicsEntry(), description="Joint dynamics, SI.")
-    link: LinkEntry = Field(default=LinkEntry(), description="The link that this joint moves.")
-    actuator: ActuatorEntry = Field(default=ActuatorEntry(), description="Overrides the file's actuators.")
+    limits: LimitsEntry = Field(default_factory=LimitsEntry, description="Limits, in the file's units.")
+    dynamics: DynamicsEntry = Field(default_factory=DynamicsEntry, description="Joint dynamics, SI.")
+    link: LinkEntry = Field(default_factory=LinkEntry, description="The link that this joint moves.")
+    actuator: ActuatorEntry = Field(default_factory=ActuatorEntry, description="Overrides the file's actuators.")
 
 
 class RobotEntry(_Model):
@@ -182,12 +183,12 @@ class RobotEntry(_Model):
     convention: ConventionField = Field(
         description="standard: Rz(theta) Tz(d) Tx(a) Rx(alpha); modified: Tx(a) Rx(alpha) Rz(theta) Tz(d)."
     )
-    units: UnitsEntry = Field(default=UnitsEntry(), description="Units of this file; default rad and m.")
+    units: UnitsEntry = Field(default_factory=UnitsEntry, description="Units of this file; default rad and m.")
     parameters: Parameters = Field(
         default_factory=dict, description="Named constants for expressions, in the file's units."
     )
-    base: BaseEntry = Field(default=BaseEntry(), description="DH frame 0 in base_link.")
-    tool: PoseEntry = Field(default=PoseEntry(), description="tool0 in DH frame n.")
+    base: BaseEntry = Field(default_factory=BaseEntry, description="DH frame 0 in base_link.")
+    tool: PoseEntry = Field(default_factory=PoseEntry, description="tool0 in DH frame n.")
     gravity: Vector = Field(default=(0.0, 0.0, -9.81), description="m/s² in base_link.")
     joints: list[JointEntry] = Field(min_length=1, description="The DH table, a row each, base first.")
     configurations: dict[str, list[Number]] = Field(
@@ -195,7 +196,7 @@ class RobotEntry(_Model):
         description="Named joint vectors, a number for each moving row, in the file's units.",
         json_schema_extra={"propertyNames": {"pattern": NAME_PATTERN, "maxLength": LONGEST_NAME}},
     )
-    actuators: ActuatorEntry = Field(default=ActuatorEntry(), description="What drives every joint.")
+    actuators: ActuatorEntry = Field(default_factory=ActuatorEntry, description="What drives every joint.")
 
 
 def json_schema() -> dict[str, Any]:

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.kinematics.sampling import random_configurations
+from dh2sim.kinematics.sampling import random_configurations, scattered_configurations
 
 
 def test_random_configurations_fill_the_bounds_and_keep_within() -> None:
@@ -44,3 +44,24 @@ def test_impossible_bounds_are_refused(lower: ArrayLike, upper: ArrayLike, messa
     with pytest.raises(ConfigurationError) as caught:
         random_configurations(lower, upper, 3, 0)
     assert str(caught.value) == message
+
+
+def test_scattered_configurations_are_those_of_splitmix64() -> None:
+    # the first numbers of SplitMix64 with seed 0, as its authors publish them
+    numbers = [0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4, 0x06C45D188009454F, 0xF88BB8A8724C81EC]
+    found = scattered_configurations([0.0, 0.0], [1.0, 1.0], 2)
+    np.testing.assert_array_equal(found.ravel(), [(number >> 11) / 2**53 for number in numbers])
+
+
+def test_scattered_configurations_fill_their_box() -> None:
+    low, high = np.array([-1.0, 2.0, 0.0]), np.array([1.0, 2.5, 30.0])
+    q = scattered_configurations(low, high, 1000)
+    assert q.shape == (1000, 3)
+    assert (q >= low).all()
+    assert (q < high).all()
+    np.testing.assert_allclose(q.mean(axis=0), (low + high) / 2, atol=0.03 * (high - low).max())
+    assert np.abs(np.asarray(np.corrcoef(q.T)) - np.eye(3)).max() < 0.1
+
+
+def test_no_joints_are_scattered_as_nothing() -> None:
+    assert scattered_configurations([], [], 5).shape == (5, 0)
