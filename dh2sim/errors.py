@@ -64,6 +64,10 @@ class EngineError(Dh2simError):
     """An engine refused a model file."""
 
 
+class EngineCapacityError(Dh2simError):
+    """An engine cannot hold a robot of this size; that says nothing about the file."""
+
+
 class OutputError(Dh2simError):
     """Files could not be written; what stood there before stands untouched."""
 

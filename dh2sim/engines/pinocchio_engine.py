@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 
 from dh2sim.engines.engine import DynamicTerms, present_frames, require_joints
-from dh2sim.errors import EngineError
+from dh2sim.errors import EngineCapacityError, EngineError
 from dh2sim.typing import Array
+
+MOST_JOINTS = 240
+"""pinocchio's work space holds four tensors of second derivatives, n³ doubles each: 0.44 GB for so many joints."""
 
 
 class PinocchioEngine:
@@ -28,6 +31,7 @@ class PinocchioEngine:
 
         Raises:
             ImportError: pinocchio is not installed.
+            EngineCapacityError: the robot has more than ``MOST_JOINTS`` moving joints.
             EngineError: pinocchio refuses the file, or frames or joints are missing.
         """
         import pinocchio
@@ -40,6 +44,11 @@ class PinocchioEngine:
         except (ValueError, RuntimeError) as error:
             raise EngineError(f"{path}: pinocchio refuses the file: {' '.join(str(error).split())}") from error
         model = self._model
+        if model.nv > MOST_JOINTS:
+            needed = 4 * 8 * model.nv**3 / 1e9
+            raise EngineCapacityError(
+                f"pinocchio needs {needed:.1f} GB for {model.nv} joints; it is asked up to {MOST_JOINTS}"
+            )
         self._data: Any = model.createData()
         found = list(model.names)[1:]  # the first one is the world
         require_joints(str(path), found, joints)

@@ -12,7 +12,7 @@ import numpy as np
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
-from dh2sim.errors import EngineError
+from dh2sim.errors import EngineCapacityError, EngineError
 from dh2sim.export.run import export_robot
 from dh2sim.export.signals import signals_deferred
 from dh2sim.export.verify import sampling_limits
@@ -135,6 +135,8 @@ def _read(model: RobotModel, mjcf: Path, urdf: Path) -> tuple[list[Mover | Yourd
         except ImportError as error:
             reason = f"not installed ({error}); pip install {package}"
             unread.append(Check(engine=name, quantity=Quantity.POSE, ok=None, reason=reason))
+        except EngineCapacityError as error:
+            unread.append(Check(engine=name, quantity=Quantity.POSE, ok=None, reason=str(error)))
         except EngineError as error:
             unread.append(Check(engine=name, quantity=Quantity.FILE, ok=False, reason=str(error)))
     return engines, unread

@@ -8,9 +8,12 @@ import pinocchio
 import pytest
 import yourdfpy
 
-from dh2sim.errors import EngineError
+from dh2sim.engines.pinocchio_engine import PinocchioEngine
+from dh2sim.errors import EngineCapacityError, EngineError
 from dh2sim.formats.mjcf import to_mjcf
 from dh2sim.formats.urdf import to_urdf
+from dh2sim.model.build import build_model
+from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 from tests.engines.files import ENGINES, joint_names, path_of, pose_engine, write
 from tests.model.samples import model
 
@@ -116,3 +119,14 @@ def test_a_ball_joint_is_refused(tmp_path: Path) -> None:
     body = text.split("<actuator>")[0]
     (tmp_path / "robot.xml").write_text(f"{body}</mujoco>")
     assert message("mujoco-mjcf", tmp_path) == "a joint is neither a hinge nor a slide"
+
+
+def test_pinocchio_is_not_asked_for_more_joints_than_memory_allows(tmp_path: Path) -> None:
+    rows = tuple(
+        Row(name=f"q{i}", type=JointType.REVOLUTE, convention=Convention.STANDARD, a=0.1) for i in range(241)
+    )
+    path = tmp_path / "snake.urdf"
+    path.write_text(to_urdf(build_model(RobotSpec(name="snake", rows=rows))), encoding="utf-8")
+    with pytest.raises(EngineCapacityError) as refusal:
+        PinocchioEngine(path, [row.name for row in rows], len(rows))
+    assert str(refusal.value) == "pinocchio needs 0.4 GB for 241 joints; it is asked up to 240"
