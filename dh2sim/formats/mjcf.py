@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from dataclasses import dataclass
 
 from dh2sim.errors import ModelError
 from dh2sim.formats.mjcf_control import add_actuators, add_keyframes, add_sensors
@@ -15,17 +16,34 @@ from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.spec import JointType
 from dh2sim.typing import Array
 
-TIMESTEP = 0.002
-"""s."""
 MOST_BODIES = 496
 """MuJoCo's XML reader refuses a deeper nesting of bodies; base_link is one of them."""
 
 
-def to_mjcf(model: RobotModel) -> str:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MjcfOptions:
+    """How a robot is simulated, as far as an MJCF says so."""
+
+    timestep: float = 0.002
+    """s."""
+    integrator: str = "implicitfast"
+    """'Euler', 'RK4', 'implicit' or 'implicitfast'."""
+    energy: bool = False
+    """Whether MuJoCo computes the energy at every step."""
+    floating_base: bool = False
+    """Whether base_link floats; it needs mass then, see ``with_base_mass``."""
+
+
+EXPORTED = MjcfOptions()
+"""Of the files that ``dh2sim export`` writes."""
+
+
+def to_mjcf(model: RobotModel, options: MjcfOptions = EXPORTED) -> str:
     """Write a robot as MJCF.
 
     Args:
         model: the robot.
+        options: how it is simulated.
 
     Returns:
         The text of the file. Meshes are looked for in ``meshes`` beside it.
@@ -41,20 +59,22 @@ def to_mjcf(model: RobotModel) -> str:
         )
     mujoco = ET.Element("mujoco", model=model.name)
     child(mujoco, "compiler", angle="radian", autolimits="true", meshdir="meshes")
-    child(
+    option = child(
         mujoco,
         "option",
-        timestep=number(TIMESTEP),
-        integrator="implicitfast",
+        timestep=number(options.timestep),
+        integrator=options.integrator,
         gravity=numbers(model.spec.gravity),
     )
+    if options.energy:
+        child(option, "flag", energy="enable")
     _defaults(mujoco, model)
     materials = _assets(mujoco, model)
-    _bodies(mujoco, model, materials)
+    _bodies(mujoco, model, materials, options)
     _contact(mujoco, model)
     add_actuators(mujoco, model)
     add_sensors(mujoco, model)
-    add_keyframes(mujoco, model)
+    add_keyframes(mujoco, model, floating_base=options.floating_base)
     return document(mujoco, provenance(model))
 
 
@@ -102,10 +122,13 @@ def _assets(mujoco: ET.Element, model: RobotModel) -> dict[Color, str]:
     return materials
 
 
-def _bodies(mujoco: ET.Element, model: RobotModel, materials: dict[Color, str]) -> None:
+def _bodies(mujoco: ET.Element, model: RobotModel, materials: dict[Color, str], options: MjcfOptions) -> None:
     body = child(child(mujoco, "worldbody"), "body", name=model.base.name, childclass=_class(model))
+    if options.floating_base:
+        _inertial(body, model.base.inertial)
+        child(body, "freejoint")  # nameless: any name might be that of a joint of the table
     _geoms(body, model, model.base, model.chain.T_base_link_dh0, materials)
-    add_site(body, "dh_0", model.chain.T_base_link_dh0, None)
+    add_site(body, "dh_0", model.chain.T_base_link_dh0, model.base.inertial if options.floating_base else None)
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
         body = child(body, "body", name=link.name, **placed(joint.joint.T_parent_joint))
         _inertial(body, link.inertial)
@@ -172,7 +195,8 @@ def _geoms(
             **placed(T_link_dh),
         )
     kind = "shape" if link.mesh is None else "collision"
-    # the base does not move: it needs no mass, and so MuJoCo gives it no principal frame of its own
+    # a base that does not move needs no mass, and so MuJoCo gives it no principal frame of its own; that of one that
+    # floats is written out
     weight = {"mass": "0"} if link is model.base else {}
     for shape in link.shapes:
         color = link.joint_color if shape.part is ShapePart.JOINT else link.color

@@ -55,14 +55,17 @@ def add_sensors(mujoco: ET.Element, model: RobotModel) -> None:
     child(sensors, "framequat", name="tool0_quat", objtype="site", objname="tool0")
 
 
-def add_keyframes(mujoco: ET.Element, model: RobotModel) -> None:
-    """Add a keyframe for every named configuration, with the controls that hold the robot still in it."""
+def add_keyframes(mujoco: ET.Element, model: RobotModel, *, floating_base: bool = False) -> None:
+    """Add a keyframe for every named configuration, with the controls that hold the robot still in it.
+
+    A base that floats starts at the origin.
+    """
     if not model.spec.configurations or not model.moving_joints:
         return
     keyframe = child(mujoco, "keyframe")
     for name, q in model.spec.configurations.items():
         controls = holding_controls(model, name)
-        key = child(keyframe, "key", name=name, qpos=numbers(q))
+        key = child(keyframe, "key", name=name, qpos=numbers([0, 0, 0, 1, 0, 0, 0, *q] if floating_base else q))
         if controls:
             key.set("ctrl", numbers(controls))
 

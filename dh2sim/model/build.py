@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from types import MappingProxyType
 
 from dh2sim.kinematics.chain import Joint, KinematicChain, build_chain
+from dh2sim.model.actuators import actuator_model
 from dh2sim.model.inertial import link_inertial
 from dh2sim.model.layout import lay_out, link_scale, neat
 from dh2sim.model.limits import (
@@ -17,15 +18,13 @@ from dh2sim.model.limits import (
     reach_bound,
 )
 from dh2sim.model.meshes import load_mesh
-from dh2sim.model.robot_model import ActuatorModel, Color, JointModel, LinkModel, RobotModel
+from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape
 from dh2sim.model.statics import gravity_loads, seen_inertias
 from dh2sim.model.touching import excluded_pairs
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType, JointType, RobotSpec, Row
+from dh2sim.robot.spec import JointType, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 
-ASSUMED_BANDWIDTH = 100.0
-"""rad/s: natural frequency that assumed gains give each joint, critically damped, in the home configuration."""
 ASSUMED_ACCELERATION = 10.0
 """rad/s² or m/s²: an assumed effort limit lifts twice the arm's weight, stretched, at this acceleration."""
 SLENDERNESS = 0.16
@@ -156,25 +155,8 @@ def _joint(row: Row, joint: Joint, limit: PositionRange | None, seen: float, loa
         effort=effort,
         assumed=tuple(assumed) if row.type.moves else (),
         dynamics=row.dynamics,
-        actuator=_actuator(row.actuator, seen + row.dynamics.armature),
+        actuator=actuator_model(row.actuator, seen + row.dynamics.armature),
     )
-
-
-def _actuator(actuator: ActuatorSpec, inertia: float) -> ActuatorModel:
-    """Gains the file leaves open make the joint a critically damped oscillator: kp = I w², kv = 2 I w."""
-    kp = kv = 0.0
-    assumed = False
-    if actuator.type is ActuatorType.POSITION:
-        kp = actuator.kp if actuator.kp is not None else neat(inertia * ASSUMED_BANDWIDTH**2)
-        if actuator.kv is not None:
-            kv = actuator.kv
-        else:
-            kv = neat(2 * math.sqrt(kp * inertia))
-        assumed = actuator.kp is None or actuator.kv is None
-    elif actuator.type is ActuatorType.VELOCITY:
-        kv = actuator.kv if actuator.kv is not None else neat(inertia * ASSUMED_BANDWIDTH)
-        assumed = actuator.kv is None
-    return ActuatorModel(type=actuator.type, kp=kp, kv=kv, assumed=assumed)
 
 
 def _load_bound(

@@ -31,7 +31,7 @@ class LinkModel:
     mesh: MeshAsset | None
     """Shows the link instead of its shapes; placed in DH frame i."""
     inertial: MassProperties | None
-    """In the joint frame; None for a fixed link without shapes or mass, and for the base link."""
+    """In the joint frame; None for a fixed link without shapes or mass, and for a base link that does not move."""
     estimated: tuple[str, ...]
     """Which of 'mass', 'com' and 'inertia' were estimated from the shapes."""
 

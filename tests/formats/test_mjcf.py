@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 from dh2sim.errors import ModelError
-from dh2sim.formats.mjcf import TIMESTEP, to_mjcf
+from dh2sim.formats.mjcf import EXPORTED, to_mjcf
 from dh2sim.kinematics.transforms import quaternion_from_rotation
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
@@ -84,7 +84,7 @@ def test_damping_friction_and_armature_reach_mujoco() -> None:
 
 def test_the_compiler_counts_in_radians_and_the_solver_is_stable() -> None:
     mj = in_mujoco(to_mjcf(model("odd")))
-    assert mj.opt.timestep == TIMESTEP
+    assert mj.opt.timestep == EXPORTED.timestep
     assert mj.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 
 

@@ -13,7 +13,8 @@ import pytest
 from dh2sim.formats.mjcf import to_mjcf
 from dh2sim.formats.scene import to_scene
 from dh2sim.formats.urdf import to_urdf
-from dh2sim.model.build import ASSUMED_BANDWIDTH, BASE_COLOR, JOINT_COLOR, PALETTE, build_model
+from dh2sim.model.actuators import ASSUMED_BANDWIDTH
+from dh2sim.model.build import BASE_COLOR, JOINT_COLOR, PALETTE, build_model
 from dh2sim.model.robot_model import ActuatorModel, RobotModel
 from dh2sim.model.statics import seen_inertias
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, BaseSpec, Dynamics, LinkSpec, RobotSpec, Row
