@@ -128,6 +128,7 @@ class MujocoEngine:
         # left out here rather than taken off the result, where it would take digits with it
         model.dof_armature[:] = 0.0
         data = mujoco.MjData(model)
+        mujoco.mj_setConst(model, data)  # of bodies that spin in place MuJoCo computes the inertia beforehand
         n = len(self._dofs)
         mass, bias, load = np.zeros((len(q), n, n)), np.zeros((len(q), n)), np.zeros((len(q), n))
         full = np.zeros((model.nv, model.nv))

@@ -73,6 +73,13 @@ def test_a_robot_of_any_kind_of_rows_matches_its_table(tmp_path: Path, text: str
     assert [entry["engine"] for entry in report["robots"][0]["engines"] if entry["quantity"] == "pose"] == ENGINES
 
 
+def test_a_rotor_that_spins_in_place_matches_its_table(tmp_path: Path) -> None:
+    # what its own axis goes through: MuJoCo computes the inertia of such a joint once, with the rotor's in it
+    joint = "{type: revolute, dynamics: {damping: 0.1, friction: 0.05, armature: 0.01}}"
+    text = f"name: rotor\nconvention: standard\njoints: [{joint}]\n"
+    assert failures(validated(write(tmp_path, text), samples=7)) == {}
+
+
 def test_samples_keep_within_the_limits_and_follow_the_seed(tmp_path: Path) -> None:
     robot = write(tmp_path, small())
     worst: dict[int, list[list[float]]] = {}
