@@ -74,3 +74,39 @@ class OutputError(Dh2simError):
 
 class MismatchError(Dh2simError):
     """A written model does not match its table; nothing was put in place."""
+
+
+class PictureError(Dh2simError):
+    """A picture cannot be made: nothing can draw here, or what it should show is not there."""
+
+
+class RunError(Dh2simError):
+    """Something is no run of dh2sim, or a run cannot be read."""
+
+
+class RunExistsError(RunError):
+    """A run would be written where something stands already."""
+
+
+class RunDiffersError(RunError):
+    """A run cannot be resumed with these settings: it was made with others."""
+
+
+class RunDamagedError(RunError):
+    """A run's files do not hold what was written to them."""
+
+
+class RunBusyError(RunError):
+    """Another process is writing to the run."""
+
+
+class RunOutputError(OutputError):
+    """A run could not be written; blocks that were committed before are safe."""
+
+
+class ControllerError(Dh2simError):
+    """A controller is not known, its options or files are wrong, or its code failed."""
+
+
+class SettingsError(Dh2simError, ValueError):
+    """A run's settings are wrong; its text has a line for each thing that is."""

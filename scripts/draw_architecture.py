@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draw docs/images/architecture.svg: the way of a table through the folders. Needs the extra `docs`."""
+"""Draw docs/images/architecture.svg: the way of a table through the folders."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ BOXES = {
     "engines": (10.4, 1.85, 1.9, "engines/\nMuJoCo, …", COOL),
     "compare": (7.8, 1.85, 1.9, "validate/\ncompared", WARM),
     "export": (13.0, 3.0, 1.9, "export/\nfiles on disk", SOFT),
+    "simulate": (10.4, 5.75, 1.9, "simulate/\nrollouts", COOL),
+    "run": (13.0, 5.75, 1.9, "dataset\n(Zarr)", "white"),
 }
 ARROWS = [
     ("yaml", "robot"),
@@ -36,6 +38,8 @@ ARROWS = [
     ("engines", "compare"),
     ("robot", "oracle"),
     ("oracle", "compare"),
+    ("formats", "simulate"),
+    ("simulate", "run"),
 ]
 HEIGHT = 0.95
 
@@ -43,7 +47,7 @@ HEIGHT = 0.95
 def main() -> None:
     """Write the picture, the same bytes each time."""
     mpl.rcParams.update({"svg.hashsalt": "dh2sim", "font.family": "DejaVu Sans", "svg.fonttype": "path"})
-    figure, axes = plt.subplots(figsize=(11.2, 3.3))
+    figure, axes = plt.subplots(figsize=(11.2, 4.3))
     for x, y, width, words, color in BOXES.values():
         box = FancyBboxPatch(
             (x, y), width, HEIGHT, boxstyle="round,pad=0.05,rounding_size=0.12", fc=color, ec=INK, lw=1.2
@@ -54,7 +58,7 @@ def main() -> None:
         _arrow(axes, start, end)
     axes.text(6.05, 1.45, "shares no code with the chain", ha="center", fontsize=8.5, style="italic", color=INK)
     axes.set_xlim(-0.2, 15.1)
-    axes.set_ylim(1.2, 5.35)
+    axes.set_ylim(1.2, 6.95)
     axes.set_aspect("equal")
     axes.axis("off")
     figure.savefig(OUT, bbox_inches="tight", metadata={"Date": None})
@@ -66,6 +70,8 @@ def _arrow(axes: plt.Axes, start: str, end: str) -> None:
         a, b = (x1 + w1 + 0.07, y1 + HEIGHT / 2), (x2 - 0.07, y2 + HEIGHT / 2)
     elif x2 + w2 < x1:
         a, b = (x1 - 0.07, y1 + HEIGHT / 2), (x2 + w2 + 0.07, y2 + HEIGHT / 2)
+    elif y2 > y1:
+        a, b = (x1 + w1 / 2, y1 + HEIGHT + 0.07), (x2 + w2 / 2, y2 - 0.07)
     else:
         a, b = (x1 + w1 / 2, y1 - 0.07), (x2 + w2 / 2, y2 + HEIGHT + 0.07)
     axes.annotate("", b, a, arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.3})

@@ -3,7 +3,7 @@
 
     python scripts/render_robots.py [ROBOT...] [--out docs/images/robots.png] [--size 640x560]
 
-Needs the extra `docs`, and EGL or OSMesa to draw without a screen (MUJOCO_GL=egl, the default here, or osmesa).
+Needs EGL or OSMesa to draw without a screen (MUJOCO_GL=egl, the default here, or osmesa).
 """
 
 from __future__ import annotations

@@ -9,8 +9,12 @@ import typer
 from dh2sim.cli.export import export
 from dh2sim.cli.fk import fk
 from dh2sim.cli.info import info
+from dh2sim.cli.plot import plot
+from dh2sim.cli.render import render
 from dh2sim.cli.robots import list_robots
+from dh2sim.cli.rollout import rollout
 from dh2sim.cli.running import guarded
+from dh2sim.cli.runs import runs
 from dh2sim.cli.schema import schema
 from dh2sim.cli.validate import validate
 
@@ -24,6 +28,10 @@ Examples:
   dh2sim export stanford             write URDF and MJCF to generated/stanford/
   dh2sim validate stanford           check every engine against the table
   dh2sim fk stanford 0.3 -0.7 0.5 1.1 0.6 -0.4
+  dh2sim rollout stanford --out run.zarr
+  dh2sim runs run.zarr               what a run holds
+  dh2sim plot run.zarr               how its joints move
+  dh2sim render run.zarr             a film of it
 
 ROBOT is the path of a robot file, or the name of a robot that comes with dh2sim.
 
@@ -63,5 +71,9 @@ app.command(short_help="Check every engine against the table.")(guarded(validate
 # a negative number is no option
 app.command(context_settings={"ignore_unknown_options": True}, short_help="Print the pose of a frame.")(guarded(fk))
 app.command(short_help="Print the table, frames, mass and reach.")(guarded(info))
+app.command(short_help="Simulate many rollouts into a dataset.")(guarded(rollout))
+app.command(short_help="Render a rollout as a film, or a robot.")(guarded(render))
+app.command(short_help="Plot joints, tool, energy or tracking.")(guarded(plot))
+app.command(short_help="Tell what a run holds, or convert it to Parquet or HDF5.")(guarded(runs))
 app.command("list", short_help="List the robots that come with dh2sim.")(guarded(list_robots))
 app.command(short_help="Print the JSON Schema of robot files.")(guarded(schema))

@@ -5,10 +5,12 @@ from __future__ import annotations
 import functools
 import os
 import sys
+import traceback
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
-from dh2sim.errors import Dh2simError, MismatchError, RobotFileError
+from dh2sim.errors import Dh2simError, MismatchError, RobotFileError, SettingsError
 
 if TYPE_CHECKING:
     from dh2sim.model.robot_model import RobotModel
@@ -18,6 +20,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 R = TypeVar("R")
 
+_DRAWING = "gl_context.py"  # of MuJoCo
 DONE, FELL_SHORT, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
@@ -40,6 +43,11 @@ def guarded(command: Callable[P, int | None]) -> Callable[P, None]:
             status = complain(f"{where}{error.strerror or error}")
         except MemoryError:
             status = complain("there is not enough memory for that")
+        except (RuntimeError, ImportError, AttributeError) as error:
+            if not _blames_drawing(error):
+                raise
+            chosen = os.environ.get("MUJOCO_GL")
+            status = complain(f"MuJoCo cannot be imported with MUJOCO_GL={chosen}: {error}. Unset that variable")
         except KeyboardInterrupt:
             status = INTERRUPTED  # of which ``main`` tells
         raise SystemExit(status)
@@ -47,9 +55,21 @@ def guarded(command: Callable[P, int | None]) -> Callable[P, None]:
     return run
 
 
+def _blames_drawing(error: BaseException) -> bool:
+    """Whether MuJoCo failed to import what the environment variable MUJOCO_GL tells it to draw with."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return "MUJOCO_GL" in os.environ and any(Path(frame.filename).name == _DRAWING for frame in frames)
+
+
 def complain(error: object) -> int:
-    """Print an error and return its exit status; problems of robot files stand on lines of their own."""
-    text = str(error) if isinstance(error, RobotFileError) else f"dh2sim: {error}"
+    """Print an error and return its exit status; problems of robot files and settings have a line each."""
+    match error:
+        case RobotFileError():
+            text = str(error)
+        case SettingsError():
+            text = "\n".join(f"dh2sim: {line}" for line in str(error).splitlines())
+        case _:
+            text = f"dh2sim: {error}"
     print(text, file=sys.stderr)
     return FELL_SHORT if isinstance(error, MismatchError) else BAD_INPUT
 

@@ -15,7 +15,7 @@ from dh2sim.robot.catalog import builtin_robots
 from tests.export.robots import small, write
 from tests.program import Outcome, dh2sim, dh2sim_process, environment
 
-COMMANDS = ("export", "validate", "fk", "info", "list", "schema")
+COMMANDS = ("export", "validate", "fk", "info", "rollout", "render", "plot", "runs", "list", "schema")
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -43,10 +43,16 @@ def test_every_example_of_the_programs_help_works(tmp_path: Path, monkeypatch: p
     lines = dh2sim("--help").out.split("Examples:\n")[1].split("\n\n")[0].splitlines()
     for line in lines:
         command = line.split("  ")[2].removeprefix("dh2sim ").split()
-        run = dh2sim(*command, *(["--samples", "10"] if command[0] == "validate" else []))
+        quicker = {"validate": ["--samples", "10"], "rollout": ["--rollouts", "2", "--steps", "50"]}
+        run = dh2sim(*command, *quicker.get(command[0], []))
         assert (run.status, run.err) == (0, ""), line
-    assert len(lines) == 5
-    assert [path.name for path in tmp_path.iterdir()] == ["generated"]
+    assert len(lines) == 9
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "generated",
+        "run-0-joints.png",
+        "run-0.mp4",
+        "run.zarr",
+    ]
 
 
 def test_without_arguments_the_help_is_shown() -> None:
@@ -157,3 +163,14 @@ def test_a_terminal_that_knows_few_characters_is_written_to_all_the_same(tmp_pat
         run = dh2sim_process("info", robot, *options, variables={"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"})
         assert (run.status, run.err) == (0, "")
     assert json.loads(dh2sim_process("info", robot, "--json").out)["description"] == "été θ 臂"
+
+
+@pytest.mark.parametrize("command", [("export", "rpr"), ("validate", "rpr"), ("rollout", "rpr", "--out", "run.zarr")])
+def test_a_library_to_draw_with_that_there_is_not_is_named(command: tuple[str, ...], tmp_path: Path) -> None:
+    run = dh2sim_process(*command, cwd=tmp_path, variables={"MUJOCO_GL": "nonsense"})
+    assert (run.status, run.out) == (2, "")
+    assert run.err == (
+        "dh2sim: MuJoCo cannot be imported with MUJOCO_GL=nonsense: invalid value for environment variable "
+        "MUJOCO_GL: nonsense. Unset that variable\n"
+    )
+    assert not list(tmp_path.iterdir())

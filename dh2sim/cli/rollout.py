@@ -1,0 +1,206 @@
+"""``dh2sim rollout``."""
+
+from __future__ import annotations
+
+import gc
+import shlex
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dh2sim.cli.progress import progress_bar
+from dh2sim.cli.running import INTERRUPTED, build_all
+from dh2sim.cli.sizes import size_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+
+    from dh2sim.simulate.prepare import Job
+    from dh2sim.simulate.run import Progress
+    from dh2sim.simulate.store.summary import RunSummary
+
+
+def rollout(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="A robot file, or the name of a robot that comes with dh2sim.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="RUN.zarr", help="Where to write the run.")],
+    rollouts: Annotated[int, typer.Option(help="How many rollouts.")] = 256,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="Length of each, in seconds; 2 if --steps is not given either.")
+    ] = None,
+    steps: Annotated[int | None, typer.Option(metavar="K", help="Length of each, in time steps.")] = None,
+    timestep: Annotated[float, typer.Option(metavar="S", help="Seconds.")] = 0.002,
+    integrator: Annotated[str, typer.Option(help="Euler, RK4, implicit or implicitfast.")] = "implicitfast",
+    controller: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME[:key=value,…]",
+            help="passive, hold, gravity-compensation, pd, computed-torque, sine, random, replay, "
+            "or MODULE:NAME of your own.",
+        ),
+    ] = "sine",
+    start: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="home, zero, random, a configuration of the robot file, or a .csv or .npy file of joint positions.",
+        ),
+    ] = "home",
+    seed: Annotated[int, typer.Option(help="Of all random numbers.")] = 0,
+    threads: Annotated[int, typer.Option(min=0, max=1024, help="0: one for each processor.")] = 0,
+    record: Annotated[
+        str,
+        typer.Option(
+            metavar="NAMES",
+            help="Of qpos, qvel, ctrl, tool_pose, reference, qacc, torque, energy, contacts; separated by commas.",
+        ),
+    ] = "qpos,qvel,ctrl,tool_pose,reference",
+    every: Annotated[int, typer.Option(help="Record a state in so many.")] = 1,
+    randomize: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME=X,…",
+            help="Multiply mass, friction, damping, armature or gain by 1 - X to 1 + X, another factor for every "
+            "link or joint of every rollout.",
+        ),
+    ] = "",
+    floating_base: Annotated[bool, typer.Option("--floating-base", help="Let base_link float.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Carry on with an interrupted run, or begin it.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the run that stands there.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> int:
+    """Simulate many rollouts in MuJoCo and write them as a dataset.
+
+    The same seed gives the same bits, whatever the number of threads and after any interruption: Ctrl-C finishes the
+    rollouts at hand, and --resume carries on. Rollouts that become unstable stop alone and are marked.
+
+    \b
+    Examples:
+      dh2sim rollout stanford --out run.zarr
+      dh2sim rollout scara --out run.zarr --controller pd:period=0.5
+      dh2sim rollout my_arm.yaml --out run.zarr --rollouts 100000 --resume
+      dh2sim rollout puma560 --out run.zarr --randomize mass=0.2
+    Then:
+      dh2sim runs run.zarr               what it holds
+      dh2sim plot run.zarr --what joints
+      dh2sim render run.zarr
+    """
+    model = build_all([robot])[0]
+    from dh2sim.simulate.prepare import prepare
+    from dh2sim.simulate.run import fill, open_run
+    from dh2sim.simulate.store.summary import summarize
+    from dh2sim.simulate.wish import Wish, names_of
+
+    gc.enable()
+    wish = Wish(
+        rollouts=rollouts,
+        steps=steps,
+        duration=duration,
+        timestep=timestep,
+        integrator=integrator,
+        controller=controller,
+        start=start,
+        seed=seed,
+        record=names_of(record),
+        every=every,
+        randomize=_shares(randomize),
+        floating_base=floating_base,
+    )
+    job = prepare(model, wish, command=shlex.join(["dh2sim", *sys.argv[1:]]))
+    with (
+        open_run(job, out, resume=resume, overwrite=overwrite) as writer,
+        _patient(quiet) as patience,
+        progress_bar("simulating", "rollouts", rollouts, quiet=quiet) as advance,
+    ):
+        progress = fill(writer, job, threads=threads, advance=advance, stopping=lambda: patience.arrived is not None)
+    summary = summarize(out)
+    if not quiet:
+        _tell(job, summary, progress, out)
+    if progress.finished:
+        return 0
+    print(
+        f"dh2sim: interrupted; {summary.rollouts - summary.not_run:,} of {rollouts:,} rollouts are safe in {out}. "
+        "Carry on with the same command and --resume",
+        file=sys.stderr,
+    )
+    return INTERRUPTED if patience.arrived == signal.SIGINT else 128 + int(patience.arrived or 0)
+
+
+def _shares(text: str) -> dict[str, float]:
+    """Read ``name=share,…``."""
+    shares: dict[str, float] = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        name, equals, value = (part.strip() for part in item.partition("="))
+        try:
+            number = float(value)
+        except ValueError:
+            number = None
+        if not equals or number is None:
+            raise typer.BadParameter(
+                f"'{item}' is not of the form name=share, as in mass=0.1", param_hint="--randomize"
+            )
+        if name in shares:
+            raise typer.BadParameter(f"'{name}' is given twice", param_hint="--randomize")
+        shares[name] = number
+    return shares
+
+
+@dataclass
+class _Patience:
+    """Whether somebody has asked for an end."""
+
+    arrived: int | None = None
+
+
+@contextmanager
+def _patient(quiet: bool) -> Iterator[_Patience]:
+    """Let a first SIGINT or SIGTERM wait until the rollouts at hand are safe; a second one is dealt with at once."""
+    patience = _Patience()
+    previous: dict[signal.Signals, Callable[[int, FrameType | None], None] | int | None] = {}
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        patience.arrived = number
+        for kind, handler in previous.items():
+            signal.signal(kind, signal.SIG_DFL if handler is None else handler)
+        if not quiet:
+            print("dh2sim: finishing the rollouts at hand; once more ends at once", file=sys.stderr)
+
+    for kind in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(kind) is not signal.SIG_IGN:
+            previous[kind] = signal.signal(kind, note)
+    try:
+        yield patience
+    finally:
+        for kind, handler in previous.items():
+            signal.signal(kind, signal.SIG_DFL if handler is None else handler)
+
+
+def _tell(job: Job, summary: RunSummary, progress: Progress, out: Path) -> None:
+    settings = job.settings
+    print(
+        f"{summary.robot}: {summary.rollouts:,} rollouts of {summary.steps:,} steps ({summary.duration:g} s), "
+        f"{settings.controller.text}, in {out}"
+    )
+    if progress.rollouts:
+        rate = progress.rollouts * settings.steps / progress.seconds
+        print(f"  simulated {progress.rollouts:,} in {progress.seconds:.1f} s: {rate:,.0f} steps/s")
+    else:
+        print("  all of them were there already")
+    print(f"  recorded {', '.join(settings.record)}: {size_text(summary.bytes_on_disk)}")
+    counts = [f"finished {summary.finished:,}"]
+    if summary.unstable:
+        reasons = ", ".join(f"{reason} {count:,}" for reason, count in summary.reasons.items())
+        counts.append(f"stopped early {summary.unstable:,} ({reasons})")
+    if summary.not_run:
+        counts.append(f"not run {summary.not_run:,}")
+    if summary.saturated:
+        counts.append(f"controls clipped in {summary.saturated:,}")
+    print(f"  {', '.join(counts)}")

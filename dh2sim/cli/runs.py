@@ -1,0 +1,233 @@
+"""``dh2sim runs``."""
+
+from __future__ import annotations
+
+import gc
+import json
+import sys
+import textwrap
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dh2sim.cli.console import make_console
+from dh2sim.cli.progress import progress_bar
+from dh2sim.cli.running import complain
+from dh2sim.cli.sizes import size_text
+from dh2sim.errors import Dh2simError
+from dh2sim.robot.words import did_you_mean
+
+if TYPE_CHECKING:
+    from dh2sim.simulate.description import RunDescription
+
+FORMATS = {"parquet": ".parquet", "hdf5": ".h5"}
+SHOWN = 5
+"""Rollouts that stopped early are named, so many of them."""
+
+
+def runs(
+    paths: Annotated[list[Path], typer.Argument(metavar="RUN.zarr", help="Runs made by 'dh2sim rollout'.")],
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON alone: an object for one run, a list for several.")
+    ] = False,
+    to: Annotated[
+        str | None, typer.Option("--to", metavar="parquet|hdf5", help="Convert, instead of telling what a run holds.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="File to write. [default: RUN.parquet or RUN.h5, beside the run]"),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that exist.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="No progress bar, and not a word of files written.")
+    ] = False,
+) -> None:
+    """Tell what runs hold, or convert them to other formats.
+
+    Told are robot, controller, how many rollouts there are and which stopped early, what is recorded, size, speed and
+    versions; of a run that is not complete also how to carry on with it.
+
+    Parquet becomes three tables: FILE has a row for every rollout, step and joint, and beside it stand FILE's
+    .steps.parquet and .rollouts.parquet. HDF5 becomes one file, which xarray reads as the same dataset (netCDF-4).
+
+    \b
+    Examples:
+      dh2sim runs run.zarr
+      dh2sim runs *.zarr --json
+      dh2sim runs run.zarr --to parquet
+      dh2sim runs run.zarr --to hdf5 --out results/run.h5
+    """
+    if to is None:
+        if out is not None or overwrite:
+            option = "--overwrite" if out is None else "--out"
+            raise typer.BadParameter("only with --to: without it nothing is written", param_hint=option)
+        _tell(paths, as_json=as_json)
+        return
+    if to not in FORMATS:
+        guess = did_you_mean(to, FORMATS)
+        raise typer.BadParameter(f"'{to}' is no format.{guess} Allowed: {', '.join(FORMATS)}", param_hint="--to")
+    if as_json:
+        raise typer.BadParameter("goes without --to", param_hint="--json")
+    if out is not None and len(paths) > 1:
+        raise typer.BadParameter("names one file, for one run", param_hint="--out")
+    _convert(paths, to, out, overwrite=overwrite, quiet=quiet)
+
+
+def _tell(paths: list[Path], *, as_json: bool) -> None:
+    from dh2sim.simulate.description import describe
+
+    told: list[RunDescription] = []
+    errors: list[Dh2simError] = []
+    for path in paths:
+        try:
+            told.append(describe(path))
+        except Dh2simError as error:
+            errors.append(error)
+    if as_json:
+        if not errors:
+            values = [description.to_json() for description in told]
+            print(json.dumps(values[0] if len(values) == 1 else values, indent=2))
+    else:
+        for number, description in enumerate(told):
+            if number:
+                print()
+            _print(description)
+    _raise_last(errors)
+
+
+def _raise_last(errors: list[Dh2simError]) -> None:
+    for error in errors[:-1]:
+        complain(error)
+    if errors:
+        raise errors[-1]
+
+
+def _convert(paths: list[Path], to: str, out: Path | None, *, overwrite: bool, quiet: bool) -> None:
+    from dh2sim.simulate.convert.hdf5 import to_hdf5
+    from dh2sim.simulate.convert.parquet import to_parquet
+    from dh2sim.simulate.store.summary import summarize
+
+    gc.enable()
+    convert = {"parquet": to_parquet, "hdf5": to_hdf5}[to]
+    for summary in [summarize(path) for path in paths]:
+        path = Path(summary.path)
+        target = _beside(path, FORMATS[to]) if out is None else out
+        with progress_bar("converting", "rollouts", summary.rollouts, quiet=quiet) as advance:
+            written = convert(path, target, overwrite=overwrite, advance=advance)
+        if not quiet:
+            for file in written:
+                print(f"{file}  {size_text(file.stat().st_size)}", flush=True)
+        if summary.not_run:
+            print(
+                f"dh2sim: {summary.not_run:,} of {summary.rollouts:,} rollouts of '{path}' are not run yet; their "
+                "numbers are missing in what was written",
+                file=sys.stderr,
+            )
+
+
+def _beside(run: Path, suffix: str) -> Path:
+    named = run if run.name not in ("", "..") else run.resolve()
+    return named.with_name(named.name.removesuffix(".zarr") + suffix)
+
+
+def _print(description: RunDescription) -> None:
+    from rich.text import Text
+
+    console = make_console()
+    summary = description.summary
+    verdict = ("complete", "bold green") if summary.complete else ("not complete", "bold yellow")
+    console.print(Text.assemble((summary.path, "bold"), "  ", verdict), soft_wrap=True)
+    for title, lines in _sections(description):
+        for number, line in enumerate(lines):
+            wrapped = textwrap.wrap(
+                line,
+                max(console.width, 40),
+                initial_indent=f"  {title if number == 0 else '':<11} ",
+                subsequent_indent=" " * 14,
+                break_long_words=False,
+                break_on_hyphens=False,
+            )
+            console.print(Text("\n".join(wrapped)), soft_wrap=True)
+
+
+def _sections(description: RunDescription) -> Iterator[tuple[str, list[str]]]:
+    summary = description.summary
+    yield "robot", [summary.robot]
+    yield "controller", [summary.controller]
+    changes = ", ".join(f"{name} ±{100 * share:g} %" for name, share in description.randomize.items())
+    yield "randomised", [changes or "nothing"]
+    yield "rollouts", [_counts(description), *_early_stops(description), *_clipped(description)]
+    every = "every one" if summary.every == 1 else f"one in {summary.every}"
+    yield (
+        "steps",
+        [f"{summary.steps:,} of {summary.timestep:g} s = {summary.duration:g} s, {every} recorded"],
+    )
+    yield "integrator", [description.integrator]
+    yield "start", [f"{description.start}, seed {summary.seed}"]
+    yield "recorded", list(_recorded(description))
+    yield "size", [_sizes(description)]
+    if summary.steps_per_second is not None:
+        yield "speed", [f"{summary.steps_per_second:,.0f} steps/s over {summary.seconds:,.3g} s"]
+    packages = {"dh2sim": "dh2sim", "mujoco": "MuJoCo", "numpy": "NumPy", "python": "Python"}
+    versions = ", ".join(f"{packages.get(name, name)} {version}" for name, version in summary.versions.items())
+    yield "made", [_moment(summary.created), f"with {versions}"]
+    if description.command:
+        yield "command", [description.command]
+    if not summary.complete:
+        again = description.resume_command
+        yield "carry on", [again or "with the same call and resume=True; it was made by the library"]
+
+
+def _moment(created: str) -> str:
+    try:
+        return f"{datetime.fromisoformat(created).astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
+    except ValueError:
+        return created
+
+
+def _counts(description: RunDescription) -> str:
+    summary = description.summary
+    parts = [f"{summary.finished:,} finished"]
+    if summary.unstable:
+        parts.append(f"{summary.unstable:,} stopped early")
+    if summary.not_run:
+        parts.append(f"{summary.not_run:,} not yet run")
+    return f"{summary.rollouts:,}: {', '.join(parts)}"
+
+
+def _clipped(description: RunDescription) -> list[str]:
+    count = description.summary.saturated
+    return [f"controls clipped in {count:,}"] if count else []
+
+
+def _early_stops(description: RunDescription) -> Iterator[str]:
+    """Why rollouts stopped early, and where the first of them did."""
+    summary = description.summary
+    if not description.stopped:
+        return
+    reasons = ", ".join(f"{name} {count:,}" for name, count in summary.reasons.items())
+    yield f"stopped early: {reasons}"
+    for each in description.stopped[:SHOWN]:
+        yield f"  rollout {each.rollout}: {each.reason} in step {each.step:,} ({each.step * summary.timestep:.4g} s)"
+    if len(description.stopped) > SHOWN:
+        yield f"  and {len(description.stopped) - SHOWN:,} more (--json names all)"
+
+
+def _recorded(description: RunDescription) -> Iterator[str]:
+    rows = [
+        (each.name, " x ".join(f"{size:,}" for size in each.shape), ", ".join(each.dimensions))
+        for each in description.recorded
+    ]
+    widths = [max(len(row[i]) for row in rows) for i in range(2)]
+    for name, shape, dimensions in rows:
+        yield f"{name:{widths[0]}}  {shape:{widths[1]}}  {dimensions}"
+
+
+def _sizes(description: RunDescription) -> str:
+    disk, memory = description.summary.bytes_on_disk, description.bytes_in_memory
+    if not memory:
+        return f"{size_text(disk)} on disk"
+    return f"{size_text(disk)} on disk for {size_text(memory)} of numbers ({100 * disk / memory:.0f} %)"

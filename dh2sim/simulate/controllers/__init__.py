@@ -1,0 +1,1 @@
+"""Controllers that come with dh2sim, and how others are found."""

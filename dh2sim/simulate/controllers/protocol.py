@@ -1,0 +1,117 @@
+"""What a controller is: it drives many rollouts at once, all arrays with the rollouts first.
+
+A rollout's controls may depend on that rollout alone: not on which others share its group, nor on how many there are.
+Then a run gives the same bits however it is cut up. So no sums over the first axis, no matrix products that a library
+blocks by size, and random numbers from the rollout's own generator only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from dh2sim.simulate.plant import Plant
+from dh2sim.typing import Array
+
+
+class Observation(Protocol):
+    """The states of a group of rollouts at one instant. What is computed on demand is computed once a step."""
+
+    @property
+    def step(self) -> int:
+        """Time steps since the start."""
+        ...
+
+    @property
+    def time(self) -> float:
+        """Time since the start, s."""
+        ...
+
+    @property
+    def q(self) -> Array:
+        """Joint positions, rad or m, shape (batch, n)."""
+        ...
+
+    @property
+    def v(self) -> Array:
+        """Joint velocities, rad/s or m/s, shape (batch, n)."""
+        ...
+
+    @property
+    def mass_matrix(self) -> Array:
+        """Joint-space inertia M(q) with armature, kg·m², kg·m or kg, shape (batch, n, n)."""
+        ...
+
+    @property
+    def bias(self) -> Array:
+        """Coriolis, centrifugal and gravity forces c(q, v) + g(q), N·m or N, shape (batch, n)."""
+        ...
+
+    @property
+    def passive(self) -> Array:
+        """Forces of springs and viscous damping on the joints, N·m or N, shape (batch, n)."""
+        ...
+
+    @property
+    def gravity(self) -> Array:
+        """Forces g(q) that balance gravity, N·m or N, shape (batch, n)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Lanes:
+    """A group of rollouts that are driven together, at their start."""
+
+    plant: Plant
+    steps: int
+    """Time steps of the run."""
+    rollouts: range
+    """Their numbers in the run."""
+    q0: Array
+    """Joint positions at the start, rad or m, shape (batch, n)."""
+    v0: Array
+    """Joint velocities at the start, rad/s or m/s, shape (batch, n)."""
+    gravity0: Array
+    """Forces that balance gravity at the start, N·m or N, shape (batch, n)."""
+    generators: Sequence[np.random.Generator]
+    """One a rollout, for the controller alone."""
+
+
+@runtime_checkable
+class OpenLoop(Protocol):
+    """A controller that looks at no state: its controls are known before the simulation runs."""
+
+    def controls(self, first: int, count: int) -> Array:
+        """Return the controls of time steps ``first`` to ``first + count - 1``, shape (batch, count, actuators).
+
+        Or of shape (batch, 1, actuators) if they are the same at every step. Any steps may be asked for, in any
+        order, and the same step always has the same controls.
+        """
+        ...
+
+
+@runtime_checkable
+class ClosedLoop(Protocol):
+    """A controller that looks at the state before every time step."""
+
+    def control(self, observation: Observation) -> Array:
+        """Return the controls of this time step, shape (batch, actuators)."""
+        ...
+
+
+Controller = OpenLoop | ClosedLoop
+
+
+@runtime_checkable
+class Follows(Protocol):
+    """A controller with a reference, which is recorded."""
+
+    def reference(self, first: int, count: int) -> tuple[Array, Array]:
+        """Return reference positions and velocities at the beginning of ``count`` time steps from ``first``.
+
+        Each of shape (batch, count, n). ``first + count - 1`` may be ``steps``: the end of the run.
+        """
+        ...

@@ -1,0 +1,173 @@
+"""Which controllers there are, and how one is chosen by a text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final
+
+from dh2sim.errors import ControllerError
+from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.words import did_you_mean, listed
+from dh2sim.simulate.controllers import discovery
+from dh2sim.simulate.controllers.blame import blamed, guarded
+from dh2sim.simulate.controllers.choice import ControllerChoice
+from dh2sim.simulate.controllers.computed_torque import ComputedTorque
+from dh2sim.simulate.controllers.gravity_compensation import GravityCompensation
+from dh2sim.simulate.controllers.hold import Hold
+from dh2sim.simulate.controllers.noise import Noise
+from dh2sim.simulate.controllers.option_text import join_pairs
+from dh2sim.simulate.controllers.options import Option, options_of, read_options
+from dh2sim.simulate.controllers.passive import Passive
+from dh2sim.simulate.controllers.pd import PD
+from dh2sim.simulate.controllers.prepared import Prepared
+from dh2sim.simulate.controllers.protocol import Controller, Lanes
+from dh2sim.simulate.controllers.replay import Replay
+from dh2sim.simulate.controllers.sine import Sine
+
+BUILT_IN: Final[Mapping[str, type]] = MappingProxyType(
+    {
+        "passive": Passive,
+        "hold": Hold,
+        "gravity-compensation": GravityCompensation,
+        "pd": PD,
+        "computed-torque": ComputedTorque,
+        "sine": Sine,
+        "random": Noise,
+        "replay": Replay,
+    }
+)
+
+
+def controllers() -> Mapping[str, str]:
+    """Return the names of all controllers, each with a line of help; no installed package is imported for it."""
+    known = {name: (found.__doc__ or "").splitlines()[0].rstrip(".") for name, found in BUILT_IN.items()}
+    for name, entries in discovery.plugins().items():
+        packages = sorted({entry.dist.name if entry.dist is not None else entry.module for entry in entries})
+        known.setdefault(name, f"of the installed package {listed(packages)}")
+    return MappingProxyType(known)
+
+
+def choose(text: str) -> ControllerChoice:
+    """Return the controller that a text names.
+
+    Args:
+        text: ``NAME`` or ``NAME:key=value,…`` of a controller that comes with dh2sim or with an installed package, or
+            ``MODULE:CLASS`` or ``MODULE:CLASS:key=value,…`` of one's own.
+
+    Raises:
+        ControllerError: there is no such controller, its options or files are wrong, or its code failed.
+    """
+    head, _, rest = text.partition(":")
+    name = head.strip()
+    if name in BUILT_IN:
+        return _choice(name, BUILT_IN[name], rest, own=True)
+    plugins = discovery.plugins()
+    if name in plugins:
+        return _choice(name, discovery.load_plugin(name, plugins[name]), rest, own=False)
+    written = discovery.module_and_class(text)
+    if written is not None:
+        module, class_name, options = written
+        found = discovery.load_class(module, class_name)
+        if found is not None:
+            return _choice(f"{module}:{class_name}", found, options, own=False)
+    known = [*BUILT_IN, *(plugin for plugin in plugins if plugin not in BUILT_IN)]
+    what = f"controller '{name}'" if written is None else f"controller and no module '{name}'"
+    raise ControllerError(
+        f"there is no {what}.{did_you_mean(name, known)} Known controllers: {listed(known)}; "
+        "one of your own is named MODULE:CLASS"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Maker:
+    """Makes the controller of a group of rollouts; its own class so that it can be sent to another process."""
+
+    name: str
+    make: Callable[..., Controller]
+    options: Mapping[str, Any] = field(default_factory=dict)
+    own: bool
+    """Whether the code is dh2sim's own."""
+
+    def __call__(self, lanes: Lanes) -> Controller:
+        if self.own:
+            with _named(self.name):
+                return self.make(lanes, **self.options)
+        with blamed(self.name):
+            controller = self.make(lanes, **self.options)
+        _check_methods(self.name, controller)
+        return guarded(self.name, controller)
+
+
+def _choice(name: str, found: type, text: str, *, own: bool) -> ControllerChoice:
+    prepare = getattr(found, "prepare", None)
+    options = _options(name, found)
+    given = read_options(name, options, text)
+    arguments = {option.parameter: given[option.name] for option in options if option.name in given}
+    if prepare is None:
+        _check_methods(name, found)
+        prepared = Prepared(
+            make=found,
+            actuation=getattr(found, "actuation", None),
+            follows=callable(getattr(found, "reference", None)),
+        )
+        maker = _Maker(name=name, make=found, options=arguments, own=own)
+    else:
+        with _named(name) if own else blamed(name):
+            prepared = prepare(**arguments)
+        maker = _Maker(name=name, make=prepared.make, own=own)
+    code = "" if own else discovery.source_digest(found)
+    return ControllerChoice(
+        text=join_pairs(name, given.items()),
+        name=name,
+        make=maker,
+        actuation=_actuation(name, prepared.actuation),
+        options=MappingProxyType(given),
+        digest=" ".join(filter(None, (code, prepared.digest))),
+        follows=prepared.follows,
+    )
+
+
+def _options(name: str, found: type) -> tuple[Option, ...]:
+    """Return the options of ``prepare``, or of the constructor behind the group of rollouts that it is given."""
+    prepare = getattr(found, "prepare", None)
+    try:
+        if prepare is None:
+            return options_of(found, found.__module__, skip=1)
+        return options_of(prepare, found.__module__, skip=0)
+    except (TypeError, ValueError) as error:
+        raise ControllerError(f"controller '{name}': {error}") from error
+
+
+def _check_methods(name: str, found: object) -> None:
+    """See that a controller, or its class, has ``control`` or ``controls``, and not both."""
+    has = [method for method in ("control", "controls") if callable(getattr(found, method, None))]
+    if len(has) != 1:
+        raise ControllerError(
+            f"controller '{name}': it has {'both' if has else 'neither'} control(observation) "
+            f"{'and' if has else 'nor'} controls(first, count); it needs one of them"
+        )
+
+
+@contextmanager
+def _named(name: str) -> Iterator[None]:
+    """Name the controller in an error."""
+    try:
+        yield
+    except ControllerError as error:
+        raise ControllerError(f"controller '{name}': {error}") from error
+
+
+def _actuation(name: str, value: object) -> ActuatorType | None:
+    if value is None:
+        return None
+    known = [kind.value for kind in ActuatorType]
+    if isinstance(value, str) and value in known:
+        return ActuatorType(value)
+    guess = did_you_mean(value, known) if isinstance(value, str) else ""
+    raise ControllerError(
+        f"controller '{name}': its actuation is {value!r}.{guess} "
+        f"It may be {listed(repr(kind) for kind in known)}, or None for the robot's own actuators"
+    )

@@ -1,0 +1,113 @@
+"""Periodic excitation, as used to identify a robot's dynamics."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+
+from dh2sim.errors import ControllerError
+from dh2sim.robot.spec import ActuatorType
+from dh2sim.simulate.controllers.curves import MINIMUM_JERK_PEAK, minimum_jerk, weighted_sum
+from dh2sim.simulate.controllers.options import Within
+from dh2sim.simulate.controllers.protocol import Lanes
+from dh2sim.simulate.controllers.windows import INSIDE, centers, free_ranges, half_ranges, widened
+from dh2sim.typing import Array
+
+
+class Sine:
+    """Position actuators follow sums of sines with random amplitudes and phases, as used for identification.
+
+    q(t) = center + sum over h = 1 … harmonics of a_h sin(2 pi h f t) + b_h cos(2 pi h f t), a finite Fourier series.
+    Source: J. Swevers et al., Optimal robot excitation and identification, IEEE Transactions on Robotics and
+    Automation 13 (1997). The amplitudes add up to no more than the limits of position and of velocity allow. A
+    minimum-jerk weight leads from the start to the series within the first seconds.
+    """
+
+    actuation = ActuatorType.POSITION
+
+    def __init__(
+        self,
+        lanes: Lanes,
+        *,
+        harmonics: Annotated[int, Within(at_least=1, at_most=100)] = 5,
+        frequency: Annotated[float, Within(above=0.0, unit="Hz")] = 0.1,
+        amplitude: Annotated[float, Within(at_least=0.0, at_most=1.0)] = 0.3,
+        fade: Annotated[float, Within(above=0.0, unit="s")] = 1.0,
+    ) -> None:
+        """Draw amplitudes and phases.
+
+        Args:
+            lanes: the rollouts.
+            harmonics: number of sines.
+            frequency: of the first, Hz; the others are its multiples.
+            amplitude: sum of the sines' amplitudes as a share of half the joint's range, before the velocity limit.
+            fade: duration of the way from the start to the series, s.
+
+        Raises:
+            ControllerError: the highest frequency is more than time steps can show.
+        """
+        plant = lanes.plant
+        self._timestep, self._fade, self._start = plant.timestep, fade, lanes.q0
+        if harmonics * frequency * plant.timestep > 0.5:
+            raise ControllerError(
+                f"the highest frequency, harmonics x frequency = {harmonics * frequency:g} Hz, is above half the "
+                f"rate of the time steps, {0.5 / plant.timestep:g} Hz"
+            )
+        self._rates = [2.0 * math.pi * frequency * h for h in range(1, harmonics + 1)]
+        drawn = np.stack([g.standard_normal((2 * harmonics, plant.n)) for g in lanes.generators], axis=1)
+        sizes = np.sqrt(drawn[:harmonics] * drawn[:harmonics] + drawn[harmonics:] * drawn[harmonics:])
+        total, speed = np.zeros(sizes.shape[1:]), np.zeros(sizes.shape[1:])
+        for rate, size in zip(self._rates, sizes, strict=True):
+            total, speed = total + size, speed + rate * size
+        reach = INSIDE * amplitude * half_ranges(plant.lower, plant.upper, free_ranges(plant))
+        # on the way to the series: rate of the weight times the distance, and the series' own velocity
+        away = np.abs(centers(lanes.q0, reach, plant.lower, plant.upper) - lanes.q0)
+        fastest = MINIMUM_JERK_PEAK / fade * (away + reach) + reach * speed / total
+        limit = INSIDE * plant.velocity
+        reach = reach * np.where(fastest > limit, limit / np.where(fastest > 0.0, fastest, 1.0), 1.0)
+        self._center = centers(lanes.q0, reach, plant.lower, plant.upper)
+        self._terms = [*(drawn * (reach / total)), self._center]
+        self._lower, self._upper = widened(lanes)
+
+    def controls(self, first: int, count: int) -> Array:
+        """Return setpoints, rad or m, shape (batch, count, n)."""
+        return self._positions(first, count, self._tables(first, count)[0])
+
+    def reference(self, first: int, count: int) -> tuple[Array, Array]:
+        """Return the setpoints and their rates."""
+        values, rates = self._tables(first, count)
+        series = weighted_sum(values, self._terms)
+        weight, change, _ = minimum_jerk(self._since(first, count))
+        v = weighted_sum(rates, self._terms[:-1]) * weight[:, None]
+        v += (change / self._fade)[:, None] * (series - self._start[:, None])
+        return self._positions(first, count, values), v
+
+    def _since(self, first: int, count: int) -> Array:
+        """Return the part of the way to the series that time steps are at, 0 to 1."""
+        since: Array = np.minimum(np.arange(first, first + count) * self._timestep / self._fade, 1.0)
+        return since
+
+    def _tables(self, first: int, count: int) -> tuple[Array, Array]:
+        """Return sines, cosines and ones at time steps, and the rates of change of the sines and cosines.
+
+        By the C library, one by one: NumPy's vectors of sines may differ in the last bit with their lengths.
+        """
+        times = [k * self._timestep for k in range(first, first + count)]
+        sines = np.array([[math.sin(rate * t) for t in times] for rate in self._rates])
+        cosines = np.array([[math.cos(rate * t) for t in times] for rate in self._rates])
+        rates = np.array(self._rates)[:, None]
+        return np.concatenate((sines, cosines, np.ones((1, count)))), np.concatenate(
+            (rates * cosines, -rates * sines)
+        )
+
+    def _positions(self, first: int, count: int, values: Array) -> Array:
+        series = weighted_sum(values, self._terms)
+        since = self._since(first, count)
+        fading = int(np.count_nonzero(since < 1.0))
+        if fading:
+            weight = minimum_jerk(since[:fading])[0][:, None]
+            blend = (1.0 - weight) * self._start[:, None] + weight * series[:, :fading]
+            series[:, :fading] = np.clip(blend, self._lower[:, None], self._upper[:, None])
+        return series

@@ -1,0 +1,159 @@
+"""A run as one HDF5 file in the netCDF-4 layout, which xarray reads as the same dataset."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dh2sim.errors import Dh2simError
+from dh2sim.export.signals import signals_deferred
+from dh2sim.simulate.convert.blocks import StoredRun, attribute_text, open_run, plain, untold
+from dh2sim.simulate.convert.files import new_files
+from dh2sim.simulate.convert.sink import Sink
+
+if TYPE_CHECKING:
+    import h5netcdf
+    import xarray as xr
+
+SUFFIX = ".h5"
+CHUNK_BYTES = 4 << 20
+"""Of a chunk at most: HDF5 reads and unpacks whole chunks, and looks into one rollout are common."""
+LEVEL = 1
+"""Of gzip; higher ones are slower by far, and gain a few per cent."""
+
+
+def to_hdf5(
+    path: Path,
+    out: Path,
+    *,
+    overwrite: bool = False,
+    advance: Callable[[int], None] = untold,
+) -> tuple[Path, ...]:
+    """Write a run as an HDF5 file.
+
+    Args:
+        path: the run.
+        out: the file.
+        overwrite: whether a file that stands there is replaced.
+        advance: told of rollouts as they are written.
+
+    Returns:
+        The file written.
+
+    Raises:
+        Dh2simError: h5netcdf or h5py is not installed, there is no run or a damaged one, the file exists already or
+            cannot be written.
+    """
+    try:
+        import h5netcdf  # noqa: F401
+        import h5py  # noqa: F401
+    except ImportError as error:
+        raise Dh2simError("HDF5 needs h5netcdf and h5py: pip install 'dh2sim[data]'") from error
+    run = open_run(path)
+    with new_files([out], run=path, overwrite=overwrite) as [staged], _opened(staged) as (file, sink):
+        with signals_deferred():  # HDF5 calls Python for every write, and is lost if that raises
+            _define(file, run)
+        for rollouts, block in run.blocks():
+            for name in block.data_vars:
+                with signals_deferred():
+                    file.variables[str(name)][rollouts.start : rollouts.stop] = block[name].values
+                sink.check()
+            advance(len(rollouts))
+    return (out,)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[h5netcdf.File, Sink]]:
+    import h5netcdf
+
+    with closing(Sink(path)) as sink:
+        file = h5netcdf.File(sink, "w")
+        try:
+            yield file, sink
+        except Exception:
+            sink.check()  # where that is the reason, it says more
+            raise
+        finally:
+            with signals_deferred():
+                file.close()
+        sink.check()
+
+
+def chunk_shape(shape: tuple[int, ...], itemsize: int, block: int) -> tuple[int, ...]:
+    """Return the shape of the chunks of a variable.
+
+    Whole rollouts, as many as fit into ``CHUNK_BYTES`` and divide a block, so that a block is whole chunks; of a
+    rollout that does not fit as many records as do.
+
+    Args:
+        shape: of the variable, rollouts first.
+        itemsize: bytes of a number.
+        block: rollouts in a block.
+    """
+    one = itemsize * math.prod(shape[1:])
+    if one > CHUNK_BYTES and len(shape) > 1:
+        records = max(1, CHUNK_BYTES * shape[1] // one)
+        return (1, records, *shape[2:])
+    block = min(block, shape[0])
+    fitting = max(1, min(block, CHUNK_BYTES // max(1, one)))
+    rollouts = max(count for count in range(1, fitting + 1) if block % count == 0)
+    return (rollouts, *shape[1:])
+
+
+def _define(file: h5netcdf.File, run: StoredRun) -> None:
+    """Write everything but the variables' numbers."""
+    dataset = run.dataset
+    file.dimensions = {str(name): size for name, size in dataset.sizes.items()}
+    for key, value in dataset.attrs.items():
+        file.attrs[str(key)] = _attribute(value)
+    for name, coordinate in dataset.coords.items():
+        _write_coordinate(file, str(name), coordinate)
+    for name, variable in dataset.data_vars.items():
+        stored: dict[str, Any] = {}
+        if variable.size:
+            chunks = chunk_shape(variable.shape, variable.dtype.itemsize, run.block)
+            stored = {"chunks": chunks, "compression": "gzip", "compression_opts": LEVEL, "shuffle": True}
+        made = file.create_variable(str(name), tuple(map(str, variable.dims)), variable.dtype, **stored)
+        for key, value in _attributes(variable).items():
+            made.attrs[key] = value
+        others = [
+            str(label)
+            for label, coordinate in dataset.coords.items()
+            if label not in dataset.sizes and set(coordinate.dims) <= set(variable.dims)
+        ]
+        if others:
+            made.attrs["coordinates"] = " ".join(others)
+
+
+def _write_coordinate(file: h5netcdf.File, name: str, coordinate: xr.DataArray) -> None:
+    import h5py
+
+    text = coordinate.dtype.kind in "OUT"
+    values = np.array([str(label) for label in coordinate.values], dtype=object) if text else coordinate.values
+    made = file.create_variable(
+        name, tuple(map(str, coordinate.dims)), h5py.string_dtype() if text else coordinate.dtype
+    )
+    made[...] = values
+    for key, value in _attributes(coordinate).items():
+        made.attrs[key] = value
+
+
+def _attributes(variable: xr.DataArray) -> Mapping[str, Any]:
+    """Return a variable's attributes; flags get the variable's own type, as the CF conventions want."""
+    return {
+        str(key): np.asarray(value, dtype=variable.dtype) if key == "flag_values" else _attribute(value)
+        for key, value in variable.attrs.items()
+    }
+
+
+def _attribute(value: object) -> str | int | float:
+    """Return an attribute as HDF5 can hold it: texts and numbers as they are, anything else as JSON."""
+    value = plain(value)
+    if isinstance(value, str | float) or (isinstance(value, int) and not isinstance(value, bool) and value < 2**63):
+        return value
+    return attribute_text(value)

@@ -1,0 +1,1 @@
+"""Pictures of robots and runs: rendered by MuJoCo, plotted by matplotlib."""

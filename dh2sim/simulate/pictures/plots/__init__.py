@@ -1,0 +1,1 @@
+"""Plots of a rollout, by matplotlib; nothing here touches its global figures."""

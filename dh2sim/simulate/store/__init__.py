@@ -1,0 +1,1 @@
+"""Runs on disk: committed block by block, verified, resumed."""

@@ -1,0 +1,211 @@
+"""The parts of ``scripts/bench`` that measure rollouts, against MuJoCo itself in the same run."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from dh2sim.simulate.prepare import Job
+
+Row = tuple[str, str, str, bool | None]
+ROLLOUTS, STEPS = 1024, 2000
+RECORD = ("qpos", "qvel", "ctrl")
+
+
+def rollouts() -> Iterator[Row]:
+    """1024 rollouts of 2000 steps of the Stanford arm into Zarr, against what MuJoCo can do at most."""
+    import mujoco
+    import mujoco.rollout
+
+    from dh2sim.simulate.engine import quiet_engine
+
+    mjcf, q0, ctrl = _held_arms()
+    model = mujoco.MjModel.from_xml_string(mjcf)
+    ceiling, stock, closed = [], [], []
+    own: list[float] = []
+    with TemporaryDirectory() as folder:
+        _run(folder, "hold", 64)  # so that nothing is imported while the clock runs
+        _run(folder, "computed-torque", 64)
+        for _ in range(5):
+            with quiet_engine():
+                floor = _seconds(lambda: _bare_steps(model, q0, ctrl))
+            own.append(_seconds(lambda: _run(folder, "hold", ROLLOUTS)))
+            ceiling.append(floor / own[-1])
+            stock.append(_seconds(lambda: _stock_rollout(model, q0, ctrl)) / own[-1])
+            closed.append(own[-1] / _seconds(lambda: _run(folder, "computed-torque", ROLLOUTS)))
+    rate = ROLLOUTS * STEPS / statistics.median(own)
+    threads = os.cpu_count()
+    yield f"steps/s end to end into Zarr, {threads} threads", f"{rate:,.0f}", "", None
+    for what, ratios, target in (
+        ("the same / mj_step in C, nothing recorded", ceiling, 0.9),
+        ("the same / mujoco.rollout, left in memory", stock, 1.2),
+        ("computed-torque / the same", closed, 0.4),
+    ):
+        ratio = statistics.median(ratios)
+        yield what, f"{ratio:.2f} ({min(ratios):.2f} to {max(ratios):.2f})", f"{target}", ratio >= target
+
+
+def memory() -> Iterator[Row]:
+    """20 000 rollouts of 1000 steps into Zarr as a process of its own, and a run of half as many."""
+    peaks = []
+    for count in (10_000, 20_000):
+        with TemporaryDirectory() as folder:
+            arguments = ["rollout", "stanford", "--out", f"{folder}/run.zarr", "--quiet"]
+            options = ["--rollouts", str(count), "--steps", "1000", "--record", "qpos,qvel,ctrl"]
+            process = subprocess.Popen([sys.executable, "-m", "dh2sim", *arguments, *options])
+            _, status, usage = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+            peaks.append(usage.ru_maxrss * 1024 if process.returncode == 0 else float("inf"))
+            if count == 20_000:
+                size = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file())
+    yield "memory of 20 000 rollouts of 1000 steps", f"{peaks[1] / 1e6:.0f} MB", "2000 MB", peaks[1] < 2e9
+    growth = peaks[1] / peaks[0]
+    yield "the same / that of half as many", f"{growth:.2f} ({size / 1e9:.1f} GB on disk)", "1.25", growth <= 1.25
+
+
+def steady() -> Iterator[Row]:
+    """60 s of simulation of 1000 arms: time per step in the last tenth, against the first."""
+    from dh2sim import build_model, load_robot
+    from dh2sim.simulate.block import simulate_block
+    from dh2sim.simulate.prepare import prepare
+    from dh2sim.simulate.wish import Wish
+
+    model = build_model(load_robot("stanford"))
+    for controller in ("sine", "computed-torque"):
+        wish = Wish(rollouts=1000, duration=60.0, controller=controller, every=100, record=("qpos",))
+        job = prepare(model, wish)
+        paces = _Paces(job.settings.steps)
+        choice = replace(job.settings.controller, make=paces.watched(job.settings.controller.make))
+        simulate_block(job.mjcf, replace(job.settings, controller=choice), range(1000))
+        ratio = paces.late / paces.early
+        what = f"60 s of 1000 arms, {controller}: step at the end / start"
+        yield what, f"{ratio:.2f} ({paces.early * 1e3:.2f} ms for 256 arms)", "1.15", ratio <= 1.15
+
+
+class _Paces:
+    """Looks at the clock whenever a controller is asked: seconds a step early and late in the rollouts."""
+
+    def __init__(self, steps: int) -> None:
+        self._steps = steps
+        self._groups: list[list[tuple[int, float]]] = []
+
+    def watched(self, make: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        """Make controllers that look at the clock."""
+
+        def make_watched(lanes: Any) -> Any:
+            controller = make(lanes)
+            ticks: list[tuple[int, float]] = []
+            self._groups.append(ticks)
+            name = "control" if hasattr(controller, "control") else "controls"
+            asked = getattr(controller, name)
+
+            def ask(first: Any, *rest: int) -> Any:
+                ticks.append((first if isinstance(first, int) else first.step, time.perf_counter()))
+                return asked(first, *rest)
+
+            setattr(controller, name, ask)
+            return controller
+
+        return make_watched
+
+    @property
+    def early(self) -> float:
+        """Seconds a step from 2 % to 12 % of the way; the first steps warm up."""
+        return self._pace(0.02, 0.12)
+
+    @property
+    def late(self) -> float:
+        """Seconds a step from 90 % of the way to the end."""
+        return self._pace(0.90, 1.0)
+
+    def _pace(self, begin: float, end: float) -> float:
+        paces = []
+        for ticks in self._groups:
+            inside = [tick for tick in ticks if begin * self._steps <= tick[0] <= end * self._steps]
+            paces.append((inside[-1][1] - inside[0][1]) / (inside[-1][0] - inside[0][0]))
+        return statistics.median(paces)
+
+
+def _job(controller: str, count: int) -> Job:
+    from dh2sim import build_model, load_robot
+    from dh2sim.simulate.prepare import prepare
+    from dh2sim.simulate.wish import Wish
+
+    wish = Wish(rollouts=count, steps=STEPS, controller=controller, start="random", record=RECORD)
+    return prepare(build_model(load_robot("stanford")), wish)
+
+
+def _held_arms() -> tuple[str, NDArray[np.float64], NDArray[np.float64]]:
+    """The model, starts and constant controls of the run that is measured."""
+    from dh2sim.simulate.block import simulate_block
+
+    job = _job("hold", ROLLOUTS)
+    short = replace(job.settings, steps=1)
+    block = simulate_block(job.mjcf, short, range(ROLLOUTS))
+    return job.mjcf, block["qpos"][:, 0], block["ctrl"][:, 0]
+
+
+def _run(folder: str, controller: str, count: int) -> None:
+    """Simulate into Zarr, from the robot file's name to the last file that is safe on disk."""
+    from dh2sim.simulate import rollout
+
+    rollout(
+        "stanford",
+        out=Path(folder) / "run.zarr",
+        overwrite=True,
+        rollouts=count,
+        steps=STEPS,
+        controller=controller,
+        start="random",
+        record=RECORD,
+    )
+
+
+def _bare_steps(model: Any, q0: NDArray[np.float64], ctrl: NDArray[np.float64]) -> None:
+    """Step the same arms in C on all processors; nothing is recorded."""
+    import mujoco
+
+    threads = os.cpu_count() or 1
+
+    def work(thread: int) -> None:
+        data = mujoco.MjData(model)
+        for i in range(thread, len(q0), threads):
+            mujoco.mj_resetData(model, data)
+            data.qpos[:], data.ctrl[:] = q0[i], ctrl[i]
+            mujoco.mj_step(model, data, STEPS)
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, range(threads)))
+
+
+def _stock_rollout(model: Any, q0: NDArray[np.float64], ctrl: NDArray[np.float64]) -> None:
+    """Roll the same arms out with mujoco.rollout, as imported; its arrays stay in memory."""
+    import mujoco
+    import mujoco.rollout
+
+    threads = os.cpu_count() or 1
+    size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    initial = np.zeros((len(q0), size))
+    initial[:, 1 : 1 + q0.shape[1]] = q0
+    controls = np.repeat(ctrl[:, None], STEPS, axis=1)
+    with mujoco.rollout.Rollout(nthread=threads) as pool:
+        pool.rollout(model, [mujoco.MjData(model) for _ in range(threads)], initial, controls)
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    work()
+    return time.perf_counter() - started

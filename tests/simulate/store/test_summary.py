@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dh2sim.errors import RunDamagedError, RunError
+from dh2sim.simulate.store.summary import summarize
+from dh2sim.simulate.store.writer import RunWriter
+from tests.program import contents
+from tests.simulate.store.runs import block_of, layout, make, whole
+
+
+def test_a_finished_run_is_summed_up(tmp_path: Path) -> None:
+    of = layout(rollouts=7, block=3, steps=4)
+    path = make(tmp_path / "run.zarr", of)
+    saturated = int((whole(of)["saturation"] > 0).any(axis=1).sum())
+    assert summarize(str(path)).to_json() == {
+        "path": str(path),
+        "robot": "small",
+        "controller": "hold",
+        "rollouts": 7,
+        "finished": 6,
+        "unstable": 1,
+        "not_run": 0,
+        "reasons": {"bad_qacc": 1},
+        "saturated": saturated,
+        "steps": 8,
+        "timestep": 0.002,
+        "every": 2,
+        "duration": 0.016,
+        "variables": ["qpos", "ctrl", "tool_pose", "contacts", "status", "stop_step", "saturation"],
+        "bytes_on_disk": sum(map(len, contents(path).values())),
+        "blocks": 3,
+        "blocks_done": 3,
+        "seconds": 0.75,
+        "steps_per_second": (6 * 8 + 3) / 0.75,
+        "seed": 0,
+        "created": "2026-11-22T10:00:00+00:00",
+        "versions": {"dh2sim": "0.1.0", "mujoco": "3.17.0", "numpy": "2.4.0", "python": "3.11.0"},
+        "complete": True,
+    }
+
+
+def test_a_run_that_has_not_begun_is_summed_up(tmp_path: Path) -> None:
+    RunWriter.create(tmp_path / "run.zarr", layout()).close()
+    summary = summarize(tmp_path / "run.zarr")
+    assert (summary.finished, summary.unstable, summary.not_run, summary.blocks_done) == (0, 0, 7, 0)
+    assert (summary.seconds, summary.steps_per_second, summary.complete) == (0, None, False)
+    assert json.loads(json.dumps(summary.to_json())) == summary.to_json()
+
+
+def test_rollouts_of_a_block_that_is_not_committed_count_as_not_run(tmp_path: Path) -> None:
+    of = layout()
+    path = make(tmp_path / "run.zarr", of)
+    (path / "qpos" / "c.0.0.0").unlink()
+    (path / "blocks" / "checksum" / "c.2.0").unlink()
+    summary = summarize(path)
+    assert (summary.finished, summary.unstable, summary.not_run) == (2, 1, 4)
+    assert (summary.blocks_done, summary.blocks, summary.seconds) == (1, 3, 0.25)
+
+
+def test_time_that_nobody_knows_does_not_count(tmp_path: Path) -> None:
+    of = layout()
+    with RunWriter.create(tmp_path / "run.zarr", of) as writer:
+        for block, seconds in enumerate((0.5, np.nan, 0.5)):
+            writer.write(block, block_of(of, block), seconds)
+    summary = summarize(tmp_path / "run.zarr")
+    assert summary.seconds == 1.0
+    assert summary.steps_per_second == 4 * 8 / 1.0
+
+
+def test_a_damaged_status_is_told_of(tmp_path: Path) -> None:
+    path = make(tmp_path / "run.zarr", layout())
+    chunk = path / "status" / "c.1"
+    chunk.write_bytes(b"\0" + chunk.read_bytes()[1:])
+    with pytest.raises(RunDamagedError) as caught:
+        summarize(path)
+    assert str(caught.value) == (
+        f"'{path}' is damaged; `dh2sim rollout` with the options it was made with and --resume mends it"
+    )
+
+
+def test_what_is_no_run_is_not_summed_up(tmp_path: Path) -> None:
+    with pytest.raises(RunError) as caught:
+        summarize(tmp_path)
+    assert str(caught.value) == f"'{tmp_path}' is not a run of dh2sim"

@@ -1,0 +1,275 @@
+"""The command itself, cut off in the ways that happen."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import xarray
+
+from dh2sim.cli.running import BAD_INPUT, INTERRUPTED
+from dh2sim.model.build import build_model
+from dh2sim.robot.load import load_robot
+from dh2sim.simulate.prepare import prepare
+from dh2sim.simulate.run import fill
+from dh2sim.simulate.store.reader import open_dataset
+from dh2sim.simulate.store.summary import summarize
+from dh2sim.simulate.store.writer import RunWriter
+from dh2sim.simulate.wish import Wish
+from tests.export.robots import small
+from tests.program import Outcome, contents, dh2sim, dh2sim_process, environment
+
+ROLLOUTS, STEPS, BLOCK = 60, 200, 3
+CONTROLLER = "pd"
+OPTIONS = ("--rollouts", str(ROLLOUTS), "--steps", str(STEPS), "--controller", CONTROLLER, "--start", "random")
+WAIT = 60.0
+
+
+def _begin(folder: Path) -> tuple[Path, RunWriter]:
+    """A run that has not begun, of blocks so small that there are many; whoever resumes it keeps them."""
+    (folder / "small.yaml").write_text(small(), encoding="utf-8")
+    wish = Wish(rollouts=ROLLOUTS, steps=STEPS, controller=CONTROLLER, start="random")
+    job = prepare(build_model(load_robot(folder / "small.yaml")), wish)
+    path = folder / "run.zarr"
+    return path, RunWriter.create(path, replace(job.layout, block=BLOCK))
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path, writer = _begin(tmp_path_factory.mktemp("undisturbed"))
+    with writer:
+        wish = Wish(rollouts=ROLLOUTS, steps=STEPS, controller=CONTROLLER, start="random")
+        fill(writer, prepare(build_model(load_robot(path.parent / "small.yaml")), wish))
+    return path
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    path, writer = _begin(tmp_path)
+    writer.close()
+    return path
+
+
+def _command(run: Path, *more: str) -> list[str]:
+    return ["rollout", str(run.parent / "small.yaml"), "--out", str(run), *OPTIONS, *more]
+
+
+def _start(run: Path, *more: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "dh2sim", *_command(run, "--resume", *more)],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def _blocks(run: Path) -> int:
+    return len(list((run / "blocks" / "checksum").glob("c.*")))
+
+
+def _wait_for_another_block(run: Path, before: int) -> None:
+    end = time.monotonic() + WAIT
+    while _blocks(run) <= before:
+        assert time.monotonic() < end, "no block was written"
+        time.sleep(0.001)
+
+
+def _chunks(run: Path) -> dict[str, bytes]:
+    """Every chunk but for the time that blocks took."""
+    files = {name: data for name, data in contents(run).items() if not name.startswith("blocks/seconds/c")}
+    return {name: data for name, data in files.items() if not name.endswith("zarr.json")}
+
+
+def _assert_same(run: Path, undisturbed: Path) -> None:
+    assert _chunks(run) == _chunks(undisturbed)
+    assert open_dataset(run).load().drop_attrs().identical(open_dataset(undisturbed).load().drop_attrs())
+    ours, theirs = (xarray.open_zarr(path).attrs for path in (run, undisturbed))
+    assert {**ours, "created": "", "command": ""} == {**theirs, "created": "", "command": ""}
+
+
+def _finish(run: Path, *more: str) -> Outcome:
+    outcome = dh2sim(*_command(run, "--resume", *more))
+    assert (outcome.status, outcome.err) == (0, "")
+    return outcome
+
+
+def test_a_command_that_is_killed_again_and_again_ends_as_if_it_had_not_been(run: Path, undisturbed: Path) -> None:
+    for threads in ("1", "2", "3"):
+        before = _blocks(run)
+        process = _start(run, "--threads", threads)
+        _wait_for_another_block(run, before)
+        process.kill()
+        process.communicate()
+        assert process.returncode == -signal.SIGKILL
+    assert summarize(run).not_run > 0
+    _finish(run, "--threads", "1")
+    _assert_same(run, undisturbed)
+
+
+def test_an_interrupt_finishes_the_block_at_hand_and_tells_how_to_carry_on(run: Path, undisturbed: Path) -> None:
+    process = _start(run)
+    _wait_for_another_block(run, 0)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=WAIT)
+    assert process.returncode == INTERRUPTED
+    safe = ROLLOUTS - summarize(run).not_run
+    assert 0 < safe < ROLLOUTS
+    assert safe % BLOCK == 0
+    assert err == (
+        "dh2sim: finishing the rollouts at hand; once more ends at once\n"
+        f"dh2sim: interrupted; {safe} of {ROLLOUTS} rollouts are safe in {run}. "
+        "Carry on with the same command and --resume\n"
+    )
+    assert f"finished {safe}, not run {ROLLOUTS - safe}" in out
+    rest = _finish(run)
+    assert re.search(rf"simulated {ROLLOUTS - safe} in ", rest.out)
+    _assert_same(run, undisturbed)
+
+
+def test_a_second_interrupt_ends_at_once_and_loses_no_committed_block(run: Path, undisturbed: Path) -> None:
+    process = _start(run)
+    _wait_for_another_block(run, 0)
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.005)
+    process.send_signal(signal.SIGINT)
+    err = process.communicate(timeout=WAIT)[1]
+    assert process.returncode in (INTERRUPTED, -signal.SIGINT)
+    assert "Traceback" not in err
+    _finish(run)
+    _assert_same(run, undisturbed)
+
+
+def test_a_finished_run_is_left_alone(run: Path, undisturbed: Path) -> None:
+    _finish(run)
+    before = contents(run)
+    assert "all of them were there already" in _finish(run).out
+    assert contents(run) == before
+
+
+def test_a_run_that_was_damaged_by_hand_is_mended(run: Path, undisturbed: Path) -> None:
+    _finish(run)
+    (run / "qpos" / "c.4.0.0").unlink()
+    (run / "joint" / "zarr.json").write_text("{")
+    (run / "zarr.json").write_text("")
+    chunk = run / "ctrl" / "c.7.0.0"
+    chunk.write_bytes(bytes(byte ^ 1 if at == 40 else byte for at, byte in enumerate(chunk.read_bytes())))
+    told = dh2sim("runs", run)
+    assert (told.status, told.out) == (BAD_INPUT, "")
+    assert told.err == (
+        f"dh2sim: '{run}' is damaged; `dh2sim rollout` with the options it was made with and --resume mends it\n"
+    )
+    assert f"simulated {2 * BLOCK} in " in _finish(run).out
+    _assert_same(run, undisturbed)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--seed", "1"), "seed is 0 there and 1 here"),
+        (("--controller", "hold"), "controller is 'pd' there and 'hold' here"),
+        (("--timestep", "0.001"), "timestep is 0.002 there and 0.001 here"),
+        (("--randomize", "mass=0.1"), "randomize is nothing there and mass=0.1 here"),
+    ],
+)
+def test_other_settings_are_refused(run: Path, options: Sequence[str], told: str) -> None:
+    before = contents(run)
+    outcome = dh2sim(*_command(run, *options, "--resume"))
+    assert (outcome.status, outcome.out, outcome.err) == (
+        BAD_INPUT,
+        "",
+        f"dh2sim: '{run}' was made with other settings: {told}. Give the same options, or write to another --out\n",
+    )
+    assert contents(run) == before
+
+
+def test_another_robot_under_the_same_name_is_refused(run: Path) -> None:
+    (run.parent / "small.yaml").write_text(small(length=0.5), encoding="utf-8")
+    outcome = dh2sim(*_command(run, "--resume"))
+    assert outcome.status == BAD_INPUT
+    assert re.fullmatch(
+        rf"dh2sim: '{run}' was made with other settings: the robot file is another one \(SHA-256 "
+        r"[0-9a-f]{12}… there and [0-9a-f]{12}… here\)\. Give the same options, or write to another --out\n",
+        outcome.err,
+    )
+
+
+def test_an_existing_run_is_overwritten_only_if_that_is_said(run: Path) -> None:
+    before = contents(run)
+    refused = dh2sim(*_command(run))
+    assert (refused.status, refused.err) == (
+        BAD_INPUT,
+        f"dh2sim: '{run}' exists already; --resume carries on with it, --overwrite replaces it\n",
+    )
+    assert contents(run) == before
+    assert dh2sim(*_command(run, "--overwrite")).status == 0
+    assert summarize(run).complete
+
+
+def test_two_commands_do_not_write_to_one_run(run: Path) -> None:
+    process = _start(run)
+    try:
+        _wait_for_another_block(run, 0)
+        outcome = dh2sim(*_command(run, "--resume"))
+    finally:
+        process.kill()
+        process.communicate()
+    assert (outcome.status, outcome.err) == (BAD_INPUT, f"dh2sim: another process is writing to '{run}'\n")
+
+
+FULL = """
+mount -t tmpfs -o size=4m tmpfs "$1" && cd "$1" && cp -r "$2" run.zarr || exit 1
+head -c $(($(stat -f -c '%a * %S' .) - 300000)) /dev/zero > filler
+shift 2
+"$@"
+echo "status $?"
+rm filler
+"$@" > finished && cp -r run.zarr "$COPIED"
+"""
+
+
+def test_on_a_full_disk_a_run_stops_and_carries_on_when_there_is_room(
+    tmp_path: Path, run: Path, undisturbed: Path
+) -> None:
+    command = ["unshare", "--user", "--map-root-user", "--mount"]
+    if not shutil.which("unshare") or subprocess.run([*command, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("needs unshare(1), and leave to make a user namespace")
+    disk, copied = tmp_path / "disk", tmp_path / "copied.zarr"
+    disk.mkdir()
+    program = [sys.executable, "-m", "dh2sim", *_command(run, "--resume")]
+    program[program.index(str(run))] = "run.zarr"
+    done = subprocess.run(
+        [*command, "sh", "-c", FULL, "sh", str(disk), str(run), *program],
+        env=environment(COPIED=str(copied)),
+        capture_output=True,
+        text=True,
+        timeout=2 * WAIT,
+        check=False,
+    )
+    assert done.stdout == "status 2\n", done.stderr
+    told = re.fullmatch(
+        r"dh2sim: cannot write to 'run\.zarr': No space left on device; (\d+) of 60 rollouts are safe\. "
+        r"Make room, then carry on with --resume\n",
+        done.stderr,
+    )
+    assert told is not None, done.stderr
+    assert 0 < int(told[1]) < ROLLOUTS
+    _assert_same(copied, undisturbed)
+
+
+def test_a_folder_that_cannot_be_made_is_told_of(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    outcome = dh2sim_process("rollout", "stanford", "--out", tmp_path / "file" / "run.zarr", "--steps", "1")
+    assert (outcome.status, outcome.out, outcome.err) == (
+        BAD_INPUT,
+        "",
+        f"dh2sim: cannot write to '{tmp_path / 'file' / 'run.zarr'}': Not a directory; nothing was changed\n",
+    )
