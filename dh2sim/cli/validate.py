@@ -8,18 +8,18 @@ import sys
 import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dh2sim.cli.console import make_console, print_whole
+from dh2sim.cli.progress import progress_bar
 from dh2sim.cli.running import FELL_SHORT, build_all, complain
 from dh2sim.errors import Dh2simError, OutputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rich.table import Table
 
     from dh2sim.model.robot_model import RobotModel
@@ -37,6 +37,13 @@ def validate(
         float,
         typer.Option(help="Allowed angle, rad, and distance as a share of the larger of 1 m and the reach."),
     ] = 1e-12,
+    dynamics: Annotated[
+        bool,
+        typer.Option(
+            "--dynamics",
+            help="Simulate, too: energy, momentum, rest, tracking, inverse dynamics, self-contact.",
+        ),
+    ] = False,
     folder: Annotated[
         Path | None,
         typer.Option("--dir", metavar="DIR", help="Read the files in DIR/<name>/ instead of exporting afresh."),
@@ -50,11 +57,13 @@ def validate(
     """Check every engine against the table: poses, Jacobians and dynamics.
 
     Compared are the library itself, MuJoCo on the MJCF and on the URDF, yourdfpy, and pinocchio where it is
-    installed. Exit status 1 if anything differs by more than rounding.
+    installed. With --dynamics the robot is simulated as by 'dh2sim rollout', and must move as physics has it.
+    Exit status 1 if anything differs by more than rounding, or by more than a simulation may.
 
     \b
     Examples:
       dh2sim validate stanford
+      dh2sim validate stanford --dynamics
       dh2sim validate my_arm.yaml --samples 100000 --json report.json
       dh2sim validate robots/*.yaml --dir generated --junit report.xml
     """
@@ -68,20 +77,20 @@ def validate(
     from dh2sim.validate.run import engine_samples, validate_robot
 
     gc.enable()
-    with _warnings_told(), _progress(sum(engine_samples(samples, len(model.joints)) for model in models)) as advance:
-        report = ValidationReport(
-            robots=tuple(
-                validate_robot(
-                    model,
-                    samples=samples,
-                    seed=seed,
-                    tolerance=tolerance,
-                    folder=None if folder is None else folder / model.name,
-                    advance=advance,
-                )
-                for model in models
+    poses = sum(engine_samples(samples, len(model.joints)) for model in models)
+    with _warnings_told(), progress_bar("comparing", "poses", poses) as advance:
+        reports = []
+        for model in models:
+            found = validate_robot(
+                model,
+                samples=samples,
+                seed=seed,
+                tolerance=tolerance,
+                folder=None if folder is None else folder / model.name,
+                advance=advance,
             )
-        )
+            reports.append(_simulated(model, found, seed) if dynamics else found)
+        report = ValidationReport(robots=tuple(reports))
     text = json.dumps(report.to_json(), indent=2)
     if json_file == "-":
         print(text)
@@ -92,6 +101,13 @@ def validate(
     if junit is not None:
         _write(junit, to_junit(report))
     return 0 if report.ok else FELL_SHORT
+
+
+def _simulated(model: RobotModel, report: RobotReport, seed: int) -> RobotReport:
+    """Add the physics checks to a robot's report."""
+    from dh2sim.simulate.physics.run import check_physics
+
+    return replace(report, checks=(*report.checks, *check_physics(model, seed=seed)))
 
 
 def _require_folders(robots: list[str], models: list[RobotModel], folder: Path) -> None:
@@ -124,25 +140,6 @@ def _warnings_told() -> Iterator[None]:
         yield
     finally:
         mujoco.set_mju_user_warning(before)
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar on standard error, if that is a terminal."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    with Progress(
-        TextColumn("comparing"),
-        BarColumn(),
-        TextColumn("{task.completed:,.0f} of {task.total:,.0f} poses"),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-        disable=not sys.stderr.isatty(),
-    ) as bar:
-        task = bar.add_task("", total=total)
-        yield lambda done: bar.advance(task, done)
 
 
 def _print(report: ValidationReport) -> None:

@@ -18,6 +18,12 @@ class Quantity(StrEnum):
     INERTIA = "link inertia"
     UNIT_QUATERNIONS = "unit quaternions"
     FILE = "file"
+    ENERGY = "energy order"
+    MOMENTUM = "momentum"
+    REST = "rest"
+    TRACKING = "tracking"
+    INVERSE = "inverse dynamics"
+    SELF_CONTACT = "self-contact"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,1 @@
+"""Checks of the physics of an exported model."""
