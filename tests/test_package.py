@@ -28,7 +28,11 @@ PUBLIC = {
     "to_scene",
     "to_urdf",
 }
-HEAVY = {"numpy", "mujoco", "pydantic", "ruamel", "rich", "trimesh", "yourdfpy", "pinocchio", "scipy", "lxml"}
+RUNS = {"zarr", "numcodecs", "google_crc32c"}
+TABLES = {"xarray", "pandas", "pyarrow", "h5netcdf", "h5py"}
+PICTURES = {"matplotlib", "PIL", "imageio_ffmpeg"}
+MODELS = {"trimesh", "yourdfpy", "pinocchio", "scipy", "lxml"}
+HEAVY = {"numpy", "mujoco", "pydantic", "ruamel", "rich", *RUNS, *TABLES, *PICTURES, *MODELS}
 
 MODULES = """
 import sys
@@ -97,6 +101,10 @@ def test_importing_the_package_imports_nothing_but_itself() -> None:
         (RUN.format(arguments=["--help"]), set()),
         (RUN.format(arguments=["export", "--help"]), {"pydantic"}),  # typer's own need, for types
         (RUN.format(arguments=["validate", "--help"]), {"pydantic"}),
+        (RUN.format(arguments=["rollout", "--help"]), {"pydantic"}),
+        (RUN.format(arguments=["render", "--help"]), {"pydantic"}),
+        (RUN.format(arguments=["plot", "--help"]), {"pydantic"}),
+        (RUN.format(arguments=["runs", "--help"]), {"pydantic"}),
         (RUN.format(arguments=["--version"]), set()),
         (RUN.format(arguments=["fk", "rpr", "home"]), {"numpy", "pydantic", "ruamel"}),
     ],
@@ -111,3 +119,16 @@ def test_an_export_imports_neither_mesh_library_nor_other_engines(tmp_path: Path
     assert "mujoco" in _imported(RUN.format(arguments=arguments))
     for options in (["--no-verify"], ["--check"]):
         assert "mujoco" not in _imported(RUN.format(arguments=[*arguments, *options]))
+    assert not _imported(RUN.format(arguments=arguments)) & {*RUNS, *TABLES, *PICTURES}
+
+
+def test_a_rollout_imports_neither_tables_nor_pictures(tmp_path: Path) -> None:
+    arguments = ["rollout", "rpr", "--out", str(tmp_path / "run.zarr"), "--rollouts", "2", "--steps", "5"]
+    found = _imported(RUN.format(arguments=arguments))
+    assert {*RUNS, "mujoco"} <= found
+    assert not found & {*TABLES, *PICTURES, *MODELS}
+
+
+def test_a_picture_of_a_robot_imports_nothing_of_runs(tmp_path: Path) -> None:
+    arguments = ["render", "rpr", "--out", str(tmp_path / "rpr.png"), "--size", "64x64"]
+    assert not _imported(RUN.format(arguments=arguments)) & {*RUNS, *TABLES, "matplotlib", "imageio_ffmpeg"}

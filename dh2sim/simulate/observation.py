@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 from mujoco.batch import Batch
-from numpy.typing import NDArray
 
 from dh2sim.simulate.engine import forward
+from dh2sim.simulate.joint_space import JointSpace
 from dh2sim.simulate.plant import Plant
 from dh2sim.simulate.randomization import apply_scales
 from dh2sim.typing import Array
@@ -20,7 +19,7 @@ class BatchObservation:
         """Observe a batch whose simulations have just been given their start."""
         self._plant, self._batch, self._weights = plant, batch, weights
         self._first_q, self._first_v = (7, 6) if plant.floating else (0, 0)
-        self._mass_index = _dense_index(plant.model, self._first_v)
+        self._space = JointSpace(plant)
         self._gravity: Array | None = None
         self._fields: dict[str, Array] = {}
         self.step = 0
@@ -47,13 +46,13 @@ class BatchObservation:
 
     @property
     def mass_matrix(self) -> Array:
-        """Joint-space inertia, shape (batch, n, n)."""
-        return np.take(self._field("M"), self._mass_index, axis=1)
+        """Joint-space inertia, shape (batch, n, n); on a floating base, what the joints feel of it."""
+        return self._space.inertia(self._field("M"))
 
     @property
     def bias(self) -> Array:
         """Coriolis, centrifugal and gravity forces, shape (batch, n)."""
-        return np.array(self._field("qfrc_bias")[:, self._first_v :])
+        return self._space.force(self._field("M"), self._field("qfrc_bias"))
 
     @property
     def passive(self) -> Array:
@@ -80,6 +79,7 @@ class Weights:
     def __init__(self, plant: Plant, simulations: int, threads: int, factors: dict[str, Array]) -> None:
         """Describe the models; nothing is made before it is needed."""
         self._plant, self._simulations, self._threads, self._factors = plant, simulations, threads, factors
+        self._space = JointSpace(plant)
         self._batch: Batch | None = None
 
     def forces(self, qpos: Array) -> Array:
@@ -87,20 +87,7 @@ class Weights:
         if self._batch is None:
             self._batch = Batch(self._plant.model, self._simulations, self._threads)
             apply_scales(self._batch, self._plant, self._factors)
-        force = self._batch.bind("qfrc_bias")
+        mass, force = self._batch.bind("M"), self._batch.bind("qfrc_bias")
         self._batch.bind("qpos")[:] = qpos
         forward(self._batch)
-        return np.array(force[:, self._plant.model.nv - self._plant.n :])
-
-
-def _dense_index(model: mujoco.MjModel, first: int) -> NDArray[np.intp]:
-    """Where MuJoCo's sparse lower triangle of the mass matrix holds each entry of the joints' dense one."""
-    n = model.nv - first
-    index = np.zeros((n, n), dtype=np.intp)
-    for row in range(first, model.nv):
-        start = model.M_rowadr[row]
-        for k in range(start, start + model.M_rownnz[row]):
-            column = model.M_colind[k]
-            if column >= first:
-                index[row - first, column - first] = index[column - first, row - first] = k
-    return index
+        return self._space.force(mass, force)

@@ -18,7 +18,10 @@ from dh2sim.typing import Array
 
 
 class Observation(Protocol):
-    """The states of a group of rollouts at one instant. What is computed on demand is computed once a step."""
+    """The states of a group of rollouts at one instant.
+
+    On a floating base inertia and forces are those that the joints feel while nothing holds the base.
+    """
 
     @property
     def step(self) -> int:
