@@ -191,10 +191,12 @@ def _tell(job: Job, summary: RunSummary, progress: Progress, out: Path) -> None:
     )
     if progress.rollouts:
         rate = progress.rollouts * settings.steps / progress.seconds
-        print(f"  simulated {progress.rollouts:,} in {progress.seconds:.1f} s: {rate:,.0f} steps/s")
+        took = f"{progress.seconds:.1f}" if progress.seconds >= 1.0 else f"{progress.seconds:.2g}"
+        print(f"  simulated {progress.rollouts:,} in {took} s: {rate:,.0f} steps/s")
     else:
         print("  all of them were there already")
-    print(f"  recorded {', '.join(settings.record)}: {size_text(summary.bytes_on_disk)}")
+    recorded = [each.name for each in job.layout.variables if {"step", "interval"} & {*each.dimensions}]
+    print(f"  recorded {', '.join(recorded)}: {size_text(summary.bytes_on_disk)}")
     counts = [f"finished {summary.finished:,}"]
     if summary.unstable:
         reasons = ", ".join(f"{reason} {count:,}" for reason, count in summary.reasons.items())

@@ -30,6 +30,8 @@ class MjcfOptions:
     """'Euler', 'RK4', 'implicit' or 'implicitfast'."""
     energy: bool = False
     """Whether MuJoCo computes the energy at every step."""
+    sensors: bool = True
+    """Whether it evaluates the sensors, which takes some of the time of a small arm's step."""
     floating_base: bool = False
     """Whether base_link floats; it needs mass then, see ``with_base_mass``."""
 
@@ -66,8 +68,9 @@ def to_mjcf(model: RobotModel, options: MjcfOptions = EXPORTED) -> str:
         integrator=options.integrator,
         gravity=numbers(model.spec.gravity),
     )
-    if options.energy:
-        child(option, "flag", energy="enable")
+    flags = {**({"energy": "enable"} if options.energy else {}), **({} if options.sensors else {"sensor": "disable"})}
+    if flags:
+        child(option, "flag", **flags)
     _defaults(mujoco, model)
     materials = _assets(mujoco, model)
     _bodies(mujoco, model, materials, options)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -61,20 +62,35 @@ def simulate_block(
         ControllerError: the controller returned something of the wrong shape.
     """
     plant = plant_of(mjcf, settings)
-    sizes = {**run_sizes(plant, settings), "rollout": len(rollouts)}
-    arrays: dict[str, NDArray[Any]] = {
-        variable.name: np.empty([sizes[name] for name in variable.dimensions], dtype=variable.dtype)
-        for variable in run_variables(plant, settings)
-    }
+    arrays = _empty(plant, settings, rollouts)
     with quiet_engine():
         for first in range(rollouts.start, rollouts.stop, GROUP):
             part = range(first, min(first + GROUP, rollouts.stop))
             rows = slice(part.start - rollouts.start, part.stop - rollouts.start)
             own = {name: array[rows] for name, array in arrays.items()}
-            _simulate(plant, settings, part, threads, own)
+            _simulate(plant, settings, part, threads, own, told=settings.steps)
             if advance is not None:
                 advance(len(part))
     return arrays
+
+
+def rehearse(plant: Plant, settings: Settings) -> None:
+    """Simulate one step of the first rollouts, so that a controller that fails does so before a run is made.
+
+    Raises:
+        ControllerError: it fails.
+    """
+    short, first = replace(settings, steps=1, every=1), range(min(2, settings.rollouts))
+    with quiet_engine():
+        _simulate(plant, short, first, 1, _empty(plant, short, first), told=settings.steps)
+
+
+def _empty(plant: Plant, settings: Settings, rollouts: range) -> dict[str, NDArray[Any]]:
+    sizes = {**run_sizes(plant, settings), "rollout": len(rollouts)}
+    return {
+        variable.name: np.empty([sizes[name] for name in variable.dimensions], dtype=variable.dtype)
+        for variable in run_variables(plant, settings)
+    }
 
 
 def plant_of(mjcf: str, settings: Settings) -> Plant:
@@ -96,15 +112,15 @@ def _compiled(mjcf: str) -> mujoco.MjModel:
         ) from error
 
 
-def _simulate(plant: Plant, settings: Settings, rollouts: range, threads: int, arrays: Block) -> None:
-    """Simulate a group into its part of the block's arrays."""
+def _simulate(plant: Plant, settings: Settings, rollouts: range, threads: int, arrays: Block, *, told: int) -> None:
+    """Simulate a group into its part of the block's arrays; the controller is told of so many steps."""
     factors = scales(plant, settings, rollouts)
     q0, v0 = starts(plant, settings, rollouts)
     qpos0 = np.concatenate([np.tile(_base(plant), (len(q0), 1)), q0], axis=1)
     weights = Weights(plant, len(rollouts), threads, factors)
     lanes = Lanes(
         plant=plant,
-        steps=settings.steps,
+        steps=told,
         rollouts=rollouts,
         q0=read_only(q0),
         v0=read_only(v0),

@@ -19,11 +19,12 @@ from dh2sim.formats.scene import to_scene
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
 from dh2sim.robot.spec import ActuatorType
-from dh2sim.simulate.block import plant_of
+from dh2sim.simulate.block import plant_of, rehearse
 from dh2sim.simulate.controllers.choice import ControllerChoice
 from dh2sim.simulate.controllers.registry import choose
 from dh2sim.simulate.layout import FORMAT, Layout
 from dh2sim.simulate.plant import Plant
+from dh2sim.simulate.records import SENSED
 from dh2sim.simulate.settings import RANDOMIZABLE, Settings
 from dh2sim.simulate.start_text import Start, read_start
 from dh2sim.simulate.starts import check_start
@@ -60,7 +61,7 @@ def prepare(model: RobotModel, wish: Wish, *, command: str = "") -> Job:
 
     Raises:
         SettingsError: the wish cannot be met; the error tells everything that is wrong with it.
-        ControllerError: there is no such controller, or its options are wrong.
+        ControllerError: there is no such controller, its options are wrong, or it fails at once.
         ModelError: an MJCF cannot hold the robot.
     """
     steps, problems = check_wish(wish)
@@ -76,6 +77,7 @@ def prepare(model: RobotModel, wish: Wish, *, command: str = "") -> Job:
         timestep=wish.timestep,
         integrator=wish.integrator_name,
         energy="energy" in wish.record,
+        sensors=not SENSED.isdisjoint(wish.record),
         floating_base=wish.floating_base,
     )
     shown = without_meshes(with_base_mass(model) if wish.floating_base else model)
@@ -84,8 +86,9 @@ def prepare(model: RobotModel, wish: Wish, *, command: str = "") -> Job:
     plant = plant_of(mjcf, settings)
     _check_start(plant, settings)
     _check_randomize(plant, wish.randomize)
-    attributes = _attributes(model, wish, settings, mjcf, to_scene(shown), command)
-    return Job(mjcf=mjcf, settings=settings, layout=_layout(plant, settings, attributes))
+    layout = _layout(plant, settings, _attributes(model, wish, settings, mjcf, to_scene(shown), command))
+    rehearse(plant, settings)
+    return Job(mjcf=mjcf, settings=settings, layout=layout)
 
 
 def _tried(problems: list[str], make: Any) -> Any:
@@ -178,9 +181,10 @@ def _layout(plant: Plant, settings: Settings, attributes: Mapping[str, Any]) -> 
         math.prod(sizes[name] for name in variable.dimensions[1:]) * variable.dtype.itemsize
         for variable in run_variables(plant, settings)
     )
-    if size + TIME_BYTES * settings.records > MOST_BYTES:
+    whole = size + TIME_BYTES * settings.records
+    if whole > MOST_BYTES:
         raise SettingsError(
-            f"one rollout would record {size / 2**30:,.1f} GB, and at most {MOST_BYTES / 2**30:g} GB can be held; "
+            f"one rollout would record {whole / 2**30:,.1f} GB, and at most {MOST_BYTES / 2**30:g} GB can be held; "
             "record a state in so many (--every) or fewer quantities (--record)"
         )
     block = max(1, min(settings.rollouts, BLOCK_BYTES // size, BLOCK_STEPS // settings.steps))

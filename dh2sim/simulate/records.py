@@ -17,6 +17,8 @@ DERIVED = ("tool_pose", "energy")
 """Likewise, but computed from the state by MuJoCo."""
 INTERVALS = ("ctrl", "qacc", "torque", "contacts")
 """Known at the beginning of every interval."""
+SENSED = frozenset({"tool_pose", "torque"})
+"""Read from the model's sensors."""
 
 Arrays = Mapping[str, NDArray[Any]]
 

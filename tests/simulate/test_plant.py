@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dh2sim.errors import EngineError
+from dh2sim.model.build import build_model
+from dh2sim.robot.spec import ActuatorType, Convention, Limits, RobotSpec, Row
+from dh2sim.simulate.block import plant_of
+from dh2sim.simulate.plant import Plant
+from dh2sim.simulate.prepare import prepare
+from dh2sim.simulate.wish import Wish
+from tests.model.samples import CONTINUOUS, FIXED, PRISMATIC, REVOLUTE, model
+from tests.simulate import robots
+
+
+def plant(name: str = "odd", *, controller: str = "tests.simulate.drivers:Wave", floating: bool = False) -> Plant:
+    robot = model(name) if name != "arm" else robots.arm(ActuatorType.VELOCITY)
+    job = prepare(robot, Wish(rollouts=1, steps=1, timestep=0.003, controller=controller, floating_base=floating))
+    return plant_of(job.mjcf, job.settings)
+
+
+@pytest.mark.parametrize("floating", [False, True], ids=["fixed", "floating"])
+def test_joints_are_those_of_the_table_that_move(floating: bool) -> None:
+    made = plant(floating=floating)
+    assert made.joints == ("one", "two", "four", "five", "six")
+    assert made.turns == (True, False, True, False, True)
+    assert made.n == 5
+    assert made.timestep == 0.003
+    assert made.floating is floating
+    assert made.model.nv == 5 + 6 * floating
+    assert made.home.tolist() == [0.4, 0.2, -2.5, 0.3, 1.1]
+
+
+@pytest.mark.parametrize("floating", [False, True], ids=["fixed", "floating"])
+def test_limits_are_those_of_the_model_and_infinite_where_there_are_none(floating: bool) -> None:
+    made, robot = plant(floating=floating), model("odd")
+    for i, joint in enumerate(robot.moving_joints):
+        wanted = (-np.inf, np.inf) if joint.range is None else (joint.range.lower, joint.range.upper)
+        assert (made.lower[i], made.upper[i]) == wanted
+        assert made.velocity[i] == joint.velocity
+    assert (made.lower[2], made.upper[2]) == (-np.inf, np.inf)
+    assert (made.lower[0], made.upper[0]) == (-2.0, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("controller", "floating"),
+    [("tests.simulate.drivers:Wave", False), ("tests.simulate.drivers:Wave", True), ("pd", True)],
+)
+def test_each_actuator_knows_its_joint_and_its_range(controller: str, floating: bool) -> None:
+    made, robot = plant(controller=controller, floating=floating), model("odd")
+    kind = "motor" if controller == "pd" else "position"
+    assert made.actuators == tuple(f"{name}_{kind}" for name in made.joints)
+    assert made.driven == (0, 1, 2, 3, 4)
+    if kind == "position":
+        assert np.array_equal(made.control_lower, made.lower)
+        assert np.array_equal(made.control_upper, made.upper)
+    else:
+        efforts = [joint.effort for joint in robot.moving_joints]
+        assert made.control_upper.tolist() == efforts
+        assert (-made.control_lower).tolist() == efforts
+
+
+def test_velocity_actuators_range_over_the_velocity_limits() -> None:
+    made = plant("arm")
+    assert made.actuators == ("joint_1_velocity", "joint_2_velocity")
+    assert made.control_upper.tolist() == [3.0, 3.0]
+
+
+def test_without_actuators_there_are_none() -> None:
+    made = plant(controller="passive")
+    assert (made.actuators, made.driven) == ((), ())
+    assert made.control_lower.shape == (0,)
+
+
+def test_actuators_of_some_joints_only_know_which() -> None:
+    rows = tuple(
+        Row(
+            name=name,
+            type=kind,
+            convention=Convention.STANDARD,
+            a=0.2,
+            alpha=0.3,
+            limits=Limits(),
+            actuator=robots.actuator(driven),
+        )
+        for name, kind, driven in (
+            ("base", REVOLUTE, "none"),
+            ("spacer", FIXED, "position"),
+            ("slide", PRISMATIC, "motor"),
+            ("wheel", CONTINUOUS, "velocity"),
+        )
+    )
+    robot = build_model(RobotSpec(name="some", rows=rows))
+    job = prepare(robot, Wish(rollouts=1, steps=1, controller="random"))
+    made = plant_of(job.mjcf, job.settings)
+    assert made.actuators == ("slide_motor", "wheel_velocity")
+    assert made.driven == (1, 2)
+    labels = {item.name: list(item.values) for item in job.layout.coordinates}
+    assert labels["actuator_unit"] == ["N", "rad/s"]
+    assert labels["joint_unit"] == ["rad", "m", "rad"]
+
+
+def test_arrays_cannot_be_written() -> None:
+    made = plant()
+    for name in ("lower", "upper", "velocity", "kp", "kv", "home", "control_lower", "control_upper"):
+        assert not getattr(made, name).flags.writeable
+
+
+def test_gains_are_those_that_position_actuators_would_have() -> None:
+    made = plant(controller="pd")
+    assert made.kp.tolist() == [joint.actuator.kp for joint in model("odd").moving_joints]
+    assert made.kv.tolist() == [joint.actuator.kv for joint in model("odd").moving_joints]
+    assert (made.kp > 0.0).all()
+
+
+def test_a_model_that_mujoco_refuses_is_an_error_in_one_line() -> None:
+    job = prepare(model("odd"), Wish(rollouts=1, steps=1))
+    with pytest.raises(EngineError) as caught:
+        plant_of(job.mjcf.replace('type="slide"', 'type="slid"', 1), job.settings)
+    assert str(caught.value).startswith("MuJoCo refuses the robot as it would be simulated: ")
+    assert "slid" in str(caught.value)
+    assert "\n" not in str(caught.value)
