@@ -132,8 +132,9 @@ def add_trace(scene: Any, points: Array, radius: float) -> None:
         rgba = np.array([*(old + (new - old) * ((k + 1) / count)), 1.0], dtype=np.float32)
         mujoco.mjv_initGeom(geom, cylinder, nothing, nothing, upright, rgba)
         mujoco.mjv_connector(geom, cylinder, radius, points[k], points[k + 1])
-        # decoration casts no shadow
+        # decoration casts no shadow, and is not what stood in this place of the scene before
         geom.category = mujoco.mjtCatBit.mjCAT_DECOR.value
+        geom.objtype, geom.objid, geom.segid = mujoco.mjtObj.mjOBJ_UNKNOWN.value, -1, -1
         geom.emission, geom.specular, geom.shininess = 0.3, 0.0, 0.0
         scene.ngeom += 1
 
