@@ -207,3 +207,16 @@ class Damper(Nothing):
 
     def control(self, observation: Observation) -> Array:
         return -observation.v
+
+
+class Drawn:
+    """Keeps the first numbers that it draws."""
+
+    actuation = "motor"
+
+    def __init__(self, lanes: Lanes) -> None:
+        count = len(lanes.plant.actuators)
+        self._drawn = np.stack([source.random(count) for source in lanes.generators])
+
+    def controls(self, first: int, count: int) -> Array:
+        return self._drawn[:, None]

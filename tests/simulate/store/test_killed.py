@@ -13,7 +13,7 @@ from dh2sim.simulate.store.summary import summarize
 from tests.simulate.store.runs import lasting, layout, make, resume, whole
 from tests.simulate.store.workers import workers
 
-ROLLOUTS = 60
+ROLLOUTS = 100
 BEFORE_A_BLOCK, AFTER_A_BLOCK = 5, 10
 """Kills at any moment of the first fraction of a second, and of a short while after a block was committed."""
 

@@ -19,13 +19,14 @@ import zarr
 from tests.simulate.store.runs import finish, layout
 from dh2sim.simulate.store.writer import RunWriter
 path, rollouts = Path(sys.argv[1]), int(sys.argv[2])
-for _ in sys.stdin:
+while sys.stdin.readline():
     child = os.fork()  # before any thread of zarr's is started
     if child == 0:
         with RunWriter.resume(path, layout(rollouts=rollouts, block=1)) as writer:
             finish(writer)
         os._exit(0)
     print(child, flush=True)
+    sys.stdin.readline()  # until then a child that has ended keeps its id
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
 
@@ -38,15 +39,19 @@ class Workers:
 
     def start(self) -> int:
         """Start one and return its id."""
-        assert self._process.stdin is not None
-        self._process.stdin.write("go\n")
-        self._process.stdin.flush()
+        self._say("go")
         return int(self._read())
 
     def kill(self, worker: int) -> int:
         """Kill one outright, and return its exit status."""
-        os.kill(worker, signal.SIGKILL)  # nobody has waited for it yet, so its id is still its own
+        os.kill(worker, signal.SIGKILL)
+        self._say("killed")
         return int(self._read())
+
+    def _say(self, word: str) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{word}\n")
+        self._process.stdin.flush()
 
     def _read(self) -> str:
         assert self._process.stdout is not None
