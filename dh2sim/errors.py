@@ -40,6 +40,10 @@ class RobotFileError(Dh2simError):
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
 
+class ImportedFileError(RobotFileError):
+    """A file that a robot is to be made from is wrong: a URDF, an MJCF, a table, axes."""
+
+
 class UnknownRobotError(Dh2simError):
     """Neither a file nor a robot that comes with dh2sim has this name."""
 

@@ -41,8 +41,18 @@ a file in degrees write `atan2(3, 4) * 180 / pi`. NaN and infinity are errors.
 
 ## Units
 
-Lengths and angles are in the file's units (`units`; m and rad by default): `a`, `alpha`, `d`, `theta`, poses, limits,
-configurations, `com`, `radius`. Everything else is SI. Every export is in m and rad.
+Lengths and angles are in the file's units (`units`; m and rad by default): `a`, `alpha`, `d`, `theta`, `beta`, poses,
+limits, configurations, `com`, `radius`. Everything else is SI. Every export is in m and rad.
+
+## Conventions
+
+`convention` says how a row's numbers are read: [docs/conventions.md](conventions.md). A Hayati row, for nearly
+parallel axes, has a second twist `beta`, and a `d` only if it slides; `beta` in any other row is an error.
+
+## Meshes
+
+A mesh shows a link instead of the shapes made from the table, and has no mass. It stands in the link's DH frame, or
+where its `xyz` and `rpy` put it from there.
 
 ## What is filled in
 

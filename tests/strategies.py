@@ -1,6 +1,6 @@
 """Random robots, and joint vectors for them, built as values: no file is read.
 
-Right angles hide errors: odd twists, offsets, flips, prismatic and fixed rows, both conventions come mixed.
+Right angles hide errors: odd twists, offsets, flips, prismatic and fixed rows, all conventions come mixed.
 """
 
 from __future__ import annotations
@@ -94,17 +94,19 @@ def limits_for(draw: DrawFn, joint_type: JointType) -> Limits:
 
 @st.composite
 def rows(draw: DrawFn, name: str, types: SearchStrategy[JointType] | None = None) -> Row:
-    """Rows of the table, of either convention."""
+    """Rows of the table, of any convention; a Hayati row has a d only if it slides."""
     joint_type = draw(types if types is not None else st.sampled_from(JointType))
-    moves = joint_type.moves
+    convention = draw(st.sampled_from(Convention))
+    hayati, moves = convention is Convention.HAYATI, joint_type.moves
     return Row(
         name=name,
         type=joint_type,
-        convention=draw(st.sampled_from(Convention)),
+        convention=convention,
         a=draw(lengths),
         alpha=draw(angles),
-        d=draw(lengths),
+        d=0.0 if hayati and joint_type is not JointType.PRISMATIC else draw(lengths),
         theta=draw(angles),
+        beta=draw(angles) if hayati else 0.0,
         flip=moves and draw(st.booleans()),
         limits=draw(limits_for(joint_type)),
         dynamics=Dynamics(damping=0.1, friction=0.05, armature=0.01) if moves and draw(st.booleans()) else Dynamics(),

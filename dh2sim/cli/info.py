@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from dh2sim.model.robot_model import JointModel, RobotModel
     from dh2sim.robot.spec import Row
 
+_TITLES = {"standard": "standard", "modified": "modified", "hayati": "Hayati"}
+
 
 def info(
     robot: Annotated[
@@ -75,6 +77,7 @@ def _row_dict(row: Row, joint: JointModel) -> dict[str, Any]:
         "alpha": row.alpha,
         "d": row.d,
         "theta": row.theta,
+        "beta": row.beta,
         "flip": row.flip,
         "limits": None
         if not row.type.moves
@@ -112,11 +115,13 @@ def _dh_table(model: RobotModel) -> Any:
     mixed = len(conventions) > 1
     modified = not mixed and spec.rows[0].convention.value == "modified"
     a, alpha = ("a i-1", "alpha i-1") if modified else ("a i", "alpha i")
-    title = "mixed conventions" if mixed else f"{spec.rows[0].convention.value} convention"
+    twice = any(row.convention.value == "hayati" for row in spec.rows)
+    title = "mixed conventions" if mixed else f"{_TITLES[spec.rows[0].convention.value]} convention"
     table = Table(box=box.SIMPLE_HEAD, title=f"DH table, {title}", title_justify="left", pad_edge=False)
     for column in ("i", "joint", "type", *(("convention",) if mixed else ())):
         table.add_column(column, no_wrap=True)
-    for column in (f"{a}\nm", f"{alpha}\ndeg", "d i\nm", "theta i\ndeg", "limits"):
+    beta = ("beta i\ndeg",) if twice else ()
+    for column in (f"{a}\nm", f"{alpha}\ndeg", *beta, "d i\nm", "theta i\ndeg", "limits"):
         table.add_column(column, justify="right", no_wrap=True)
     for i, (row, joint) in enumerate(zip(spec.rows, model.joints, strict=True), start=1):
         table.add_row(
@@ -126,11 +131,23 @@ def _dh_table(model: RobotModel) -> Any:
             *((row.convention.value,) if mixed else ()),
             _short(row.a),
             _short(math.degrees(row.alpha)),
-            _variable(f"d{i}", row.d, row) if row.type.value == "prismatic" else _short(row.d),
+            *((_beta(row),) if twice else ()),
+            _offset(i, row),
             _variable(f"θ{i}", math.degrees(row.theta), row) if row.type.turns else _short(math.degrees(row.theta)),
             _limits(row, joint),
         )
     return table
+
+
+def _beta(row: Row) -> str:
+    return _short(math.degrees(row.beta)) if row.convention.value == "hayati" else ""
+
+
+def _offset(i: int, row: Row) -> str:
+    if row.type.value == "prismatic":
+        return _variable(f"d{i}", row.d, row)
+    # nearly parallel axes have no joint offset
+    return "" if row.convention.value == "hayati" and row.d == 0.0 else _short(row.d)
 
 
 def _variable(name: str, offset: float, row: Row) -> str:

@@ -195,7 +195,7 @@ def _geoms(
             class_=f"{model.name}_visual",
             mesh=link.name,
             material=material,
-            **placed(T_link_dh),
+            **placed(compose(T_link_dh, link.mesh.T_dh_mesh)),  # of the file's frame; MuJoCo sees to its own
         )
     kind = "shape" if link.mesh is None else "collision"
     # a base that does not move needs no mass, and so MuJoCo gives it no principal frame of its own; that of one that

@@ -10,8 +10,9 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 
 from dh2sim.formats.xml import child, numbers
+from dh2sim.kinematics.tensors import rotate_tensor
 from dh2sim.kinematics.transforms import identity, quaternion_from_rotation
-from dh2sim.model.mass import MassProperties, rotate_tensor
+from dh2sim.model.mass import MassProperties
 from dh2sim.typing import Array
 
 NEAR = 1e-5

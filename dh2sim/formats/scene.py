@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from dh2sim.formats.xml import child, document, number, numbers, provenance
 from dh2sim.kinematics.forward import reference_joint_poses
+from dh2sim.kinematics.tensors import move_point
 from dh2sim.kinematics.transforms import identity
-from dh2sim.model.mass import move_point
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import read_only
 

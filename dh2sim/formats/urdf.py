@@ -82,7 +82,7 @@ def _link(robot: ET.Element, link: LinkModel, T_link_dh: Array, materials: dict[
         _inertial(element, link.inertial)
     if link.mesh is not None:
         visual = child(element, "visual")
-        _origin(visual, T_link_dh)
+        _origin(visual, compose(T_link_dh, link.mesh.T_dh_mesh))
         scale = numbers([link.mesh.scale] * 3)
         child(child(visual, "geometry"), "mesh", filename=f"meshes/{link.mesh.file_name}", scale=scale)
         child(visual, "material", name=materials[link.color])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from dh2sim.kinematics.transforms import compose, identity, joint_part, link_part, pose_from_rpy
+from dh2sim.kinematics.transforms import compose, identity, joint_part, link_part, pose_from_rpy, second_twist
 from dh2sim.robot.spec import Convention, JointType, RobotSpec
 from dh2sim.typing import Array
 
@@ -47,12 +47,12 @@ class KinematicChain:
 def build_chain(spec: RobotSpec) -> KinematicChain:
     """Turn a Denavit-Hartenberg table into a chain of joint-placed bodies.
 
-    With X = Tx(a) Rx(alpha) and Z = Rz(theta) Tz(d), a row's transform is Z X (standard) or X Z (modified).
-    The joint moves in Z, so the X of a standard row stands behind its joint and goes in front of the next. A
-    fixed row becomes a joint that does not move.
+    With X = Tx(a) Rx(alpha) and Z = Rz(theta) Tz(d), a row's transform is Z X (standard), X Z (modified) or
+    Z X Ry(beta) (Hayati). The joint moves in Z, so what follows Z in a row stands behind its joint and goes in
+    front of the next. A fixed row becomes a joint that does not move.
 
     Args:
-        spec: The robot; rows of both conventions may be mixed.
+        spec: The robot; rows of all conventions may be mixed.
 
     Returns:
         One joint for every row; its transforms are the same bits on every machine.
@@ -67,6 +67,8 @@ def build_chain(spec: RobotSpec) -> KinematicChain:
                 T_dh_joint, T_joint_dh = joint, link
             case Convention.MODIFIED:
                 T_dh_joint, T_joint_dh = compose(link, joint), identity()
+            case Convention.HAYATI:
+                T_dh_joint, T_joint_dh = joint, compose(link, second_twist(row.beta))
         joints.append(
             Joint(
                 name=row.name,

@@ -66,6 +66,8 @@ def row_matrix(row: Row, q: Array) -> Array:
 
     Standard: M. W. Spong, S. Hutchinson, M. Vidyasagar, Robot Modeling and Control, 2006, section 3.2.
     Modified: J. J. Craig, Introduction to Robotics, 3rd ed., 2005, section 3.6.
+    Hayati: S. Hayati, M. Mirmirani, Improving the absolute positioning accuracy of robot manipulators, J. Robotic
+    Systems 2(4), 1985; a prismatic row's d slides along z before a.
 
     Args:
         row: The row of the table.
@@ -78,24 +80,28 @@ def row_matrix(row: Row, q: Array) -> Array:
     theta = row.theta + coordinate if row.type.turns else np.full(q.shape, row.theta)
     d = row.d + coordinate if row.type.moves and not row.type.turns else np.full(q.shape, row.d)
     ct, st, ca, sa = np.cos(theta), np.sin(theta), math.cos(row.alpha), math.sin(row.alpha)
+    cb, sb = math.cos(row.beta), math.sin(row.beta)
     zero, one, a = np.zeros(q.shape), np.ones(q.shape), np.full(q.shape, row.a)
-    if row.convention is Convention.STANDARD:  # Rz(theta) Tz(d) Tx(a) Rx(alpha)
-        return np.array(
-            [
+    match row.convention:
+        case Convention.STANDARD:  # Rz(theta) Tz(d) Tx(a) Rx(alpha)
+            matrix = [
                 [ct, -st * ca, st * sa, a * ct],
                 [st, ct * ca, -ct * sa, a * st],
                 [zero, one * sa, one * ca, d],
-                [zero, zero, zero, one],
             ]
-        )
-    return np.array(  # Tx(a) Rx(alpha) Rz(theta) Tz(d)
-        [
-            [ct, -st, zero, a],
-            [st * ca, ct * ca, -one * sa, -sa * d],
-            [st * sa, ct * sa, one * ca, ca * d],
-            [zero, zero, zero, one],
-        ]
-    )
+        case Convention.MODIFIED:  # Tx(a) Rx(alpha) Rz(theta) Tz(d)
+            matrix = [
+                [ct, -st, zero, a],
+                [st * ca, ct * ca, -one * sa, -sa * d],
+                [st * sa, ct * sa, one * ca, ca * d],
+            ]
+        case Convention.HAYATI:  # Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)
+            matrix = [
+                [ct * cb - st * sa * sb, -st * ca, ct * sb + st * sa * cb, a * ct],
+                [st * cb + ct * sa * sb, ct * ca, st * sb - ct * sa * cb, a * st],
+                [-one * ca * sb, one * sa, one * ca * cb, d],
+            ]
+    return np.array([*matrix, [zero, zero, zero, one]])
 
 
 def _block_poses(spec: RobotSpec, columns: Array, poses: Array) -> None:

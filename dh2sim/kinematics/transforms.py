@@ -77,6 +77,19 @@ def joint_part(theta: float, d: float) -> Array:
     return _transform(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, d))
 
 
+def second_twist(beta: float) -> Array:
+    """Return the second twist of a Hayati row, Ry(beta).
+
+    Args:
+        beta: rad.
+
+    Returns:
+        Shape (4, 4).
+    """
+    s, c = sin_cos(beta)
+    return _transform(((c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c)), (0.0, 0.0, 0.0))
+
+
 def pose_from_rpy(xyz: ArrayLike, rpy: ArrayLike) -> Array:
     """Return the transform of a position and URDF angles, R = Rz(yaw) Ry(pitch) Rx(roll).
 

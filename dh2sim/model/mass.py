@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from dh2sim.kinematics.tensors import move_point, rotate_tensor
 from dh2sim.model.shapes import Shape, ShapeKind
 from dh2sim.typing import Array, read_only
 
@@ -72,18 +73,6 @@ def shift_inertia(inertia: Array, mass: float, offset: list[float]) -> Array:
     )
 
 
-def rotate_tensor(T: Array, tensor: Array) -> Array:
-    """R A Rᵀ, shape (3, 3), with R the rotation of the pose ``T``; exactly symmetric."""
-    R = [[float(T[i, j]) for j in range(3)] for i in range(3)]
-    A = [[float(tensor[i, j]) for j in range(3)] for i in range(3)]
-    RA = [[R[i][0] * A[0][j] + R[i][1] * A[1][j] + R[i][2] * A[2][j] for j in range(3)] for i in range(3)]
-    out = [[0.0] * 3 for _ in range(3)]
-    for i in range(3):
-        for j in range(i, 3):
-            out[i][j] = out[j][i] = RA[i][0] * R[j][0] + RA[i][1] * R[j][1] + RA[i][2] * R[j][2] + 0.0
-    return read_only(out)
-
-
 def made_possible(inertia: Array) -> Array:
     """The inertia, shape (3, 3), of a body of which no two principal moments make less than the third.
 
@@ -125,14 +114,3 @@ def in_frame(T: Array, body: MassProperties) -> MassProperties:
     return MassProperties(
         mass=body.mass, com=read_only(move_point(T, body.com)), inertia=rotate_tensor(T, body.inertia)
     )
-
-
-def move_point(T: Array, point: Array) -> list[float]:
-    """A point (m, shape (3,)) of frame b in frame a, with T_a_b of shape (4, 4)."""
-    return [
-        float(T[i, 0]) * float(point[0])
-        + float(T[i, 1]) * float(point[1])
-        + float(T[i, 2]) * float(point[2])
-        + float(T[i, 3])
-        for i in range(3)
-    ]

@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dh2sim.errors import MeshError
+from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.robot.spec import MeshSpec
+from dh2sim.typing import Array
 
 if TYPE_CHECKING:
     import trimesh
@@ -23,7 +25,7 @@ STL_HEADER, STL_FACE = 84, 50
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MeshAsset:
-    """A mesh file as it is exported; it shows a link in the link's DH frame."""
+    """A mesh file as it is exported; it shows a link, placed in the link's DH frame."""
 
     file_name: str
     """Name in the export's ``meshes`` folder."""
@@ -31,6 +33,8 @@ class MeshAsset:
     """A binary STL file."""
     scale: float
     """Metres per unit of the file."""
+    T_dh_mesh: Array = field(repr=False)
+    """Pose of the mesh's own frame in the link's DH frame, shape (4, 4)."""
     converted_from: str | None
     """Suffix of the original where it was no binary STL file, such as ``.glb``; colours and textures are lost."""
 
@@ -39,7 +43,7 @@ def load_mesh(mesh: MeshSpec, link_name: str) -> MeshAsset:
     """Read a mesh file.
 
     Args:
-        mesh: which file, and its scale.
+        mesh: which file, its scale and its pose.
         link_name: names the exported file.
 
     Raises:
@@ -57,7 +61,13 @@ def load_mesh(mesh: MeshSpec, link_name: str) -> MeshAsset:
         data, converted = original, None
     else:
         data, converted = bytes(surface.export(file_type="stl")), suffix
-    return MeshAsset(file_name=f"{link_name}.stl", data=data, scale=mesh.scale, converted_from=converted)
+    return MeshAsset(
+        file_name=f"{link_name}.stl",
+        data=data,
+        scale=mesh.scale,
+        T_dh_mesh=pose_from_rpy(mesh.pose.xyz, mesh.pose.rpy),
+        converted_from=converted,
+    )
 
 
 def _read(mesh: MeshSpec) -> trimesh.Trimesh:

@@ -29,7 +29,7 @@ class LinkModel:
     joint_color: Color
     """Of the joint bodies."""
     mesh: MeshAsset | None
-    """Shows the link instead of its shapes; placed in DH frame i."""
+    """Shows the link instead of its shapes; placed from DH frame i."""
     inertial: MassProperties | None
     """In the joint frame; None for a fixed link without shapes or mass, and for a base link that does not move."""
     estimated: tuple[str, ...]

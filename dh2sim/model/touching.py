@@ -10,7 +10,7 @@ import numpy as np
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import reference_joint_poses
-from dh2sim.model.mass import move_point
+from dh2sim.kinematics.tensors import move_point
 from dh2sim.model.shapes import Shape
 from dh2sim.typing import Array
 

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from typing import Final
 
 from dh2sim.robot.document import Node
-from dh2sim.robot.fields import name_problem
-from dh2sim.robot.report import Loc, Report
+from dh2sim.robot.fields import is_reserved, name_problem
+from dh2sim.robot.report import Loc, Report, path_of
 from dh2sim.robot.rows import RowView, choice_at, number_at, row_views
-from dh2sim.robot.spec import ActuatorType, JointType
+from dh2sim.robot.spec import ActuatorType, Convention, JointType
 from dh2sim.robot.words import listed, shown
 
-_RESERVED: Final = re.compile(r"base_link-base|flange-tool0|base_link-dh_0|link_[0-9]+-(flange|dh_[0-9]+)")
 _SLACK: Final = 1e-12
 """By which a configuration may pass a limit, of the larger of the two limits' sizes."""
 _TAKEN_BY: Final = {
@@ -27,14 +25,15 @@ _TAKEN_BY: Final = {
 def check(root: Node, names: Mapping[str, float], report: Report) -> None:
     """Note in ``report`` what does not go together; ``names`` are the evaluated parameters."""
     rows = row_views(root, names)
-    _check_names(rows, report)
+    check_names(rows, report)
     for row in rows:
-        _check_type(row, report)
-    _check_configurations(root, rows, names, report)
-    _check_actuators(root, rows, report)
+        check_type(row, report)
+        _check_convention(row, root, report)
+    check_configurations(root, rows, names, report)
+    check_actuators(root, rows, report)
 
 
-def _check_names(rows: Sequence[RowView], report: Report) -> None:
+def check_names(rows: Sequence[RowView], report: Report) -> None:
     """Joint names are unique, and none is one that the exports need."""
     first: dict[str, RowView] = {}
     for row in rows:
@@ -42,21 +41,21 @@ def _check_names(rows: Sequence[RowView], report: Report) -> None:
             continue
         given = row.node.at("name")
         place = given or row.node
-        loc: Loc = ("joints", row.index, "name") if given else ("joints", row.index)
-        if _RESERVED.fullmatch(row.name):
+        loc: Loc = (*row.loc, "name") if given else row.loc
+        if is_reserved(row.name):
             message = f"{shown(row.name)} is the name of a fixed joint in the exports; choose another"
             report.add(place.line, place.column, loc, message)
         other = first.setdefault(row.name, row)
         if other is not row:
             line = (other.node.at("name") or other.node).line
             what = "joint name" if given else "default joint name"
-            message = f"duplicate {what} {shown(row.name)}; joints[{other.index}] on line {line} has it already"
+            message = f"duplicate {what} {shown(row.name)}; {path_of(other.loc)} on line {line} has it already"
             report.add(place.line, place.column, loc, message)
 
 
-def _check_type(row: RowView, report: Report) -> None:
+def check_type(row: RowView, report: Report) -> None:
     """A row has nothing that its type has no use for."""
-    node, here = row.node, ("joints", row.index)
+    node, here = row.node, row.loc
     if row.type is JointType.CONTINUOUS and (entry := node.entry("limits", "position")):
         message = "a continuous joint has no position limits; make it revolute or remove them"
         report.add(entry.line, entry.column, (*here, "limits", "position"), message)
@@ -69,7 +68,24 @@ def _check_type(row: RowView, report: Report) -> None:
             report.add(entry.line, entry.column, (*here, key), message)
 
 
-def _check_configurations(root: Node, rows: Sequence[RowView], names: Mapping[str, float], report: Report) -> None:
+def _check_convention(row: RowView, root: Node, report: Report) -> None:
+    """A row has no parameter that its convention has no use for."""
+    node, here = row.node, row.loc
+    convention = choice_at(node.at("convention") or root.at("convention"), Convention)
+    if convention is Convention.HAYATI:
+        entry = node.entry("d") if row.type not in (None, JointType.PRISMATIC) else None
+        if entry is not None:
+            message = f"a {row.type} Hayati row takes no 'd', which nearly parallel axes leave free; "
+            message += "use 'a' and 'beta', or another convention for this row"
+            report.add(entry.line, entry.column, (*here, "d"), message)
+    elif convention is not None and (entry := node.entry("beta")):
+        message = f"a {convention} row takes no 'beta', the second twist of a row of 'convention: hayati'"
+        report.add(entry.line, entry.column, (*here, "beta"), message)
+
+
+def check_configurations(
+    root: Node, rows: Sequence[RowView], names: Mapping[str, float], report: Report, *, each: str = "moving row"
+) -> None:
     """Configurations have proper names, a value for each moving row, and each value within its limits."""
     node = root.at("configurations")
     if node is None or not isinstance(node.value, dict):
@@ -84,8 +100,8 @@ def _check_configurations(root: Node, rows: Sequence[RowView], names: Mapping[st
         if not countable or not isinstance(values.value, list):
             continue
         if len(values.value) != len(moving):
-            joints = listed(row.name or f"joints[{row.index}]" for row in moving)
-            expected = f"expected {len(moving)} numbers, one for each moving row ({joints})"
+            joints = listed(row.name or path_of(row.loc) for row in moving)
+            expected = f"expected {len(moving)} numbers, one for each {each} ({joints})"
             message = f"{expected}, found a list of {len(values.value)}"
             report.add(values.line, values.column, loc, message)
             continue
@@ -102,16 +118,16 @@ def _outside(value: float, row: RowView) -> str | None:
     slack = _SLACK * max(abs(lower), abs(upper))
     if math.isnan(slack) or lower >= upper or not (value < lower - slack or value > upper + slack):
         return None
-    return f"{value!r} is outside the limits of {row.name or f'joints[{row.index}]'}: {lower!r} to {upper!r}"
+    return f"{value!r} is outside the limits of {row.name or path_of(row.loc)}: {lower!r} to {upper!r}"
 
 
-def _check_actuators(root: Node, rows: Sequence[RowView], report: Report) -> None:
+def check_actuators(root: Node, rows: Sequence[RowView], report: Report) -> None:
     """An actuator has only the gains that its type uses."""
     default = _actuator_type(root.at("actuators"), ActuatorType.POSITION)
     _check_gains(root, ("actuators",), default, report)
     for row in rows:
         if row.type is not JointType.FIXED:
-            place: Loc = ("joints", row.index, "actuator")
+            place: Loc = (*row.loc, "actuator")
             _check_gains(root, place, _actuator_type(root.at(*place), default), report)
 
 

@@ -24,8 +24,13 @@ MAX_DEPTH: Final = 32
 MAX_NODES: Final = 50_000
 
 
-def compose(text: str, report: Report) -> Node:
+def compose(text: str, report: Report, needs: str = "a robot needs at least name, convention and joints") -> Node:
     """Return the tree of a YAML document; problems that leave a tree are noted in ``report``.
+
+    Args:
+        text: The document.
+        report: Where problems are noted.
+        needs: What an empty file is told that it needs.
 
     Raises:
         RobotFileError: There is no tree, with everything noted so far.
@@ -34,7 +39,7 @@ def compose(text: str, report: Report) -> Node:
     for event in _events(text, report):
         composer.take(event)
     if composer.root is None:
-        report.add(1, 1, (), "the file is empty; a robot needs at least name, convention and joints")
+        report.add(1, 1, (), f"the file is empty; {needs}")
         raise report.error()
     return composer.root
 

@@ -91,6 +91,7 @@ class _Converter:
             alpha=units.radians(joint.alpha),
             d=units.metres(joint.d),
             theta=units.radians(joint.theta),
+            beta=units.radians(joint.beta),
             flip=joint.flip,
             limits=self._limits(joint.limits, turns=joint.type.turns),
             dynamics=_dynamics(joint.dynamics),
@@ -125,9 +126,9 @@ class _Converter:
         node = self._root.at(*loc)
         place = f":{node.line}:{node.column}" if node else ""
         location = f"{self._source.path}{place}: {path_of(loc)}"
-        return MeshSpec(file=mesh.file, scale=mesh.scale, location=location)
+        return MeshSpec(file=mesh.file, scale=mesh.scale, pose=self._pose(mesh), location=location)
 
-    def _pose(self, pose: PoseEntry) -> Pose:
+    def _pose(self, pose: PoseEntry | MeshEntry) -> Pose:
         return Pose(xyz=self._lengths(pose.xyz), rpy=read_only([self._units.radians(x) for x in pose.rpy]))
 
     def _lengths(self, values: Sequence[float]) -> Array:

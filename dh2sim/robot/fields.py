@@ -19,6 +19,7 @@ PROBLEM: Final = "dh2sim"
 """Type of the validation errors that carry a whole message."""
 NAME_PATTERN: Final = "^[A-Za-z][A-Za-z0-9_-]*$"
 LONGEST_NAME: Final = 100
+_RESERVED: Final = re.compile(r"base_link-base|flange-tool0|base_link-dh_0|link_[0-9]+-(flange|dh_[0-9]+)")
 MESH_SUFFIXES: Final = (".stl", ".obj", ".ply", ".glb")
 
 
@@ -40,6 +41,11 @@ def name_problem(value: object, what: str = "a name") -> str | None:
         return None
     allowed = "letters, digits, '_' and '-', starting with a letter"
     return f"{what} is made of {allowed}; found {shown(value)}"
+
+
+def is_reserved(name: str) -> bool:
+    """Whether a joint cannot have this name, which a fixed joint of the exports has."""
+    return _RESERVED.fullmatch(name) is not None
 
 
 def _fail(message: str) -> NoReturn:

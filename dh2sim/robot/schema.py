@@ -54,6 +54,13 @@ class MeshEntry(_Model):
 
     file: MeshFile = Field(description="STL, OBJ, PLY or GLB file; relative to the folder of this file.")
     scale: Positive = Field(default=1.0, description="Metres per unit of the mesh file.")
+    xyz: Vector = Field(
+        default=(0.0, 0.0, 0.0),
+        description="Position of the mesh file's own frame in the DH frame, in the file's length unit.",
+    )
+    rpy: Angles = Field(
+        default=(0.0, 0.0, 0.0), description="Roll, pitch, yaw of it in the DH frame, in the file's angle unit."
+    )
 
 
 class PoseEntry(_Model):
@@ -159,9 +166,16 @@ class JointEntry(_Model):
     convention: ConventionField | None = Field(default=None, description="Overrides the file's for this row.")
     a: Number = Field(default=0.0, description="a_i (modified: a_{i-1}), in the file's length unit.")
     alpha: Number = Field(default=0.0, description="alpha_i (modified: alpha_{i-1}), in the file's angle unit.")
-    d: Number = Field(default=0.0, description="d_i, in the file's length unit; a prismatic coordinate adds to it.")
+    d: Number = Field(
+        default=0.0,
+        description="d_i, in the file's length unit; a prismatic coordinate adds to it. "
+        "A Hayati row has one only if it is prismatic.",
+    )
     theta: Number = Field(
         default=0.0, description="theta_i, in the file's angle unit; a revolute coordinate adds to it."
+    )
+    beta: Number = Field(
+        default=0.0, description="beta_i, second twist, about y, in the file's angle unit; of a Hayati row alone."
     )
     flip: Flag = Field(default=False, description="True: the joint coordinate subtracts instead.")
     limits: LimitsEntry = Field(default_factory=LimitsEntry, description="Limits, in the file's units.")
@@ -181,7 +195,8 @@ class RobotEntry(_Model):
     description: Text = Field(default="", description="What the robot is.")
     source: Text = Field(default="", description="Where the numbers come from.")
     convention: ConventionField = Field(
-        description="standard: Rz(theta) Tz(d) Tx(a) Rx(alpha); modified: Tx(a) Rx(alpha) Rz(theta) Tz(d)."
+        description="standard: Rz(theta) Tz(d) Tx(a) Rx(alpha); modified: Tx(a) Rx(alpha) Rz(theta) Tz(d); "
+        "hayati: Rz(theta) Tx(a) Rx(alpha) Ry(beta)."
     )
     units: UnitsEntry = Field(default_factory=UnitsEntry, description="Units of this file; default rad and m.")
     parameters: Parameters = Field(

@@ -18,6 +18,8 @@ class Convention(StrEnum):
     """A_i = Rz(theta) Tz(d) Tx(a) Rx(alpha); distal (Paul, Spong)."""
     MODIFIED = "modified"
     """A_i = Tx(a) Rx(alpha) Rz(theta) Tz(d), with a and alpha of index i - 1; proximal (Craig)."""
+    HAYATI = "hayati"
+    """A_i = Rz(theta) Tx(a) Rx(alpha) Ry(beta), for nearly parallel axes; distal (Hayati, Mirmirani)."""
 
 
 class JointType(StrEnum):
@@ -79,6 +81,8 @@ class MeshSpec:
     """Absolute path of the file; known to exist when the robot was read."""
     scale: float = 1.0
     """Metres per unit of the file."""
+    pose: Pose = field(default_factory=Pose)
+    """Pose of the mesh's own frame in the DH frame that carries it."""
     location: str = ""
     """``file:line:column: path`` of the entry in the robot file, to begin an error message with."""
 
@@ -155,6 +159,8 @@ class Row:
     """m."""
     theta: float = 0.0
     """rad."""
+    beta: float = 0.0
+    """rad; second twist of a Hayati row, about y."""
     flip: bool = False
     limits: Limits = field(default_factory=Limits)
     dynamics: Dynamics = field(default_factory=Dynamics)

@@ -1,9 +1,9 @@
-"""A tree of nodes against the models of the robot file: every complaint becomes a problem with its place."""
+"""A tree of nodes against the models of a file: every complaint becomes a problem with its place."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final, get_args
+from typing import Any, Final, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -13,6 +13,8 @@ from dh2sim.robot.fields import PROBLEM, Context
 from dh2sim.robot.report import Loc, Report
 from dh2sim.robot.schema import RobotEntry
 from dh2sim.robot.words import closest, did_you_mean, listed, shown
+
+Model = TypeVar("Model", bound=BaseModel)
 
 
 class _Nothing:
@@ -27,17 +29,22 @@ _NOTHING: Final = _Nothing()
 
 def read_structure(root: Node, context: Context, report: Report) -> RobotEntry | None:
     """Return the robot file's content, or None with what is wrong noted in ``report``."""
+    return read_model(RobotEntry, root, context, report)
+
+
+def read_model(model: type[Model], root: Node, context: Context, report: Report) -> Model | None:
+    """Return the content of a file that ``model`` describes, or None with what is wrong noted in ``report``."""
     try:
-        return RobotEntry.model_validate(_plain(root), context=context)
+        return model.model_validate(_plain(root), context=context)
     except ValidationError as error:
         errors = error.errors(include_url=False, include_input=False)
     guessed = {
-        (*loc[:-1], closest(str(loc[-1]), _keys(loc[:-1])))
+        (*loc[:-1], closest(str(loc[-1]), _keys(model, loc[:-1])))
         for loc in (details["loc"] for details in errors if details["type"] == "extra_forbidden")
     }
     for details in errors:
         if details["type"] != "missing" or details["loc"] not in guessed:
-            _note(details, root, report)
+            _note(model, details, root, report)
     return None
 
 
@@ -54,14 +61,14 @@ def _plain(node: Node) -> object:
             return scalar
 
 
-def _note(details: ErrorDetails, root: Node, report: Report) -> None:
+def _note(model: type[BaseModel], details: ErrorDetails, root: Node, report: Report) -> None:
     """Note a validation error at the place of the file that it is about."""
     loc = details["loc"]
     parent = root.at(*loc[:-1])
     match details["type"]:
         case "extra_forbidden":
             entry = root.entry(*loc)
-            key, allowed = str(loc[-1]), _keys(loc[:-1])
+            key, allowed = str(loc[-1]), _keys(model, loc[:-1])
             message = f"unknown key {shown(key)}.{did_you_mean(key, allowed)} Allowed keys: {listed(allowed)}"
             if entry is not None:
                 report.add(entry.line, entry.column, loc[:-1], message)
@@ -71,16 +78,16 @@ def _note(details: ErrorDetails, root: Node, report: Report) -> None:
         case _:
             node = root.at(*loc) or parent or root
             if not node.wrong:
-                report.add(node.line, node.column, loc, _message(details, node))
+                report.add(node.line, node.column, loc, _message(model, details, node))
 
 
-def _message(details: ErrorDetails, node: Node) -> str:
+def _message(model: type[BaseModel], details: ErrorDetails, node: Node) -> str:
     found = shown(node.value)
     match details["type"]:
         case kind if kind == PROBLEM:
             return str(details["ctx"]["message"])
         case "model_type" | "dict_type":
-            keys = _keys(details["loc"])
+            keys = _keys(model, details["loc"])
             return f"expected a mapping{f' with the keys {listed(keys)}' if keys else ''}, found {found}"
         case "list_type":
             return f"expected a list, found {found}"
@@ -90,14 +97,14 @@ def _message(details: ErrorDetails, node: Node) -> str:
             return f"{details['msg']}, found {found}"
 
 
-def _keys(loc: Loc) -> Mapping[str, Any] | tuple[str, ...]:
+def _keys(model: type[BaseModel], loc: Loc) -> Mapping[str, Any] | tuple[str, ...]:
     """Return the keys that the mapping at a place may hold; none where they are free."""
-    model: type[BaseModel] | None = RobotEntry
+    here: type[BaseModel] | None = model
     for part in loc:
         if isinstance(part, str):
-            field = model.model_fields.get(part) if model else None
-            model = _model_in(field.annotation) if field else None
-    return model.model_fields if model else ()
+            field = here.model_fields.get(part) if here else None
+            here = _model_in(field.annotation) if field else None
+    return here.model_fields if here else ()
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

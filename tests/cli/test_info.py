@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,16 @@ joints:
   - {type: fixed, d: 0.25, theta: 15}
 """
 
+HAYATI = """\
+name: hayati
+convention: hayati
+units: {angle: deg}
+joints:
+  - {name: shoulder, type: revolute, a: 0.4318, alpha: 0.1, beta: -0.05}
+  - {name: slide, type: prismatic, a: 0.1, d: 0.2, limits: {position: [-1, 1]}}
+  - {name: plate, type: fixed, beta: 0.25, theta: 15}
+"""
+
 
 def test_json_tells_all_in_si_units(tmp_path: Path) -> None:
     robot = write(tmp_path, RICH)
@@ -41,6 +52,7 @@ def test_json_tells_all_in_si_units(tmp_path: Path) -> None:
         "alpha": 0.0,
         "d": 0.0,
         "theta": 0.0,
+        "beta": 0.0,
         "flip": False,
         "limits": {"position": [-2.0, 2.0], "velocity": 3.0, "effort": 80.0, "assumed": []},
     }
@@ -84,6 +96,35 @@ def test_a_modified_table_names_its_indices_and_a_mixed_one_each_rows_convention
         ["1", "one", "revolute", "standard"],
         ["2", "two", "prismatic", "modified"],
         ["3", "three", "fixed", "modified"],
+    ]
+
+
+def test_a_hayati_table_has_a_second_twist_and_no_offset_but_of_slides(tmp_path: Path) -> None:
+    robot = write(tmp_path, HAYATI)
+    lines = dh2sim("info", robot).out.splitlines()
+    assert lines[1].strip() == "DH table, Hayati convention"
+    assert [line.split() for line in lines[3:5]] == [
+        ["a", "i", "alpha", "i", "beta", "i", "d", "i", "theta", "i"],
+        ["i", "joint", "type", "m", "deg", "deg", "m", "deg", "limits"],
+    ]
+    assert [" ".join(line.split()) for line in lines[6:9]] == [
+        "1 shoulder revolute 0.4318 0.1 -0.05 θ1* (-180 … 180°)",
+        "2 slide prismatic 0.1 0 0 d2* + 0.2 0 -1 … 1 m",
+        "3 plate fixed 0 0 0.25 15",
+    ]
+    told = json.loads(dh2sim("info", robot, "--json").out)
+    assert [row["convention"] for row in told["rows"]] == ["hayati"] * 3
+    assert [row["beta"] for row in told["rows"]] == [math.radians(-0.05), 0.0, math.radians(0.25)]
+
+
+def test_rows_of_other_conventions_have_no_second_twist(tmp_path: Path) -> None:
+    text = HAYATI.replace("type: fixed", "type: fixed, convention: standard").replace("beta: 0.25", "d: 0.3")
+    lines = dh2sim("info", write(tmp_path, text)).out.splitlines()
+    assert lines[1].strip() == "DH table, mixed conventions"
+    assert [" ".join(line.split()) for line in lines[6:9]] == [
+        "1 shoulder revolute hayati 0.4318 0.1 -0.05 θ1* (-180 … 180°)",
+        "2 slide prismatic hayati 0.1 0 0 d2* + 0.2 0 -1 … 1 m",
+        "3 plate fixed standard 0 0 0.3 15",
     ]
 
 

@@ -15,7 +15,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import BaseSpec, LinkSpec, Pose, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 from tests.formats.readers import body_poses, in_mujoco, site_poses
-from tests.model.samples import FIXED, MODIFIED, ODD, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
+from tests.model.samples import FIXED, HAYATI, MODIFIED, ODD, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
 from tests.robots.samples import NAMES, robot
 from tests.strategies import robot_specs, robots_with_joint_vectors
 
@@ -69,17 +69,18 @@ TINY = [1e-3, 1e-5, 1e-6, 3e-7, 1e-8, 1e-12, 1e-15, 5e-324]
 
 
 @pytest.mark.parametrize("tiny", TINY)
-@pytest.mark.parametrize("what", ["alpha", "a", "both", "tool", "base", "com"])
+@pytest.mark.parametrize("what", ["alpha", "a", "both", "beta", "tool", "base", "com"])
 def test_frames_that_are_nearly_others_stand_where_the_table_says(tiny: float, what: str) -> None:
     link = LinkSpec(com=read_only([tiny, 0, 0]), inertia=read_only(np.diag([0.1, 0.2, 0.25])), mass=1.0)
     row = Row(
         name="one",
         type=REVOLUTE,
-        convention=STANDARD,
+        convention=HAYATI if what == "beta" else STANDARD,
         a=tiny if what in ("a", "both") else 0.3,
         alpha=tiny if what in ("alpha", "both") else 0.0,
-        d=0.2,
+        d=0.0 if what == "beta" else 0.2,
         theta=0.1,
+        beta=tiny if what == "beta" else 0.0,
         link=link if what == "com" else LinkSpec(),
     )
     pose = Pose(xyz=read_only([0, tiny, 0]), rpy=read_only([0, 0, -tiny]))
@@ -93,12 +94,26 @@ def test_frames_that_are_nearly_others_stand_where_the_table_says(tiny: float, w
 
 
 @pytest.mark.parametrize("kind", [REVOLUTE, PRISMATIC, FIXED])
-@pytest.mark.parametrize("convention", [STANDARD, MODIFIED])
+@pytest.mark.parametrize("convention", [STANDARD, MODIFIED, HAYATI])
 def test_a_robot_of_one_row_works(kind: str, convention: str) -> None:
-    for lengths in ({}, {"a": 0.3, "alpha": ODD, "d": 0.2, "theta": -0.8}):
+    own = {"beta": -1.1} if convention is HAYATI else {"d": 0.2}
+    for lengths in ({}, {"a": 0.3, "alpha": ODD, "theta": -0.8, **own}):
         row = Row(name="only", type=kind, convention=convention, **lengths)  # type: ignore[arg-type]
         built = build_model(RobotSpec(name="one", rows=(row,)))
         assert_poses_are_the_tables(built, in_limits(built, 3, seed=11))
+
+
+def test_an_arm_of_nearly_parallel_axes_stands_where_the_table_says() -> None:
+    """A calibrated arm: Hayati rows where axes are parallel but for half a degree, a slide among them."""
+    rows = (
+        Row(name="waist", type=REVOLUTE, convention=STANDARD, alpha=-math.pi / 2 + 1e-3, d=0.6),
+        Row(name="shoulder", type=REVOLUTE, convention=HAYATI, a=0.43, alpha=2e-3, beta=-8e-3, theta=0.01, flip=True),
+        Row(name="elbow", type=PRISMATIC, convention=HAYATI, a=0.02, alpha=-4e-3, beta=3e-3, d=0.1, theta=-0.3),
+        Row(name="plate", type=FIXED, convention=HAYATI, a=0.1, alpha=1e-3, beta=2e-6, theta=0.7),
+        Row(name="wrist", type=REVOLUTE, convention=MODIFIED, a=0.05, alpha=ODD, d=0.2, theta=0.2),
+    )
+    built = build_model(RobotSpec(name="calibrated", rows=rows, tool=Pose(xyz=read_only([0.1, 0.02, 0.03]))))
+    assert_poses_are_the_tables(built, in_limits(built, 100, seed=12))
 
 
 def test_a_robot_that_does_not_move_works() -> None:

@@ -7,7 +7,7 @@ import math
 from dh2sim.robot.spec import BaseSpec, Convention, JointType, Pose, RobotSpec, Row
 from dh2sim.typing import read_only
 
-STANDARD, MODIFIED = Convention.STANDARD, Convention.MODIFIED
+STANDARD, MODIFIED, HAYATI = Convention.STANDARD, Convention.MODIFIED, Convention.HAYATI
 ODD = math.radians(37.3)
 
 
@@ -20,6 +20,7 @@ def row(
     alpha: float = 0.0,
     d: float = 0.0,
     theta: float = 0.0,
+    beta: float = 0.0,
     flip: bool = False,
 ) -> Row:
     return Row(
@@ -30,6 +31,7 @@ def row(
         alpha=alpha,
         d=d,
         theta=theta,
+        beta=beta,
         flip=flip,
     )
 

@@ -13,7 +13,7 @@ from dh2sim.kinematics.table import row_matrix, table_frame_poses
 from dh2sim.kinematics.transforms import compose, joint_part, link_part
 from dh2sim.robot.spec import Pose, RobotSpec, Row
 from dh2sim.typing import Array, read_only
-from tests.kinematics.robots import MODIFIED, ODD, ODD_ARM, STANDARD, STANFORD, row
+from tests.kinematics.robots import HAYATI, MODIFIED, ODD, ODD_ARM, STANDARD, STANFORD, row
 from tests.strategies import robot_specs, robots_with_joint_vectors
 
 Q = np.random.default_rng(1).uniform(-2, 2, (20, 5))
@@ -89,6 +89,27 @@ def test_a_modified_row_after_a_standard_one_takes_over_its_link_part() -> None:
     second = build_chain(RobotSpec(name="r", rows=rows)).joints[1]
     expected = link_part(0.3, ODD) @ link_part(0.2, 0.7) @ joint_part(0.0, 0.1)
     np.testing.assert_allclose(second.T_parent_joint, expected, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("joint_type", ["revolute", "prismatic", "fixed"])
+def test_a_hayati_row_turns_twice_behind_its_joint(joint_type: str) -> None:
+    d = 0.25 if joint_type == "prismatic" else 0.0
+    one = row("one", joint_type, HAYATI, a=0.3, alpha=ODD, d=d, theta=0.7, beta=-0.4)
+    first, second = build_chain(RobotSpec(name="r", rows=(one, row("two", theta=0.6, d=0.4)))).joints
+    np.testing.assert_array_equal(first.T_parent_joint, joint_part(0.7, d))
+    c, s = math.cos(-0.4), math.sin(-0.4)
+    twist = np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]])
+    np.testing.assert_allclose(first.T_joint_dh, link_part(0.3, ODD) @ twist, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(second.T_parent_joint, first.T_joint_dh @ joint_part(0.6, 0.4), rtol=0, atol=1e-15)
+
+
+def test_a_hayati_row_without_a_second_twist_is_a_standard_one() -> None:
+    standard, hayati = (
+        build_chain(RobotSpec(name="r", rows=(row("one", "prismatic", kind, a=0.3, alpha=ODD, d=0.1, theta=0.2),)))
+        for kind in (STANDARD, HAYATI)
+    )
+    np.testing.assert_array_equal(hayati.joints[0].T_joint_dh, standard.joints[0].T_joint_dh)
+    np.testing.assert_array_equal(hayati.joints[0].T_parent_joint, standard.joints[0].T_parent_joint)
 
 
 def test_the_first_joint_stands_in_base_link() -> None:

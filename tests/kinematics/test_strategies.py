@@ -5,7 +5,7 @@ import re
 import numpy as np
 from hypothesis import given
 
-from dh2sim.robot.spec import JointType, RobotSpec
+from dh2sim.robot.spec import Convention, JointType, RobotSpec
 from dh2sim.typing import Array
 from tests.strategies import inertias, robot_specs, robots_with_joint_vectors
 
@@ -17,6 +17,9 @@ def test_random_robots_are_ones_that_a_file_could_describe(spec: RobotSpec) -> N
     assert len({row.name for row in spec.rows}) == len(spec.rows)
     assert spec.moving_rows
     for row in spec.rows:
+        hayati = row.convention is Convention.HAYATI
+        assert row.d == 0.0 or not hayati or row.type is JointType.PRISMATIC
+        assert row.beta == 0.0 or hayati
         if row.limits.position is not None:
             assert row.type in (JointType.REVOLUTE, JointType.PRISMATIC)
             assert row.limits.position[0] < row.limits.position[1]

@@ -10,13 +10,15 @@ import pytest
 from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics import table
 from dh2sim.kinematics.table import row_matrix, table_frame_poses, table_tool_pose
-from dh2sim.robot.spec import Pose, RobotSpec
+from dh2sim.robot.spec import Convention, Pose, RobotSpec
 from dh2sim.typing import read_only
-from tests.kinematics.robots import MODIFIED, ODD, ODD_ARM, STANDARD, STANFORD, row
+from tests.kinematics.robots import HAYATI, MODIFIED, ODD, ODD_ARM, STANDARD, STANFORD, row
 
-# cos and sin of 37.3 degrees and of 20 degrees, from tables
+BETA = math.radians(123.4)
+# cos and sin of 37.3 degrees, of 20 degrees and of 123.4 degrees, from tables
 CA, SA = 0.7954734808548959, 0.605988400265711
 CT, ST = 0.9396926207859084, 0.3420201433256687
+CB, SB = -0.5504807400849956, 0.8348478632634065
 
 
 def test_standard_row_is_the_hand_expanded_product() -> None:
@@ -43,21 +45,38 @@ def test_modified_row_is_the_hand_expanded_product() -> None:
     np.testing.assert_allclose(found[:, :, 0], expected, rtol=0, atol=1e-15)
 
 
+def test_hayati_row_is_the_hand_expanded_product() -> None:
+    one = row("one", "prismatic", HAYATI, a=0.3, alpha=ODD, d=0.2, theta=math.radians(20.0), beta=BETA)
+    expected: list[list[float]] = [
+        [CT * CB - ST * SA * SB, -ST * CA, CT * SB + ST * SA * CB, 0.3 * CT],
+        [ST * CB + CT * SA * SB, CT * CA, ST * SB - CT * SA * CB, 0.3 * ST],
+        [-CA * SB, SA, CA * CB, 0.5],
+        [0, 0, 0, 1],
+    ]
+    found = row_matrix(one, np.array([0.3]))
+    np.testing.assert_allclose(found[:, :, 0], expected, rtol=0, atol=1e-15)
+
+
 @pytest.mark.parametrize("joint_type", ["revolute", "continuous", "prismatic", "fixed"])
 @pytest.mark.parametrize("flip", [False, True])
-def test_row_is_the_product_of_its_four_moves(joint_type: str, flip: bool) -> None:
+@pytest.mark.parametrize("convention", list(Convention))
+def test_row_is_the_product_of_its_moves(joint_type: str, flip: bool, convention: Convention) -> None:
     q = 0.7
-    for convention in (STANDARD, MODIFIED):
-        one = row("one", joint_type, convention, a=0.3, alpha=ODD, d=0.5, theta=-1.1, flip=flip)
-        moved = -q if flip else q
-        theta = -1.1 + (moved if joint_type in ("revolute", "continuous") else 0.0)
-        d = 0.5 + (moved if joint_type == "prismatic" else 0.0)
-        Rz, Tz, Tx, Rx = np.eye(4), np.eye(4), np.eye(4), np.eye(4)
-        Rz[:2, :2] = [[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]]
-        Rx[1:3, 1:3] = [[math.cos(ODD), -math.sin(ODD)], [math.sin(ODD), math.cos(ODD)]]
-        Tz[2, 3], Tx[0, 3] = d, 0.3
-        expected = Rz @ Tz @ Tx @ Rx if convention is STANDARD else Tx @ Rx @ Rz @ Tz
-        np.testing.assert_allclose(row_matrix(one, np.array([q]))[:, :, 0], expected, rtol=0, atol=1e-15)
+    one = row("one", joint_type, convention, a=0.3, alpha=ODD, d=0.5, theta=-1.1, beta=BETA, flip=flip)
+    moved = -q if flip else q
+    theta = -1.1 + (moved if joint_type in ("revolute", "continuous") else 0.0)
+    d = 0.5 + (moved if joint_type == "prismatic" else 0.0)
+    Rz, Tz, Tx, Rx, Ry = np.eye(4), np.eye(4), np.eye(4), np.eye(4), np.eye(4)
+    Rz[:2, :2] = [[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]]
+    Rx[1:3, 1:3] = [[math.cos(ODD), -math.sin(ODD)], [math.sin(ODD), math.cos(ODD)]]
+    Ry[0, [0, 2]], Ry[2, [0, 2]] = [math.cos(BETA), math.sin(BETA)], [-math.sin(BETA), math.cos(BETA)]
+    Tz[2, 3], Tx[0, 3] = d, 0.3
+    expected = {
+        STANDARD: Rz @ Tz @ Tx @ Rx,
+        MODIFIED: Tx @ Rx @ Rz @ Tz,
+        HAYATI: Rz @ Tz @ Tx @ Rx @ Ry,
+    }[convention]
+    np.testing.assert_allclose(row_matrix(one, np.array([q]))[:, :, 0], expected, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("q", [(0.3, 0.4), (-2.0, 1.1), (3.0, -2.9)])

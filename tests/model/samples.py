@@ -16,7 +16,7 @@ from dh2sim.robot.spec import BaseSpec, Convention, JointType, Limits, LinkSpec,
 from dh2sim.typing import Array, read_only
 from tests.robots.samples import robot
 
-STANDARD, MODIFIED = Convention.STANDARD, Convention.MODIFIED
+STANDARD, MODIFIED, HAYATI = Convention.STANDARD, Convention.MODIFIED, Convention.HAYATI
 REVOLUTE, CONTINUOUS = JointType.REVOLUTE, JointType.CONTINUOUS
 PRISMATIC, FIXED = JointType.PRISMATIC, JointType.FIXED
 ODD = math.radians(37.3)

@@ -15,17 +15,19 @@ from dh2sim.model.mass import MassProperties
 from dh2sim.model.robot_model import LinkModel
 from dh2sim.robot.spec import Convention, LinkSpec, RobotSpec, Row
 from dh2sim.typing import Array, read_only
-from tests.model.samples import FIXED, MODIFIED, ODD, REVOLUTE, STANDARD
+from tests.model.samples import FIXED, HAYATI, MODIFIED, ODD, REVOLUTE, STANDARD
 from tests.model.test_mass import plates
 
 MASS = 4.2
 COM = read_only([0.05, -0.03, 0.11])
 INERTIA = read_only([[0.04, 0.003, -0.002], [0.003, 0.05, 0.004], [-0.002, 0.004, 0.06]])
 A = 0.3
+BETA = -0.4
 
 
 def robot(link: LinkSpec, convention: Convention = STANDARD) -> RobotSpec:
-    row = Row(name="one", type=REVOLUTE, convention=convention, a=A, alpha=ODD, d=0.2, theta=0.7, link=link)
+    d, beta = (0.0, BETA) if convention is HAYATI else (0.2, 0.0)
+    row = Row(name="one", type=REVOLUTE, convention=convention, a=A, alpha=ODD, d=d, theta=0.7, beta=beta, link=link)
     after = Row(name="two", type=REVOLUTE, convention=convention, a=0.1, alpha=-1.1, d=0.15)
     return RobotSpec(name="weighed", rows=(row, after))
 
@@ -41,7 +43,9 @@ def dh_in_joint(convention: Convention) -> tuple[Array, Array]:
     if convention is MODIFIED:
         return np.eye(3), np.zeros(3)
     c, s = math.cos(ODD), math.sin(ODD)
-    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]]), np.array([A, 0, 0])
+    Rx = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    c, s = (math.cos(BETA), math.sin(BETA)) if convention is HAYATI else (1.0, 0.0)
+    return Rx @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]), np.array([A, 0, 0])
 
 
 @pytest.mark.parametrize("convention", list(Convention))

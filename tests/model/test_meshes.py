@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+import math
 from pathlib import Path
 
 import mujoco
@@ -29,14 +30,14 @@ def wedge() -> trimesh.Trimesh:
     return trimesh.Trimesh(vertices, box.faces, process=False)
 
 
-def text(file: str, scale: float = 1.0, base: str = "") -> str:
+def text(file: str, scale: float = 1.0, base: str = "", pose: str = "") -> str:
     return f"""
 name: shown
 convention: standard
 {base}
 joints:
   - {{type: revolute, a: 0.3, alpha: 0.6511, d: 0.1, theta: 0.4}}
-  - {{type: revolute, a: 0.2, alpha: -1.1, d: 0.2, link: {{mesh: {{file: {file}, scale: {scale!r}}}}}}}
+  - {{type: revolute, a: 0.2, alpha: -1.1, d: 0.2, link: {{mesh: {{file: {file}, scale: {scale!r}{pose}}}}}}}
 """
 
 
@@ -103,6 +104,42 @@ def test_a_mesh_of_the_base_is_shown_in_dh_frame_zero(tmp_path: Path) -> None:
     assert model.base.mesh.file_name == "base_link.stl"
     found = shown_vertices(*in_mujoco(model, tmp_path), "base_link")
     expected = placed(np.array(surface.vertices), table_frame_poses(model.spec, Q)[0])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
+
+
+def turned(roll: float, pitch: float, yaw: float) -> Array:
+    """Turns about fixed x, y and z, one after the other, shape (3, 3)."""
+    cr, sr, cp, sp, cy, sy = (f(x) for x in (roll, pitch, yaw) for f in (math.cos, math.sin))
+    Rx = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    Ry = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    Rz = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    R: Array = Rz @ Ry @ Rx
+    return R
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("scale", [1.0, 0.001])
+def test_a_mesh_is_shown_where_its_pose_puts_it(tmp_path: Path, kind: str, scale: float) -> None:
+    surface = wedge()
+    large = surface.copy()
+    large.apply_scale(1 / scale)
+    pose = ", xyz: [0.3, -0.2, 0.15], rpy: [0.4, -0.7, 2.1]"
+    model = built(tmp_path, text(write(tmp_path, kind, large), scale, pose=pose))
+    found = shown_vertices(*in_mujoco(model, tmp_path), "link_2")
+    in_dh = np.array(surface.vertices) @ turned(0.4, -0.7, 2.1).T + [0.3, -0.2, 0.15]
+    expected = placed(in_dh, table_frame_poses(model.spec, Q)[2])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
+
+
+def test_a_mesh_of_the_base_has_a_pose_too(tmp_path: Path) -> None:
+    surface = wedge()
+    file = write(tmp_path, "stl", surface)
+    mesh = f"{{file: {file}, xyz: [100, 0, -50], rpy: [90, 0, 30]}}"
+    base = f"units: {{length: mm, angle: deg}}\nbase: {{xyz: [10, 20, 30], rpy: [40, 50, 60], mesh: {mesh}}}"
+    model = built(tmp_path, text("part.stl", base=base))
+    found = shown_vertices(*in_mujoco(model, tmp_path), "base_link")
+    in_dh = np.array(surface.vertices) @ turned(*np.radians([90, 0, 30])).T + [0.1, 0, -0.05]
+    expected = placed(in_dh, table_frame_poses(model.spec, Q)[0])
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
 
 

@@ -63,6 +63,50 @@ def test_a_fixed_row_may_say_that_it_is_not_flipped() -> None:
     assert _complaints("{type: fixed, flip: false}") == []
 
 
+@pytest.mark.parametrize("kind", ["revolute", "continuous", "fixed"])
+def test_a_hayati_row_that_does_not_slide_takes_no_d(kind: str) -> None:
+    place = 12 + len(kind)
+    assert _complaints(f"{{type: {kind}, d: 0.1, convention: hayati}}") == [
+        f"r.yaml:4:{place}: joints[0].d: a {kind} Hayati row takes no 'd', which nearly parallel axes leave free; "
+        "use 'a' and 'beta', or another convention for this row"
+    ]
+
+
+def test_the_files_own_convention_counts_where_a_row_names_none() -> None:
+    text = "name: r\nconvention: hayati\njoints:\n- {type: revolute, beta: 1, d: 2}\n"
+    assert complaints(text) == [
+        "r.yaml:4:29: joints[0].d: a revolute Hayati row takes no 'd', which nearly parallel axes leave free; "
+        "use 'a' and 'beta', or another convention for this row"
+    ]
+    assert complaints(text.replace("{type", "{convention: standard, type")) == [
+        "r.yaml:4:42: joints[0].beta: a standard row takes no 'beta', the second twist of a row of "
+        "'convention: hayati'"
+    ]
+
+
+def test_a_hayati_row_that_slides_takes_a_d() -> None:
+    assert _complaints("{type: prismatic, convention: hayati, a: 1, alpha: 0.1, beta: 0.2, d: 3}") == []
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_only_a_hayati_row_takes_a_second_twist(convention: str) -> None:
+    assert _complaints(
+        "{type: fixed, convention: hayati, beta: 1}", f"{{beta: x, type: fixed, convention: {convention}}}"
+    ) == [
+        "r.yaml:5:4: joints[1].beta: a " + convention + " row takes no 'beta', the second twist of a row of "
+        "'convention: hayati'",
+        "r.yaml:5:10: joints[1].beta: unknown name 'x'. Known names: pi",
+    ]
+
+
+@pytest.mark.parametrize(
+    "wrong", ["{type: screw, convention: hayati, d: 1}", "{type: fixed, convention: craig, beta: 1}"]
+)
+def test_a_row_of_unknown_type_or_convention_is_told_that_alone(wrong: str) -> None:
+    (message,) = _complaints(wrong)
+    assert ": found '" in message
+
+
 def test_a_configuration_has_a_value_for_each_moving_row() -> None:
     joints = ["{type: revolute}", "{type: fixed}", "{type: prismatic, name: slide}"]
     expected = "expected 2 numbers, one for each moving row (joint_1, slide), found a list of"

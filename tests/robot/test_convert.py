@@ -115,6 +115,29 @@ def test_meshes_are_absolute_and_know_where_they_are_named(tmp_path: Path) -> No
     assert spec.base.mesh.location == "r.yaml:5:21: base.mesh.file"
 
 
+def test_the_pose_of_a_mesh_is_in_the_files_units(tmp_path: Path) -> None:
+    (tmp_path / "b.stl").write_bytes(b"")
+    text = with_joint("{type: fixed, link: {mesh: {file: b.stl, xyz: [10, 0, -2.5], rpy: [90, 0, -45]}}}")
+    text += "units: {angle: deg, length: mm}\nbase: {mesh: {file: b.stl, xyz: [1, 2, 3]}}\n"
+    spec = robot(text, directory=tmp_path)
+    mesh = spec.rows[0].link.mesh
+    assert mesh is not None
+    assert mesh.pose.xyz.tolist() == [0.01, 0, -0.0025]
+    assert mesh.pose.rpy.tolist() == [math.pi / 2, 0, -math.pi / 4]
+    assert spec.base.mesh is not None
+    assert spec.base.mesh.pose.xyz.tolist() == [0.001, 0.002, 0.003]
+    assert spec.base.mesh.pose.rpy.tolist() == [0, 0, 0]
+
+
+def test_a_hayati_row_has_a_second_twist() -> None:
+    text = with_joint("{type: revolute, convention: hayati, a: 431.8, alpha: 0.25, beta: -0.05, theta: 10}")
+    row = robot(text + "units: {angle: deg, length: mm}\n").rows[0]
+    assert row.convention is Convention.HAYATI
+    assert (row.a, row.alpha) == (0.4318, math.radians(0.25))
+    assert (row.beta, row.d, row.theta) == (math.radians(-0.05), 0, math.radians(10))
+    assert robot(MINIMAL.replace("standard", "hayati")).rows[0].convention is Convention.HAYATI
+
+
 def test_mesh_paths_start_in_the_current_folder_where_there_is_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

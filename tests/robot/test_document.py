@@ -145,7 +145,7 @@ def test_keys_that_a_merge_would_have_brought_are_not_missed() -> None:
 def test_bad_keys_do_not_hide_other_mistakes() -> None:
     assert complaints("name: r\nname: s\nconvention: x\njoints:\n- {type: revolute, 1: 2}\n") == [
         "r.yaml:2:1: duplicate key 'name'; it stands on line 1 already",
-        "r.yaml:3:13: convention: found 'x'. Allowed: standard, modified",
+        "r.yaml:3:13: convention: found 'x'. Allowed: standard, modified, hayati",
         "r.yaml:5:20: joints[0]: a key must be text, found 1; put it in quotes",
     ]
 

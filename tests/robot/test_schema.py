@@ -48,7 +48,16 @@ def test_no_key_may_be_null() -> None:
     assert "None" not in str(SCHEMA)
 
 
-@pytest.mark.parametrize("text", [MINIMAL, FULL])
+@pytest.mark.parametrize(
+    "text",
+    [
+        MINIMAL,
+        FULL,
+        with_joint("{type: revolute, convention: hayati, beta: 0.01}"),
+        MINIMAL.replace("standard", "hayati"),
+        with_joint("{type: fixed, link: {mesh: {file: b.stl, scale: 0.001, xyz: [1, 2, 3], rpy: [0, pi / 2, 0]}}}"),
+    ],
+)
 def test_right_files_are_valid(text: str) -> None:
     assert _valid(text)
 
@@ -68,6 +77,10 @@ def test_right_files_are_valid(text: str) -> None:
         with_joint("{type: revolute, link: {color: [1, 2, 0]}}"),
         with_joint("{type: revolute, link: {inertia: {ixx: 1}}}"),
         with_joint("{type: revolute, link: null}"),
+        with_joint("{type: revolute, convention: hyati}"),
+        with_joint("{type: revolute, convention: hayati, beta: true}"),
+        with_joint("{type: fixed, link: {mesh: {file: b.stl, xyz: [1, 2]}}}"),
+        with_joint("{type: fixed, link: {mesh: {file: b.stl, rpy: 3}}}"),
         "name: r\nconvention: standard\njoints: []\n",
         with_keys("parameters: {d-1: 3}\n"),
         with_keys("configurations: {a b: [1]}\n"),

@@ -11,7 +11,7 @@ from tests.robot.files import MINIMAL, complaints, with_joint, with_keys
 TOP = (
     "name, description, source, convention, units, parameters, base, tool, gravity, joints, configurations, actuators"
 )
-JOINT = "name, type, convention, a, alpha, d, theta, flip, limits, dynamics, link, actuator"
+JOINT = "name, type, convention, a, alpha, d, theta, beta, flip, limits, dynamics, link, actuator"
 NUMBER = "expected a number or an expression in a string"
 NAME = "a name is made of letters, digits, '_' and '-', starting with a letter"
 
@@ -73,7 +73,7 @@ def test_a_file_that_holds_no_mapping_is_told_what_belongs_there(text: str, foun
         ("{type: }", "4:4: joints[0].type: found nothing. Allowed: revolute, continuous, prismatic, fixed"),
         (
             "{type: fixed, convention: craig}",
-            "4:29: joints[0].convention: found 'craig'. Allowed: standard, modified",
+            "4:29: joints[0].convention: found 'craig'. Allowed: standard, modified, hayati",
         ),
         ("{type: fixed, name: 2nd}", f"4:23: joints[0].name: {NAME}; found '2nd'"),
         ("{type: fixed, name: a b}", f"4:23: joints[0].name: {NAME}; found 'a b'"),
@@ -274,7 +274,7 @@ def test_all_mistakes_are_told_at_once_in_the_order_of_the_file() -> None:
         """
     assert complaints(text) == [
         f"r.yaml:1:7: name: {NAME}; found '3r'",
-        "r.yaml:2:13: convention: found 'standart'. Did you mean 'standard'? Allowed: standard, modified",
+        "r.yaml:2:13: convention: found 'standart'. Did you mean 'standard'? Allowed: standard, modified, hayati",
         "r.yaml:3:17: parameters.a: parameters need each other in a circle: a -> b -> a",
         f"r.yaml:5:20: joints[0]: unknown key 'alfa'. Did you mean 'alpha'? Allowed keys: {JOINT}",
         "r.yaml:5:48: joints[0].limits.position: the lower limit 2.0 is not below the upper limit 1.0",
