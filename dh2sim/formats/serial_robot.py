@@ -1,0 +1,79 @@
+"""What a reader makes of a URDF, an MJCF or a file of axes: one serial chain, and all that hangs on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+from dh2sim.kinematics.serial import SerialChain
+from dh2sim.model.mass import MassProperties
+from dh2sim.robot.spec import ActuatorSpec, Dynamics, Limits
+from dh2sim.typing import Array, read_only
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SerialMesh:
+    """A mesh that shows a link."""
+
+    uri: str
+    """As the file names it, such as ``package://pkg/meshes/link.stl``."""
+    path: Path | None
+    """The file, where it was found."""
+    scale: float
+    """Metres per unit of the mesh file."""
+    T_link_mesh: Array = field(repr=False)
+    """Pose of the mesh's own frame in the link's frame, shape (4, 4)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SerialLink:
+    """A link of the chain, with everything that is fixed to it; None where the file says nothing."""
+
+    name: str
+    """As in the file."""
+    mass: float | None = None
+    """kg, greater than 0."""
+    com: Array | None = None
+    """Centre of mass in the link's frame, m, shape (3,)."""
+    inertia: Array | None = None
+    """About the centre of mass, along the link frame's axes, kg·m², shape (3, 3); possible for a body."""
+    mesh: SerialMesh | None = None
+    color: tuple[float, float, float, float] | None = None
+    """Red, green, blue, alpha, each from 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SerialRobot:
+    """A serial robot as a file of another format describes it; SI units."""
+
+    name: str
+    """As in the file; it need not be a name that a robot file allows."""
+    description: str
+    """Such as ``URDF panda.urdf, from panda_link0 to panda_link8``."""
+    chain: SerialChain
+    """Starts in the base's frame, ends in the tip's."""
+    base: SerialLink
+    """The base; its mass is not used by a robot file."""
+    links: tuple[SerialLink, ...]
+    """One for every joint of the chain: the link that it carries, in the frame of ``SerialJoint.T_parent_link``."""
+    limits: tuple[Limits, ...]
+    """One for every joint."""
+    dynamics: tuple[Dynamics, ...]
+    """One for every joint."""
+    actuators: tuple[ActuatorSpec, ...] | None = None
+    """One for every joint; None where the format says nothing of actuators."""
+    gravity: Array = field(default_factory=lambda: read_only([0, 0, -9.81]))
+    """m/s² in the base's frame, shape (3,)."""
+    configurations: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
+    """Named joint vectors, rad and m, each of shape (number of joints,)."""
+    notes: tuple[str, ...] = ()
+    """What was chosen, changed or left out, a sentence each, for the user to read."""
+
+
+def properties(link: SerialLink) -> MassProperties | None:
+    """Return a link's mass properties in its frame, or None where the file does not give all of them."""
+    if link.mass is None or link.com is None or link.inertia is None:
+        return None
+    return MassProperties(mass=link.mass, com=link.com, inertia=link.inertia)
