@@ -1,0 +1,1 @@
+"""URDF texts to serial robots."""
