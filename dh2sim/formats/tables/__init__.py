@@ -1,0 +1,1 @@
+"""Denavit-Hartenberg tables as people write them: Markdown, CSV, TSV and the printouts of Corke's toolboxes."""

@@ -1,0 +1,92 @@
+"""Notation to plain characters: LaTeX, Markdown, HTML and Unicode become what arithmetic is written in."""
+
+from __future__ import annotations
+
+import functools
+import html
+import re
+import unicodedata
+from collections.abc import Callable
+from typing import Final, TypeAlias
+
+LONGEST_CELL: Final = 400
+"""Characters of a cell that are looked at; no number is longer."""
+
+_BEFORE: Final = str.maketrans(
+    {
+        "º": "°", "˚": "°", "∘": "°", "½": "(1/2)", "¼": "(1/4)", "¾": "(3/4)",
+        "⁰": "**0", "¹": "**1", "²": "**2", "³": "**3", "⁴": "**4",
+        "\u200b": "", "\u200c": "", "\u200d": "", "\ufeff": "", "\u2060": "",
+    }
+)  # fmt: skip
+"""Characters that compatibility normalisation would turn into something else."""
+_AFTER: Final = str.maketrans(
+    {
+        "−": "-", "–": "-", "‒": "-", "—": "-", "―": "-", "‐": "-", "‑": "-",
+        "×": "*", "·": "*", "∙": "*", "⋅": "*", "∗": "*", "⋆": "*", "★": "*", "÷": "/", "∕": "/", "⁄": "/",
+        "π": "pi", "ϖ": "pi", "θ": "theta", "ϑ": "theta", "Θ": "theta", "α": "alpha", "⍺": "alpha", "ɑ": "alpha",
+        "β": "beta", "σ": "sigma", "ς": "sigma", "√": "sqrt",
+    }
+)  # fmt: skip
+
+_Change: TypeAlias = tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]
+_HTML: Final[tuple[_Change, ...]] = (
+    (re.compile(r"<sup>\s*(?:o|0|°|&deg;)\s*</sup>", re.IGNORECASE), "°"),
+    (re.compile(r"<sup>\s*\*\s*</sup>", re.IGNORECASE), "*"),
+    (re.compile(r"<sub>([^<>]*)</sub>", re.IGNORECASE), r"_\1"),
+    (re.compile(r"</?(?:b|i|em|strong|code|span|br|sup|p|tt|var)\b[^<>]*>", re.IGNORECASE), " "),
+)
+_LATEX: Final[tuple[_Change, ...]] = (
+    (re.compile(r"\$|\\[()\[\]]"), ""),
+    (re.compile(r"\\([_*|#%&])"), r"\1"),
+    (re.compile(r"\\(?:mathrm|mathbf|mathit|textbf|textit|text|operatorname|rm|bf)(?![A-Za-z])"), ""),
+    (re.compile(r"\\(?:left|right|quad|qquad|[,;:! ])(?![A-Za-z])|\\[,;:! ]"), " "),
+    (re.compile(r"\^\s*\{?\s*(?:\\circ|°|o\b)\s*\}?|\\(?:circ|degree|textdegree)(?![A-Za-z])"), "°"),
+    (re.compile(r"\^\s*\{?\s*(?:\\ast|\\star|\*)\s*\}?|\\(?:ast|star)(?![A-Za-z])"), "*"),
+    (re.compile(r"\\(?:cdot|times)(?![A-Za-z])"), "*"),
+    (re.compile(r"\\pm(?![A-Za-z])"), "±"),
+    (re.compile(r"\\l?dots(?![A-Za-z])"), "..."),
+    (re.compile(r"\\var(theta)"), r"\\\1"),
+    (re.compile(r"\\(theta|alpha|beta|sigma|pi)(?![A-Za-z])"), r"\1"),
+    (re.compile(r"\\sqrt\s*\{([^{}]*)\}"), r"sqrt(\1)"),
+)
+_FRACTION: Final = re.compile(r"\\[dt]?frac\s*(?:\{([^{}]*)\}|(pi|\d))\s*(?:\{([^{}]*)\}|(\d))")
+_INDEX: Final = re.compile(r"_\{([^{}]*)\}")
+_EMPHASIS: Final[tuple[_Change, ...]] = (
+    (re.compile(r"`+([^`]*)`+"), r"\1"),
+    (re.compile(r"(?<![\w)])\*\*(?=\S)(.+?)(?<=\S)\*\*(?![\w(*])"), r"\1"),
+    (re.compile(r"(?<!\w)__(?=\S)(.+?)(?<=\S)__(?!\w)"), r"\1"),
+    (re.compile(r"^\*(?=[^\s*])([^*]*[^\s*])\*$"), r"\1"),
+)
+
+
+@functools.lru_cache(maxsize=4096)
+def plain(text: str) -> str:
+    r"""Return a heading, a cell or a line in plain characters.
+
+    Greek letters get their names (``θ₁``, ``$\theta_{1}$`` and ``&theta;<sub>1</sub>`` become ``theta1`` or
+    ``theta_1``), every dash becomes ``-``, every sign for times ``*``, fractions become divisions, emphasis goes.
+    A star that marks a variable and the degree sign stay.
+
+    Args:
+        text: As written; what is longer than a cell can be is cut off.
+    """
+    text = html.unescape(_changed(text[:LONGEST_CELL], _HTML)).translate(_BEFORE)
+    text = unicodedata.normalize("NFKC", text).translate(_AFTER)
+    text = _changed(text, _EMPHASIS[:3])
+    text = _changed(text, _LATEX)
+    for _ in range(4):
+        text = _INDEX.sub(r"_\1", _FRACTION.sub(_divided, text))
+    text = text.replace("{", "").replace("}", "").strip()
+    return " ".join(_changed(text, _EMPHASIS[3:]).split())
+
+
+def _divided(found: re.Match[str]) -> str:
+    above, below = found[1] or found[2] or "", found[3] or found[4] or ""
+    return f"(({above})/({below}))"
+
+
+def _changed(text: str, changes: tuple[_Change, ...]) -> str:
+    for pattern, replacement in changes:
+        text = pattern.sub(replacement, text)
+    return text
