@@ -1,0 +1,1 @@
+"""MJCF files to serial robots; MuJoCo parses them."""

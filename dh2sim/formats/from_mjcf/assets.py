@@ -1,0 +1,167 @@
+"""What an MJCF takes from other files than XML: meshes, height fields, pictures; and how to do without them.
+
+Works on MuJoCo's ``MjSpec``, the model before it is compiled.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import stat
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from dh2sim.formats.from_mjcf.files import MjcfFiles
+
+MAX_ASSET_BYTES: Final = 500_000_000
+"""Of a mesh or a height field; a larger file counts as missing."""
+_BALL: Final = 0.01
+"""Radius of what stands for a geom without its mesh, m."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeshFile:
+    """A mesh of the model that comes from a file."""
+
+    uri: str
+    """As the MJCF names it."""
+    path: Path
+    """The file, absolute; it exists."""
+    scale: tuple[float, ...]
+    """Along x, y and z."""
+    refpos: tuple[float, ...]
+    """Taken off the file's positions before they are scaled; x, y, z."""
+    refquat: tuple[float, ...]
+    """The inverse of this rotation is applied last; (w, x, y, z), of any length."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Lost:
+    """What a model lacks because files are missing; its elements have numbers only once it is compiled."""
+
+    geoms: tuple[tuple[Any, str], ...]
+    """Geoms, and the names of their files; a ball stands for each."""
+    masses: tuple[Any, ...]
+    """Bodies whose mass would come from such geoms."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Assets:
+    """The files of a model's meshes and height fields, by name of the asset; None where a file is missing."""
+
+    meshes: dict[str, Path | None] = field(repr=False)
+    fields: dict[str, Path | None] = field(repr=False)
+
+    @property
+    def has_files(self) -> bool:
+        """Whether a file was found for anything."""
+        return any((*self.meshes.values(), *self.fields.values()))
+
+
+def find_assets(spec: Any, files: MjcfFiles) -> Assets:
+    """Look for the files that a model's meshes and height fields come from."""
+    return Assets(
+        meshes={mesh.name: _found(mesh, spec, files) for mesh in spec.meshes if mesh.file},
+        fields={field.name: _found(field, spec, files) for field in spec.hfields if field.file},
+    )
+
+
+def _found(asset: Any, spec: Any, files: MjcfFiles) -> Path | None:
+    """Return the file of an asset; which of the models that attach one another names it, MuJoCo does not tell."""
+    name = asset.file.replace("\\", "/")
+    if spec.strippath:
+        name = name.rpartition("/")[2]
+    for folder in files.folders:
+        path = folder / asset.compiler.meshdir.replace("\\", "/") / name
+        try:
+            status = path.stat()
+        except (OSError, ValueError):  # ValueError: a name that no file can have
+            continue
+        if stat.S_ISREG(status.st_mode) and status.st_size <= MAX_ASSET_BYTES:
+            return Path(os.path.normpath(path))
+    return None
+
+
+def mesh_files(spec: Any, assets: Assets) -> dict[int, MeshFile]:
+    """Return the meshes of a compiled model that come from files, by number."""
+    files = {}
+    for mesh in spec.meshes:
+        path = assets.meshes.get(mesh.name) if mesh.file else None
+        if path is not None:
+            files[mesh.id] = MeshFile(
+                uri=mesh.file,
+                path=path,
+                scale=tuple(mesh.scale.tolist()),
+                refpos=tuple(mesh.refpos.tolist()),
+                refquat=tuple(mesh.refquat.tolist()),
+            )
+    return files
+
+
+def drop_pictures(spec: Any) -> None:
+    """Remove textures, skins and keyframes: nothing of a serial arm needs them, and their files may be missing."""
+    for texture in list(spec.textures):
+        spec.delete(texture)
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
+    for left_out in [*spec.skins, *spec.keys]:
+        spec.delete(left_out)
+    spec.nkey = 0
+
+
+def drop_files(spec: Any, assets: Assets, *, all_files: bool) -> Lost:
+    """Remove the meshes and height fields whose files are missing; a ball takes the place of each of their geoms.
+
+    A geom that would give its body mass becomes a ball of 1 kg, so that MuJoCo does not complain of a body without.
+
+    Args:
+        spec: The model, not compiled yet.
+        assets: Its files.
+        all_files: Whether to remove those whose files are there, too.
+    """
+    import mujoco
+
+    meshes = {name for name, path in assets.meshes.items() if path is None or all_files}
+    fields = {name for name, path in assets.fields.items() if path is None or all_files}
+    uris = {mesh.name: mesh.file for mesh in spec.meshes if mesh.name in meshes}
+    geoms: list[tuple[Any, str]] = []
+    masses: list[Any] = []
+    for geom in spec.geoms:
+        if geom.meshname not in meshes and geom.hfieldname not in fields:
+            continue
+        geoms.append((geom, uris.get(geom.meshname, "")))
+        body = geom.parent
+        gives_mass = _gives_mass(geom, body)
+        if gives_mass and not any(body == other for other in masses):
+            masses.append(body)
+        geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
+        geom.meshname = geom.hfieldname = ""
+        geom.size = [_BALL, 0.0, 0.0]
+        geom.mass = 1.0 if gives_mass else 0.0
+    for site in spec.sites:
+        if site.meshname in meshes:
+            site.type, site.meshname, site.size = mujoco.mjtGeom.mjGEOM_SPHERE, "", [_BALL, 0.0, 0.0]
+    _delete(spec, spec.meshes, meshes)
+    _delete(spec, spec.hfields, fields)
+    if masses and spec.compiler.settotalmass > 0.0:  # all are scaled by the sum
+        masses = [body for body in spec.bodies if body.name != "world"]
+    return Lost(geoms=tuple(geoms), masses=tuple(masses))
+
+
+def _delete(spec: Any, assets: Iterable[Any], names: set[str]) -> None:
+    for asset in list(assets):
+        if asset.name in names:
+            spec.delete(asset)
+
+
+def _gives_mass(geom: Any, body: Any) -> bool:
+    """Whether MuJoCo would infer some of the body's mass from a geom."""
+    import mujoco
+
+    if body.explicitinertial and body.compiler.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+        return False
+    first, last = body.compiler.inertiagrouprange
+    weightless = geom.density == 0.0 if math.isnan(geom.mass) else geom.mass == 0.0
+    return bool(first <= geom.group <= last and not weightless)
