@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.errors import PictureError
+from dh2sim.export.placing import written_whole
 from dh2sim.robot.words import shown
 from dh2sim.simulate.pictures.gif import SAMPLES, check_gif, write_gif
 from dh2sim.simulate.pictures.motion import Motion
 from dh2sim.simulate.pictures.mp4 import write_mp4
-from dh2sim.simulate.pictures.placing import written_whole
 from dh2sim.simulate.pictures.stage import Look, Stage, stage
 
 FILMS = (".mp4", ".gif")

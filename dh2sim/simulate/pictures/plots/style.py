@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.errors import PictureError
+from dh2sim.export.placing import written_whole
 from dh2sim.robot.words import shown
-from dh2sim.simulate.pictures.placing import written_whole
 
 ENDINGS = (".png", ".svg", ".pdf")
 BLUE, TEAL, PURPLE, ORANGE, RED, INK, GREY = (

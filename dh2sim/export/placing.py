@@ -1,4 +1,4 @@
-"""Picture files are written beside where they will stand, and put there whole."""
+"""Single files are written beside where they will stand, and put there whole."""
 
 from __future__ import annotations
 
