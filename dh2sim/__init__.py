@@ -13,27 +13,39 @@ if TYPE_CHECKING:
     from dh2sim.formats.mjcf import to_mjcf
     from dh2sim.formats.scene import to_scene
     from dh2sim.formats.urdf import to_urdf
+    from dh2sim.imports.converted import convert_robot
+    from dh2sim.imports.files import ImportOptions, import_robot
+    from dh2sim.kinematics.assignment.recover import recover_table
     from dh2sim.kinematics.chain import KinematicChain, build_chain
     from dh2sim.kinematics.forward import forward_kinematics, frame_poses
     from dh2sim.kinematics.jacobian import geometric_jacobian
     from dh2sim.model.build import build_model
     from dh2sim.model.robot_model import RobotModel
+    from dh2sim.kinematics.serial import SerialChain, SerialJoint
     from dh2sim.robot.load import load_robot, parse_robot
     from dh2sim.robot.spec import RobotSpec
+    from dh2sim.robot.writing.robot_file import robot_file_text
 
 __all__ = [
     "Dh2simError",
+    "ImportOptions",
     "KinematicChain",
     "RobotFileError",
     "RobotModel",
     "RobotSpec",
+    "SerialChain",
+    "SerialJoint",
     "build_chain",
     "build_model",
+    "convert_robot",
     "forward_kinematics",
     "frame_poses",
     "geometric_jacobian",
+    "import_robot",
     "load_robot",
     "parse_robot",
+    "recover_table",
+    "robot_file_text",
     "to_mjcf",
     "to_scene",
     "to_urdf",
@@ -41,17 +53,24 @@ __all__ = [
 
 _HOMES = {
     "Dh2simError": "errors",
+    "ImportOptions": "imports.files",
     "KinematicChain": "kinematics.chain",
     "RobotFileError": "errors",
     "RobotModel": "model.robot_model",
     "RobotSpec": "robot.spec",
+    "SerialChain": "kinematics.serial",
+    "SerialJoint": "kinematics.serial",
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
+    "convert_robot": "imports.converted",
     "forward_kinematics": "kinematics.forward",
     "frame_poses": "kinematics.forward",
     "geometric_jacobian": "kinematics.jacobian",
+    "import_robot": "imports.files",
     "load_robot": "robot.load",
     "parse_robot": "robot.load",
+    "recover_table": "kinematics.assignment.recover",
+    "robot_file_text": "robot.writing.robot_file",
     "to_mjcf": "formats.mjcf",
     "to_scene": "formats.scene",
     "to_urdf": "formats.urdf",

@@ -16,6 +16,8 @@ INK, SOFT, WARM, COOL = "#26303c", "#eef1f5", "#fbe6d2", "#dcebf7"
 
 BOXES = {
     # name: (x, y, width, words, colour)
+    "others": (0.0, 5.75, 1.7, "URDF, MJCF,\ntables, axes", "white"),
+    "imports": (0.0, 4.375, 1.7, "imports/\nback to DH", SOFT),
     "yaml": (0.0, 3.0, 1.7, "robot file\n(YAML)", "white"),
     "robot": (2.4, 3.0, 1.9, "robot/\nRobotSpec", SOFT),
     "kinematics": (5.0, 4.15, 2.1, "kinematics/\nKinematicChain", SOFT),
@@ -29,6 +31,8 @@ BOXES = {
     "run": (13.0, 5.75, 1.9, "dataset\n(Zarr)", "white"),
 }
 ARROWS = [
+    ("others", "imports"),
+    ("imports", "yaml"),
     ("yaml", "robot"),
     ("robot", "kinematics"),
     ("kinematics", "model"),

@@ -22,6 +22,7 @@ from dh2sim.validate.run import validate_robot
 README = Path(__file__).resolve().parent.parent / "README.md"
 CONSOLE = re.compile(r"^```console\n\$ (.*?)\n.*?^```", flags=re.MULTILINE | re.DOTALL)
 TABLE = re.compile(r"(<!-- accuracy: begin -->\n).*(<!-- accuracy: end -->)", flags=re.DOTALL)
+MARKDOWN = re.compile(r"^```markdown\n(.*?)^```", flags=re.MULTILINE | re.DOTALL)
 ROBOT_FILE = re.compile(r"^```yaml\n(name: my_arm\n.*?)^```", flags=re.MULTILINE | re.DOTALL)
 MISTAKES = (("alpha: 90,", "alfa: 90,"), ("[0.1, 1.2]", "[1.2, 0.1]"))
 """What is wrong in the robot file whose errors the page shows."""
@@ -36,6 +37,13 @@ def wrong_robot(text: str) -> str:
         assert right in robot
         robot = robot.replace(right, wrong)
     return robot
+
+
+def files(text: str) -> dict[str, str]:
+    """The files that the page's commands read, by name."""
+    table = MARKDOWN.search(text)
+    assert table is not None
+    return {"my_arm.yaml": wrong_robot(text), "ur5.md": table.group(1)}
 
 
 def run(command: str, folder: Path) -> str:
@@ -72,7 +80,8 @@ def main() -> None:
     text = README.read_text(encoding="utf-8")
     with TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "my_arm.yaml").write_text(wrong_robot(text), encoding="utf-8")
+        for file, content in files(text).items():
+            (folder / file).write_text(content, encoding="utf-8")
         text = CONSOLE.sub(lambda found: f"```console\n$ {found[1]}\n{run(found[1], folder)}```", text)
     README.write_text(TABLE.sub(lambda found: found[1] + accuracy() + found[2], text), encoding="utf-8")
 

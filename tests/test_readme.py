@@ -9,7 +9,7 @@ import pytest
 
 from dh2sim.robot.load import parse_robot
 from dh2sim.simulate import rollout
-from scripts.update_readme import wrong_robot
+from scripts.update_readme import files
 from tests.program import dh2sim_process
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -41,8 +41,9 @@ def without_rounding_noise(text: str) -> list[str]:
 def test_commands_print_what_the_readme_shows(command: str, output: str, tmp_path: Path) -> None:
     program, *arguments = command.split()
     assert program == "dh2sim"
-    if "my_arm.yaml" in arguments:
-        (tmp_path / "my_arm.yaml").write_text(wrong_robot(README), encoding="utf-8")
+    for name, content in files(README).items():
+        if name in arguments:
+            (tmp_path / name).write_text(content, encoding="utf-8")
     done = dh2sim_process(*arguments, cwd=tmp_path, variables={"COLUMNS": "80"})
     printed = without_rounding_noise(done.out + done.err)
     # a first export of the page's folder writes what later ones leave as it is
@@ -50,7 +51,14 @@ def test_commands_print_what_the_readme_shows(command: str, output: str, tmp_pat
 
 
 def test_there_are_commands_to_check() -> None:
-    assert [command.split()[1] for command, _ in shown_commands()] == ["export", "validate", "fk", "rollout", "info"]
+    assert [command.split()[1] for command, _ in shown_commands()] == [
+        "export",
+        "validate",
+        "fk",
+        "import",
+        "rollout",
+        "info",
+    ]
 
 
 def test_the_robot_file_of_the_readme_is_right() -> None:

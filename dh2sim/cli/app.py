@@ -6,8 +6,11 @@ from typing import Annotated
 
 import typer
 
+from dh2sim.cli.convert import convert
 from dh2sim.cli.export import export
 from dh2sim.cli.fk import fk
+from dh2sim.cli.frames import frames
+from dh2sim.cli.import_robot import import_robot
 from dh2sim.cli.info import info
 from dh2sim.cli.plot import plot
 from dh2sim.cli.render import render
@@ -28,6 +31,9 @@ Examples:
   dh2sim export stanford             write URDF and MJCF to generated/stanford/
   dh2sim validate stanford           check every engine against the table
   dh2sim fk stanford 0.3 -0.7 0.5 1.1 0.6 -0.4
+  dh2sim import arm.urdf -o arm.yaml
+  dh2sim convert stanford --to modified
+  dh2sim frames axes.yaml            from joint axes to a table
   dh2sim rollout stanford --out run.zarr
   dh2sim runs run.zarr               what a run holds
   dh2sim plot run.zarr               how its joints move
@@ -71,6 +77,9 @@ app.command(short_help="Check every engine against the table.")(guarded(validate
 # a negative number is no option
 app.command(context_settings={"ignore_unknown_options": True}, short_help="Print the pose of a frame.")(guarded(fk))
 app.command(short_help="Print the table, frames, mass and reach.")(guarded(info))
+app.command("import", short_help="Make a robot file of a URDF, an MJCF or a table.")(guarded(import_robot))
+app.command(short_help="Write a table in the other convention.")(guarded(convert))
+app.command(short_help="Assign DH frames to joint axes, step by step.")(guarded(frames))
 app.command(short_help="Simulate many rollouts into a dataset.")(guarded(rollout))
 app.command(short_help="Render a rollout as a film, or a robot.")(guarded(render))
 app.command(short_help="Plot joints, tool, energy or tracking.")(guarded(plot))

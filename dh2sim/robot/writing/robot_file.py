@@ -7,10 +7,10 @@ from pathlib import Path
 
 from dh2sim.robot.spec import ActuatorSpec, RobotSpec
 from dh2sim.robot.units import AngleUnit, LengthUnit, Units
-from dh2sim.robot.write_layout import Tree, entry_lines, table_lines
-from dh2sim.robot.write_numbers import UnitWriter, numbers
-from dh2sim.robot.write_parts import PartWriter, actuator
-from dh2sim.robot.write_text import comment_lines, text_lines, word
+from dh2sim.robot.writing.layout import Tree, entry_lines, table_lines
+from dh2sim.robot.writing.numbers import UnitWriter, numbers
+from dh2sim.robot.writing.parts import PartWriter, actuator
+from dh2sim.robot.writing.text import comment_lines, text_lines, word
 
 _GRAVITY = [0.0, 0.0, -9.81]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
-from dh2sim.robot.axes_schema import AxisEntry
+from dh2sim.robot.axes.schema import AxisEntry
 from dh2sim.robot.checks import check_actuators, check_configurations, check_names, check_type
 from dh2sim.robot.document import Node
 from dh2sim.robot.report import Report

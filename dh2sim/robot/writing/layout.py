@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import Final, TypeAlias
 
-from dh2sim.robot.write_text import WIDTH
+from dh2sim.robot.writing.text import WIDTH
 
 Tree: TypeAlias = "str | list[str] | dict[str, Tree]"
 """Texts as they stand in the file, in lists and mappings."""

@@ -13,12 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.kinematics.table import table_frame_poses
-from dh2sim.robot.axes_load import read_axes
-from dh2sim.robot.axes_spec import AxesSpec
+from dh2sim.robot.axes.load import read_axes
+from dh2sim.robot.axes.spec import AxesSpec
 from dh2sim.robot.load import load_robot
 from dh2sim.robot.spec import ActuatorType, Convention, JointType
 
-PUMA = Path(__file__).parents[2] / "docs" / "puma560_axes.yaml"
+PUMA = Path(__file__).parents[3] / "docs" / "puma560_axes.yaml"
 
 FULL = """\
 name: full

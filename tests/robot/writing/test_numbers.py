@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from dh2sim.errors import ModelError
 from dh2sim.robot.scalars import resolve_plain
 from dh2sim.robot.units import AngleUnit, LengthUnit, Units
-from dh2sim.robot.write_numbers import UnitWriter, number
+from dh2sim.robot.writing.numbers import UnitWriter, number
 
 DEGREES = UnitWriter(units=Units(angle=AngleUnit.DEG))
 

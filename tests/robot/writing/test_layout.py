@@ -23,7 +23,7 @@ from dh2sim.robot.spec import (
     Row,
 )
 from dh2sim.robot.units import AngleUnit, LengthUnit
-from dh2sim.robot.write import robot_file_text
+from dh2sim.robot.writing.robot_file import robot_file_text
 from dh2sim.typing import read_only
 from tests.robot.files import FULL, complaints, robot
 

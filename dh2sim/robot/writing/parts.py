@@ -23,9 +23,9 @@ from dh2sim.robot.spec import (
     RobotSpec,
     Row,
 )
-from dh2sim.robot.write_layout import Tree, inline
-from dh2sim.robot.write_numbers import UnitWriter, number, numbers
-from dh2sim.robot.write_text import word
+from dh2sim.robot.writing.layout import Tree, inline
+from dh2sim.robot.writing.numbers import UnitWriter, number, numbers
+from dh2sim.robot.writing.text import word
 from dh2sim.typing import Array
 
 

@@ -17,7 +17,7 @@ from dh2sim.robot.spec import (
     RobotSpec,
     Row,
 )
-from dh2sim.robot.write import robot_file_text
+from dh2sim.robot.writing.robot_file import robot_file_text
 
 
 def _shown_by(file: Path) -> RobotSpec:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from dh2sim.robot.compose import compose
 from dh2sim.robot.document import NOT_PRINTABLE, decode
 from dh2sim.robot.report import Report
-from dh2sim.robot.write_text import WIDTH, comment_lines, quoted, text_lines, word
+from dh2sim.robot.writing.text import WIDTH, comment_lines, quoted, text_lines, word
 
 ALPHABET = st.characters(exclude_categories=["Cs"]) | st.sampled_from(
     " \n\t\r\"'\\:#-?[]{},&*!|>%@`~\x85\u2028\ufeff"

@@ -30,7 +30,7 @@ from dh2sim.robot.spec import (
     Row,
 )
 from dh2sim.robot.units import AngleUnit, LengthUnit
-from dh2sim.robot.write import robot_file_text
+from dh2sim.robot.writing.robot_file import robot_file_text
 from tests.robot.files import FULL, robot
 from tests.strategies import joint_vectors_for, lengths, names, poses, robot_specs, robots_with_joint_vectors, vectors
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from dh2sim.errors import ImportedFileError
-from dh2sim.robot.axes_checks import check_axes
-from dh2sim.robot.axes_schema import AxesEntry
-from dh2sim.robot.axes_spec import AxesSpec, AxisJoint
+from dh2sim.robot.axes.checks import check_axes
+from dh2sim.robot.axes.schema import AxesEntry
+from dh2sim.robot.axes.spec import AxesSpec, AxisJoint
 from dh2sim.robot.compose import compose
 from dh2sim.robot.convert import to_spec
 from dh2sim.robot.document import Node, decode

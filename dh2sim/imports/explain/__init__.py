@@ -1,0 +1,1 @@
+"""A frame assignment in the words of a textbook."""

@@ -1,0 +1,1 @@
+"""A frame assignment as a picture of axes, frames and lengths."""

@@ -1,0 +1,1 @@
+"""Axes files: joint axes to which frames are yet to be assigned."""

@@ -1,0 +1,1 @@
+"""RobotSpecs to robot files."""

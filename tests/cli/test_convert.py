@@ -1,0 +1,58 @@
+"""``dh2sim convert``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dh2sim.robot.load import load_robot, parse_robot
+from tests.program import dh2sim
+
+
+def test_the_other_table_is_printed() -> None:
+    run = dh2sim("convert", "stanford", "--to", "modified")
+    assert run.status == 0
+    spec = parse_robot(run.out)
+    assert {row.convention.value for row in spec.rows} == {"modified"}
+    assert run.err.splitlines() == [
+        "dh2sim: note: Parameters are written as the numbers that they gave.",
+        run.err.splitlines()[1],
+    ]
+    assert run.err.splitlines()[1].startswith("stanford, 6 rows, modified; tool0 off by at most ")
+
+
+def test_the_other_table_is_written_and_converts_back(tmp_path: Path) -> None:
+    out = tmp_path / "scara_modified.yaml"
+    assert dh2sim("convert", "scara", "--to", "modified", "-o", out).status == 0
+    run = dh2sim("convert", out, "--to", "standard", "-q")
+    assert (run.status, run.err) == (0, "")
+    assert [(r.a, r.alpha, r.d) for r in parse_robot(run.out).rows] == [
+        (r.a, r.alpha, r.d) for r in load_robot("scara").rows
+    ]
+
+
+def test_a_wrong_convention_is_told() -> None:
+    run = dh2sim("convert", "scara", "--to", "hayati")
+    assert (run.status, run.out) == (2, "")
+    assert "'hayati' is none of standard, modified" in run.err
+
+
+def test_the_convention_wanted_must_be_named() -> None:
+    run = dh2sim("convert", "scara")
+    assert run.status == 2
+    assert "Missing option '--to'" in run.err
+
+
+def test_a_mesh_is_found_from_where_the_new_file_stands(tmp_path: Path) -> None:
+    (tmp_path / "old").mkdir()
+    (tmp_path / "new").mkdir()
+    facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+    (tmp_path / "old" / "m.stl").write_text(f"solid m\n{facet}endsolid m\n")
+    row = "{type: revolute, a: 0.4, alpha: 0.3, link: {mesh: {file: m.stl}}}"
+    text = f"name: r\nconvention: standard\njoints:\n  - {row}\n"
+    (tmp_path / "old" / "r.yaml").write_text(text)
+    out = tmp_path / "new" / "r.yaml"
+    assert dh2sim("convert", tmp_path / "old" / "r.yaml", "--to", "modified", "-o", out).status == 0
+    mesh_spec = load_robot(out).rows[0].link.mesh
+    assert mesh_spec is not None
+    assert mesh_spec.file.resolve() == (tmp_path / "old" / "m.stl").resolve()
+    assert mesh_spec.pose.xyz.tolist() == [0.4, 0.0, 0.0]

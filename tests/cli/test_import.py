@@ -1,0 +1,114 @@
+"""``dh2sim import``."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+
+import pytest
+
+from dh2sim.formats.urdf import to_urdf
+from dh2sim.model.build import build_model
+from dh2sim.robot.load import load_robot, parse_robot
+from tests.program import contents, dh2sim, dh2sim_process
+
+CSV = "theta,d (m),a (m),alpha (deg)\nq1,0.4,0,-90\nq2,0.15,0,90\n"
+
+
+@pytest.fixture
+def urdf(tmp_path: Path) -> Path:
+    path = tmp_path / "arm.urdf"
+    path.write_text(to_urdf(build_model(load_robot("stanford"))), encoding="utf-8")
+    return path
+
+
+def test_the_robot_file_is_printed_and_what_there_is_to_say_is_not_mixed_with_it(urdf: Path) -> None:
+    run = dh2sim("import", urdf)
+    assert run.status == 0
+    spec = parse_robot(run.out)
+    assert [row.type.value for row in spec.rows].count("prismatic") == 1
+    assert run.err.splitlines()[-1].startswith("stanford, 6 rows, standard; off by at most ")
+    assert run.err.splitlines()[-1].endswith(" at 1000 configurations")
+
+
+def test_the_robot_file_is_written_where_asked_for_and_exports(urdf: Path, tmp_path: Path) -> None:
+    out = tmp_path / "again.yaml"
+    run = dh2sim("import", urdf, "--convention", "modified", "--name", "again", "-o", out)
+    assert run.status == 0
+    assert run.out.startswith(f"{out}: again, 6 rows, modified; off by at most ")
+    assert dh2sim("validate", out, "--samples", "20").status == 0
+    assert dh2sim("export", out, "--out", tmp_path / "generated").status == 0
+
+
+def test_a_file_that_exists_is_not_written_over_unless_forced(urdf: Path, tmp_path: Path) -> None:
+    out = tmp_path / "arm.yaml"
+    out.write_text("mine\n")
+    run = dh2sim("import", urdf, "-o", out)
+    assert (run.status, run.out) == (2, "")
+    assert run.err == f"dh2sim: '{out}' exists already; choose another name, or write over it with --force\n"
+    assert out.read_text() == "mine\n"
+    assert dh2sim("import", urdf, "-o", out, "--force").status == 0
+    assert out.read_text() != "mine\n"
+
+
+def test_quiet_prints_only_the_robot_file(urdf: Path, tmp_path: Path) -> None:
+    assert dh2sim("import", urdf, "-q").err == ""
+    run = dh2sim("import", urdf, "-q", "-o", tmp_path / "quiet.yaml")
+    assert (run.status, run.out, run.err) == (0, "", "")
+
+
+def test_a_table_is_read_from_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(CSV.encode())))
+    run = dh2sim("import", "-", "--convention", "standard", "--name", "piped")
+    assert run.status == 0
+    assert [row.d for row in parse_robot(run.out).rows] == [0.4, 0.15]
+
+
+def test_a_table_without_a_convention_is_an_error_that_says_what_to_add(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text(CSV)
+    run = dh2sim("import", path, "-o", tmp_path / "out.yaml")
+    assert (run.status, run.out) == (2, "")
+    assert run.err.startswith(f"{path}:")
+    assert "--convention standard" in run.err
+    assert contents(tmp_path) == {"table.csv": CSV.encode()}
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--convention", "hayati"], "'hayati' is none of standard, modified"),
+        (["--convention", "modifed"], "'modifed' is none of standard, modified. Did you mean 'modified'?"),
+        (["--angle", "grad"], "'grad' is none of rad, deg"),
+        (["--length", "km"], "'km' is none of m, mm, cm, in"),
+        (["--tolerance", "0"], "0.0 is not between 0 and 1"),
+        (["--tolerance", "nan"], "nan is not between 0 and 1"),
+    ],
+)
+def test_a_wrong_option_is_told_with_what_is_allowed(urdf: Path, options: list[str], expected: str) -> None:
+    run = dh2sim("import", urdf, *options)
+    assert (run.status, run.out) == (2, "")
+    assert expected in run.err
+
+
+def test_an_unknown_tip_is_told_with_its_neighbours(urdf: Path) -> None:
+    run = dh2sim("import", urdf, "--tip", "tol0")
+    assert (run.status, run.out) == (2, "")
+    assert "Did you mean 'tool0'?" in run.err
+
+
+def test_nothing_is_left_behind_where_the_folder_is_missing(urdf: Path, tmp_path: Path) -> None:
+    out = tmp_path / "no" / "arm.yaml"
+    run = dh2sim("import", urdf, "-o", out)
+    assert run.err == f"dh2sim: cannot write '{out}': there is no folder '{out.parent}'\n"
+    assert run.status == 2
+
+
+def test_a_broken_file_is_told_with_its_place_and_without_a_traceback(tmp_path: Path) -> None:
+    path = tmp_path / "broken.urdf"
+    path.write_text('<robot name="r">\n  <link name="a">\n</robot>\n')
+    run = dh2sim_process("import", path)
+    assert (run.status, run.out) == (2, "")
+    assert run.err.startswith(f"{path}:3:")
+    assert "Traceback" not in run.err
