@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -42,6 +43,7 @@ def hand_over(text: str, out: Path | None, *, summary: str, notes: Iterable[str]
     if quiet:
         return
     for note in notes:
-        print(f"dh2sim: note: {note}", file=sys.stderr)
+        text = textwrap.fill(f"dh2sim: note: {note}", 80, subsequent_indent="  ", break_on_hyphens=False)
+        print(text, file=sys.stderr)
     where = "" if out is None else f"{out}: "
     print(f"{where}{summary}", file=sys.stderr if out is None else sys.stdout)

@@ -6,11 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
+from typing import Final, TypeAlias
 
 from dh2sim.kinematics.serial import SerialChain
 from dh2sim.model.mass import MassProperties
 from dh2sim.robot.spec import ActuatorSpec, Dynamics, Limits
 from dh2sim.typing import Array, read_only
+
+GREATEST: Final = 1e30
+"""Of any number in a file: products of a few such still fit a double."""
+Color: TypeAlias = tuple[float, float, float, float]
+"""Red, green, blue, alpha, each from 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -28,6 +34,26 @@ class SerialMesh:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Inertial:
+    """Mass properties as far as they are known, in a link of the arm; None where the file says nothing of use."""
+
+    mass: float | None = None
+    """kg, greater than 0."""
+    com: Array | None = field(default=None, repr=False)
+    """m, shape (3,)."""
+    inertia: Array | None = field(default=None, repr=False)
+    """About the centre of mass, along the axes of the link of the arm, kg·m², shape (3, 3)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Look:
+    """How a link looks; None where nothing of the file can be carried over."""
+
+    mesh: SerialMesh | None = None
+    color: Color | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SerialLink:
     """A link of the chain, with everything that is fixed to it; None where the file says nothing."""
 
@@ -40,8 +66,7 @@ class SerialLink:
     inertia: Array | None = None
     """About the centre of mass, along the link frame's axes, kg·m², shape (3, 3); possible for a body."""
     mesh: SerialMesh | None = None
-    color: tuple[float, float, float, float] | None = None
-    """Red, green, blue, alpha, each from 0 to 1."""
+    color: Color | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

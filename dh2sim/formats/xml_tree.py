@@ -238,3 +238,9 @@ def _not_utf_8(builder: _Builder, data: bytes) -> str | None:
 
 def _error(file: str, line: int, column: int, message: str) -> ImportedFileError:
     return ImportedFileError([Problem(file=file, line=max(line, 1), column=max(column, 1), path="", message=message)])
+
+
+def place(tag: str, name: str) -> str:
+    """Return how the path of a problem begins, such as ``joint[elbow]``."""
+    plain = name.isprintable() and 0 < len(name) <= 60
+    return f"{tag}[{name if plain else shown(name)}]"

@@ -13,6 +13,7 @@ from dh2sim.kinematics.assignment.simple import simple_angles, simple_length, si
 from dh2sim.kinematics.assignment.tolerances import Tolerances
 from dh2sim.kinematics.tensors import rotate_tensor
 from dh2sim.kinematics.transforms import invert, pose_from_rpy, rpy_from_rotation
+from dh2sim.model.mass import is_possible
 from dh2sim.robot.spec import ActuatorSpec, BaseSpec, Limits, LinkSpec, MeshSpec, Pose, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 
@@ -95,8 +96,12 @@ def _link(link: SerialLink, T_dh_link: Array, tolerances: Tolerances) -> LinkSpe
 
 def _rounded(tensor: Array, tolerances: Tolerances) -> Array:
     """Return an inertia with as few digits as the tolerance allows, relative to the largest moment."""
-    allowed = max(tolerances.angle, _ROUNDING) * float(np.trace(tensor))
-    return read_only([[_fewest_digits(value, allowed) for value in row] for row in tensor.tolist()])
+    for share in (max(tolerances.angle, _ROUNDING), _ROUNDING):
+        allowed = share * float(np.trace(tensor))
+        rounded = read_only([[_fewest_digits(value, allowed) for value in row] for row in tensor.tolist()])
+        if is_possible(rounded):  # that of a flat body may not be once it is rounded
+            return rounded
+    return tensor
 
 
 def _fewest_digits(value: float, allowed: float) -> float:

@@ -9,12 +9,15 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import numpy as np
+
 from dh2sim.kinematics.tensors import move_point, rotate_tensor
 from dh2sim.model.shapes import Shape, ShapeKind
 from dh2sim.typing import Array, read_only
 
 ROUNDING = (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """By which shares of its trace an inertia may be mended: numbers in robot files are rounded."""
+_TRIANGLE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,6 +74,18 @@ def shift_inertia(inertia: Array, mass: float, offset: list[float]) -> Array:
             for i in range(3)
         ]
     )
+
+
+def is_possible(inertia: Array) -> bool:
+    """Whether a body can have an inertia, shape (3, 3): positive definite, no two moments less than the third.
+
+    As a robot file allows it: two moments may fall short of the third by 1e-9 of it.
+    """
+    scale = float(np.abs(inertia).max())
+    if scale == 0.0:
+        return False
+    a, b, c = np.linalg.eigvalsh(inertia / scale).tolist()
+    return bool(a > 0.0 and a + b >= c * (1.0 - _TRIANGLE_TOLERANCE))
 
 
 def made_possible(inertia: Array) -> Array:

@@ -11,8 +11,8 @@ import numpy as np
 from dh2sim.formats.from_mjcf.chain import Selection
 from dh2sim.formats.from_mjcf.compile import Compiled
 from dh2sim.formats.from_mjcf.tree import MjcfJoint
-from dh2sim.formats.from_urdf.notes import Notes
-from dh2sim.formats.from_urdf.values import GREATEST
+from dh2sim.formats.notes import Notes
+from dh2sim.formats.serial_robot import GREATEST
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType
 from dh2sim.robot.words import shown
 

@@ -10,7 +10,7 @@ from dh2sim.errors import ImportedFileError
 from dh2sim.formats.from_mjcf.files import MjcfFiles
 from dh2sim.formats.from_mjcf.tree import WORLD, MjcfBody, MjcfJoint, MjcfSite, MjcfTree, Motion
 from dh2sim.formats.from_mjcf.walk import Walk, counted
-from dh2sim.formats.from_urdf.notes import Notes
+from dh2sim.formats.notes import Notes
 from dh2sim.robot.words import did_you_mean, listed, shown
 
 FIRST_TIP: Final = "tool0"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from dh2sim.errors import ImportedFileError, Problem
 from dh2sim.formats.from_mjcf.assets import Assets, MeshFile, drop_files, drop_pictures, find_assets, mesh_files
 from dh2sim.formats.from_mjcf.files import MjcfFiles
-from dh2sim.formats.from_urdf.notes import Notes
+from dh2sim.formats.notes import Notes
 
 if TYPE_CHECKING:
     import mujoco

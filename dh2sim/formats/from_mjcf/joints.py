@@ -14,8 +14,9 @@ from dh2sim.formats.from_mjcf.chain import Selection
 from dh2sim.formats.from_mjcf.compile import Compiled
 from dh2sim.formats.from_mjcf.files import MjcfFiles
 from dh2sim.formats.from_mjcf.tree import MjcfJoint, MjcfTree, Motion
-from dh2sim.formats.from_urdf.notes import Notes
-from dh2sim.formats.from_urdf.values import GREATEST, place
+from dh2sim.formats.notes import Notes
+from dh2sim.formats.serial_robot import GREATEST
+from dh2sim.formats.xml_tree import place
 from dh2sim.kinematics.serial import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.kinematics.trig import sin_cos

@@ -9,7 +9,7 @@ from dh2sim.formats.from_mjcf.chain import Selection, names_of
 from dh2sim.formats.from_mjcf.compile import Compiled
 from dh2sim.formats.from_mjcf.masses import weight_of
 from dh2sim.formats.from_mjcf.tree import WORLD, MjcfTree
-from dh2sim.formats.from_urdf.notes import Notes
+from dh2sim.formats.notes import Notes
 from dh2sim.robot.words import listed, shown
 
 _MOST_BRANCHES: Final = 20

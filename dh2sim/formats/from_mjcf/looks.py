@@ -10,9 +10,8 @@ import numpy as np
 from dh2sim.formats.from_mjcf.assets import MeshFile
 from dh2sim.formats.from_mjcf.compile import Compiled
 from dh2sim.formats.from_mjcf.tree import WORLD, MjcfBody, MjcfTree, pose
-from dh2sim.formats.from_urdf.notes import Notes
-from dh2sim.formats.from_urdf.visuals import Color, Look
-from dh2sim.formats.serial_robot import SerialMesh
+from dh2sim.formats.notes import Notes
+from dh2sim.formats.serial_robot import Color, Look, SerialMesh
 from dh2sim.kinematics.transforms import compose, invert
 from dh2sim.robot.fields import MESH_SUFFIXES
 from dh2sim.robot.words import listed

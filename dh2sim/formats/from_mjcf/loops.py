@@ -9,8 +9,8 @@ from dh2sim.errors import ImportedFileError, Problem
 from dh2sim.formats.from_mjcf.chain import Selection, names_of
 from dh2sim.formats.from_mjcf.files import MjcfFiles
 from dh2sim.formats.from_mjcf.tree import MjcfJoint, MjcfTree
-from dh2sim.formats.from_urdf.notes import Notes
-from dh2sim.formats.from_urdf.values import place
+from dh2sim.formats.notes import Notes
+from dh2sim.formats.xml_tree import place
 from dh2sim.robot.words import shown
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ import numpy as np
 
 from dh2sim.formats.from_mjcf.compile import Compiled
 from dh2sim.formats.from_mjcf.tree import MjcfBody, MjcfTree, pose
-from dh2sim.formats.from_urdf.inertials import Inertial, is_possible
-from dh2sim.formats.from_urdf.notes import Notes
+from dh2sim.formats.notes import Notes
+from dh2sim.formats.serial_robot import Inertial
 from dh2sim.kinematics.tensors import rotate_tensor
-from dh2sim.model.mass import MassProperties, combine, in_frame
+from dh2sim.model.mass import MassProperties, combine, in_frame, is_possible
 from dh2sim.typing import read_only
 
 if TYPE_CHECKING:

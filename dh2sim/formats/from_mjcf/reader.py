@@ -14,9 +14,8 @@ from dh2sim.formats.from_mjcf.looks import read_look
 from dh2sim.formats.from_mjcf.loops import check_loops
 from dh2sim.formats.from_mjcf.masses import read_mass
 from dh2sim.formats.from_mjcf.tree import WORLD, MjcfBody, MjcfTree, tree_of
-from dh2sim.formats.from_urdf.notes import Notes
-from dh2sim.formats.from_urdf.values import GREATEST
-from dh2sim.formats.serial_robot import SerialLink, SerialRobot
+from dh2sim.formats.notes import Notes
+from dh2sim.formats.serial_robot import GREATEST, SerialLink, SerialRobot
 from dh2sim.robot.words import shown
 from dh2sim.typing import Array, read_only
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from dh2sim.formats.from_urdf.notes import Notes
 from dh2sim.formats.from_urdf.tree import UrdfJoint, UrdfTree
+from dh2sim.formats.notes import Notes
 from dh2sim.formats.xml_tree import XmlReport
 from dh2sim.robot.words import listed, shown
 

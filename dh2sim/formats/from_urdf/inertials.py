@@ -3,36 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
-from dh2sim.formats.from_urdf.notes import Notes
 from dh2sim.formats.from_urdf.parts import Body, Part, note_unreadable
 from dh2sim.formats.from_urdf.values import read_number, read_only_child, read_pose
+from dh2sim.formats.notes import Notes
+from dh2sim.formats.serial_robot import Inertial
 from dh2sim.formats.xml_tree import Element, XmlReport
 from dh2sim.kinematics.tensors import move_point, rotate_tensor
 from dh2sim.kinematics.transforms import compose
-from dh2sim.model.mass import MassProperties, combine
+from dh2sim.model.mass import MassProperties, combine, is_possible
 from dh2sim.typing import Array, read_only
 
-_TRIANGLE_TOLERANCE: Final = 1e-9
-"""By which two principal moments may fall short of the third, relative to it; as in a robot file."""
 _POINT_MASS_SHARE: Final = 0.1
 """Of a body's mass: what lighter parts whose inertia is not known add by themselves is small."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Inertial:
-    """Mass properties as far as they are known, in a link of the arm; None where the file says nothing of use."""
-
-    mass: float | None = None
-    """kg, greater than 0."""
-    com: Array | None = field(default=None, repr=False)
-    """m, shape (3,)."""
-    inertia: Array | None = field(default=None, repr=False)
-    """About the centre of mass, along the axes of the link of the arm, kg·m², shape (3, 3)."""
 
 
 def read_inertial(body: Body, report: XmlReport, notes: Notes) -> Inertial:
@@ -70,15 +56,6 @@ def _checked(whole: MassProperties, name: str, notes: Notes) -> Inertial:
         return Inertial(mass=whole.mass, com=whole.com, inertia=whole.inertia)
     notes.group("An inertia that no body has is left out, of links {}.", name)
     return Inertial(mass=whole.mass, com=whole.com)
-
-
-def is_possible(inertia: Array) -> bool:
-    """Whether a body can have an inertia, shape (3, 3): positive definite, no two moments less than the third."""
-    scale = float(np.abs(inertia).max())
-    if scale == 0.0:
-        return False
-    a, b, c = np.linalg.eigvalsh(inertia / scale).tolist()
-    return bool(a > 0.0 and a + b >= c * (1.0 - _TRIANGLE_TOLERANCE))
 
 
 def _read_part(part: Part, report: XmlReport, notes: Notes) -> tuple[MassProperties, bool] | None:

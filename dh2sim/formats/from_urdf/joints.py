@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from dh2sim.formats.from_urdf.chain import Selection
-from dh2sim.formats.from_urdf.notes import Notes
 from dh2sim.formats.from_urdf.tree import UrdfJoint
 from dh2sim.formats.from_urdf.values import read_axis, read_bound, read_number, read_only_child, read_pose
+from dh2sim.formats.notes import Notes
 from dh2sim.formats.xml_tree import Element, XmlReport
 from dh2sim.kinematics.serial import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import compose, identity

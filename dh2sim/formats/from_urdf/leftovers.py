@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Final
 
 from dh2sim.formats.from_urdf.chain import Selection
-from dh2sim.formats.from_urdf.notes import Notes
 from dh2sim.formats.from_urdf.parts import Body, weight_of
 from dh2sim.formats.from_urdf.tree import UrdfJoint, UrdfTree
+from dh2sim.formats.notes import Notes
 from dh2sim.robot.words import listed, shown
 
 _MOST_BRANCHES: Final = 20

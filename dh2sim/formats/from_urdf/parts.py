@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from dh2sim.formats.from_urdf.chain import Selection
-from dh2sim.formats.from_urdf.notes import Notes
 from dh2sim.formats.from_urdf.tree import UrdfJoint, UrdfTree
-from dh2sim.formats.from_urdf.values import place, read_number, read_pose
-from dh2sim.formats.xml_tree import Element, XmlReport
+from dh2sim.formats.from_urdf.values import read_number, read_pose
+from dh2sim.formats.notes import Notes
+from dh2sim.formats.xml_tree import Element, XmlReport, place
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.robot.words import shown
 from dh2sim.typing import Array

@@ -8,12 +8,12 @@ from dh2sim.formats.from_urdf.chain import Selection, select_chain
 from dh2sim.formats.from_urdf.inertials import read_inertial
 from dh2sim.formats.from_urdf.joints import read_joints
 from dh2sim.formats.from_urdf.leftovers import note_leftovers
-from dh2sim.formats.from_urdf.notes import Notes
 from dh2sim.formats.from_urdf.parts import Body, read_bodies
 from dh2sim.formats.from_urdf.tree import UrdfTree, read_tree
 from dh2sim.formats.from_urdf.values import read_pose
 from dh2sim.formats.from_urdf.visuals import read_look, read_materials
 from dh2sim.formats.mesh_paths import FindMesh
+from dh2sim.formats.notes import Notes
 from dh2sim.formats.serial_robot import SerialLink, SerialRobot
 from dh2sim.formats.xml_tree import XmlReport, parse_xml
 from dh2sim.kinematics.transforms import compose, identity

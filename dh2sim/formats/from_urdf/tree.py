@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from dh2sim.formats.from_urdf.values import place, read_only_child
-from dh2sim.formats.xml_tree import Element, XmlReport
+from dh2sim.formats.from_urdf.values import read_only_child
+from dh2sim.formats.xml_tree import Element, XmlReport, place
 from dh2sim.robot.words import listed, shown
 
 JOINT_TYPES: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")

@@ -6,23 +6,15 @@ import math
 import re
 from typing import Final
 
+from dh2sim.formats.serial_robot import GREATEST
 from dh2sim.formats.xml_tree import Element, XmlReport
 from dh2sim.kinematics.transforms import identity, pose_from_rpy
 from dh2sim.robot.words import listed, shown
 from dh2sim.typing import Array, read_only
 
-GREATEST: Final = 1e30
-"""Of any number: products of a few such still fit a double."""
-
 _BLANK: Final = re.compile(r"[ \t\r\n]+")
 _NUMBER: Final = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _INFINITE: Final = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
-
-
-def place(tag: str, name: str) -> str:
-    """Return how the path of a problem begins, such as ``joint[elbow]``."""
-    plain = name.isprintable() and 0 < len(name) <= 60
-    return f"{tag}[{name if plain else shown(name)}]"
 
 
 def read_number(element: Element, attribute: str, path: str, report: XmlReport) -> float:

@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import PurePosixPath
-from typing import Final, TypeAlias
+from typing import Final
 
-from dh2sim.formats.from_urdf.notes import Notes
 from dh2sim.formats.from_urdf.parts import Body, Part, note_unreadable
 from dh2sim.formats.from_urdf.values import read_numbers, read_only_child, read_pose
 from dh2sim.formats.mesh_paths import FindMesh
-from dh2sim.formats.serial_robot import SerialMesh
+from dh2sim.formats.notes import Notes
+from dh2sim.formats.serial_robot import Color, Look, SerialMesh
 from dh2sim.formats.xml_tree import Element, XmlReport
 from dh2sim.kinematics.transforms import compose
 from dh2sim.robot.fields import MESH_SUFFIXES
 from dh2sim.robot.words import listed, shown
 
-Color: TypeAlias = tuple[float, float, float, float]
-
 _SAME: Final = 1e-6
 """By which the three scales of a mesh may differ, relative to the greatest."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Look:
-    """How a link looks; None where nothing of the file can be carried over."""
-
-    mesh: SerialMesh | None = None
-    color: Color | None = None
 
 
 def read_materials(robot: Element) -> Mapping[str, Color]:

@@ -22,6 +22,9 @@ from dh2sim.kinematics.assignment.lines import (
 from dh2sim.kinematics.assignment.tolerances import LOOSE, Tolerances
 from dh2sim.typing import Array
 
+_ABOUT_SQUARE = 0.02
+"""Cosine of a theta, about 1 degree off a quarter turn: which of two is the smaller is then an accident of rounding."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Passage:
@@ -140,7 +143,7 @@ def _sense(
 ) -> tuple[Array, SenseRule]:
     """Choose between ``forwards``, towards the next axis, and its opposite."""
     cosine = float(x_before @ forwards)
-    if abs(cosine) > LOOSE:
+    if abs(cosine) > _ABOUT_SQUARE:
         return (forwards if cosine > 0.0 else -forwards), SenseRule.LEAST_THETA
     if apart > tolerances.near:
         return forwards, SenseRule.TOWARDS_NEXT

@@ -1,0 +1,54 @@
+"""A chain in a file that somebody else wrote."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from dh2sim.imports.files import ImportOptions
+from dh2sim.robot.spec import Convention
+from scripts.real_arms.packages import Package
+
+TOLERANCE = ImportOptions().tolerance
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arm:
+    """A chain in a file, and what the import of it is asked for."""
+
+    robot: str
+    """Name and, where a file has more than one, which arm or leg."""
+    package: Package
+    file: str
+    """Below the package's folder of robots."""
+    base: str
+    """Where it begins: asked for, or found by the import itself."""
+    tip: str
+    ask_base: bool = False
+    ask_tip: bool = False
+    convention: Convention = Convention.STANDARD
+    tolerance: float = TOLERANCE
+    hayati: tuple[str, ...] = ()
+    """Joints whose rows are Hayati's."""
+    remark: str = ""
+
+    @property
+    def key(self) -> str:
+        """Short and different for every arm."""
+        tolerance = "" if self.tolerance == TOLERANCE else f"-{self.tolerance:.0e}"
+        modified = "-modified" if self.convention is Convention.MODIFIED else ""
+        return f"{self.package.name}/{self.robot.replace(' ', '_')}{modified}{tolerance}"
+
+    @property
+    def options(self) -> ImportOptions:
+        """What the import is given."""
+        return ImportOptions(
+            base=self.base if self.ask_base else None,
+            tip=self.tip if self.ask_tip else None,
+            convention=self.convention,
+            tolerance=self.tolerance,
+        )
+
+    def path(self, root: Path) -> Path:
+        """The file, where ``root`` is the package's folder of robots."""
+        return root / self.file
