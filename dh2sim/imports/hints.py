@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import Convention, RobotSpec
 
 _STEP = math.radians(15.0)
-_LOOKS_MEANT = 2e-4
-"""rad: 1.571 and 3.1416 are nearer to right angles; 1.57, which is 8e-4 off, may be meant."""
+_LOOKS_MEANT = 1e-5
+"""rad: 1.5708, 3.1416 and 0.7854 are nearer to what they stand for; calibrated angles seldom are."""
 
 
 def simpler_with(spec: RobotSpec, tolerance: float) -> str | None:
@@ -32,9 +32,9 @@ def simpler_with(spec: RobotSpec, tolerance: float) -> str | None:
 
 def _angles(spec: RobotSpec) -> Iterator[tuple[str, float]]:
     for row in spec.rows:
-        yield f"alpha of {row.name}", row.alpha
         yield f"theta of {row.name}", row.theta
-        yield f"beta of {row.name}", row.beta
+        if row.convention is not Convention.HAYATI:  # whose twists are small on purpose
+            yield f"alpha of {row.name}", row.alpha
 
 
 def _gap(angle: float) -> float:
