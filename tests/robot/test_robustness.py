@@ -91,7 +91,7 @@ def test_a_large_wrong_file_is_refused_soon(text: str) -> None:
     start = time.perf_counter()
     with pytest.raises(RobotFileError):
         parse_robot(text)
-    assert time.perf_counter() - start < 20
+    assert time.perf_counter() - start < 60  # hours, if it were not refused
 
 
 def test_a_large_right_file_is_read_soon() -> None:
