@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from dh2sim.kinematics.chain import KinematicChain, build_chain
     from dh2sim.kinematics.forward import forward_kinematics, frame_poses
     from dh2sim.kinematics.jacobian import geometric_jacobian
+    from dh2sim.kinematics.serial import SerialChain, SerialJoint
     from dh2sim.model.build import build_model
     from dh2sim.model.robot_model import RobotModel
-    from dh2sim.kinematics.serial import SerialChain, SerialJoint
     from dh2sim.robot.load import load_robot, parse_robot
     from dh2sim.robot.spec import RobotSpec
     from dh2sim.robot.writing.robot_file import robot_file_text

@@ -17,7 +17,21 @@ from tests.export.robots import small, write
 from tests.program import Outcome, dh2sim, dh2sim_process, environment
 
 ROOT = Path(__file__).resolve().parents[2]
-COMMANDS = ("export", "validate", "fk", "info", "import", "convert", "frames", "rollout", "render", "plot", "runs", "list", "schema")
+COMMANDS = (
+    "export",
+    "validate",
+    "fk",
+    "info",
+    "import",
+    "convert",
+    "frames",
+    "rollout",
+    "render",
+    "plot",
+    "runs",
+    "list",
+    "schema",
+)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

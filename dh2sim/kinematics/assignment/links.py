@@ -23,7 +23,7 @@ from dh2sim.kinematics.assignment.tolerances import LOOSE, Tolerances
 from dh2sim.typing import Array
 
 _ABOUT_SQUARE = 0.02
-"""Cosine of a theta, about 1 degree off a quarter turn: which of two is the smaller is then an accident of rounding."""
+"""Cosine of a theta 1 degree off a quarter turn: nearer than that, rounding decides which of two is the smaller."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

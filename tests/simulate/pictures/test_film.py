@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 from dh2sim.errors import OutputError, PictureError
+from dh2sim.export.placing import written_whole
 from dh2sim.simulate.pictures.film import Tempo, film_positions, require_ending, write_film, write_still
 from dh2sim.simulate.pictures.gif import check_gif, write_gif
 from dh2sim.simulate.pictures.mp4 import write_mp4
-from dh2sim.export.placing import written_whole
 from dh2sim.simulate.pictures.stage import Look, stage
 from tests.simulate.pictures.drawing import moving, require_gl
 
