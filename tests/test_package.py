@@ -35,11 +35,13 @@ PUBLIC = {
     "to_scene",
     "to_urdf",
 }
+URDF = Path(__file__).resolve().parent.parent / "generated" / "rpr" / "rpr.urdf"
 RUNS = {"zarr", "numcodecs", "google_crc32c"}
 TABLES = {"xarray", "pandas", "pyarrow", "h5netcdf", "h5py"}
 PICTURES = {"matplotlib", "PIL", "imageio_ffmpeg"}
 MODELS = {"trimesh", "yourdfpy", "pinocchio", "scipy", "lxml"}
-HEAVY = {"numpy", "mujoco", "pydantic", "ruamel", "rich", *RUNS, *TABLES, *PICTURES, *MODELS}
+VIEWER = {"viser", "mink", "websockets", "requests"}
+HEAVY = {"numpy", "mujoco", "pydantic", "ruamel", "rich", *RUNS, *TABLES, *PICTURES, *MODELS, *VIEWER}
 
 MODULES = """
 import sys
@@ -112,6 +114,10 @@ def test_importing_the_package_imports_nothing_but_itself() -> None:
         (RUN.format(arguments=["render", "--help"]), {"pydantic"}),
         (RUN.format(arguments=["plot", "--help"]), {"pydantic"}),
         (RUN.format(arguments=["runs", "--help"]), {"pydantic"}),
+        (RUN.format(arguments=["view", "--help"]), {"pydantic"}),
+        (RUN.format(arguments=["import", "--help"]), {"pydantic"}),
+        (RUN.format(arguments=["convert", "rpr", "--to", "standard", "-q"]), {"numpy", "pydantic", "ruamel"}),
+        (RUN.format(arguments=["import", str(URDF), "-q"]), {"numpy", "pydantic", "ruamel"}),
         (RUN.format(arguments=["--version"]), set()),
         (RUN.format(arguments=["fk", "rpr", "home"]), {"numpy", "pydantic", "ruamel"}),
     ],

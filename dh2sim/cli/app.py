@@ -20,6 +20,7 @@ from dh2sim.cli.running import guarded
 from dh2sim.cli.runs import runs
 from dh2sim.cli.schema import schema
 from dh2sim.cli.validate import validate
+from dh2sim.cli.view import view
 
 HELP = """\
 From a Denavit-Hartenberg table to a simulated robot that provably matches it.
@@ -31,6 +32,7 @@ Examples:
   dh2sim export stanford             write URDF and MJCF to generated/stanford/
   dh2sim validate stanford           check every engine against the table
   dh2sim fk stanford 0.3 -0.7 0.5 1.1 0.6 -0.4
+  dh2sim view stanford --export stanford.html
   dh2sim import arm.urdf -o arm.yaml
   dh2sim convert stanford --to modified
   dh2sim frames axes.yaml            from joint axes to a table
@@ -77,6 +79,7 @@ app.command(short_help="Check every engine against the table.")(guarded(validate
 # a negative number is no option
 app.command(context_settings={"ignore_unknown_options": True}, short_help="Print the pose of a frame.")(guarded(fk))
 app.command(short_help="Print the table, frames, mass and reach.")(guarded(info))
+app.command(short_help="See a robot in the browser, and edit its table.")(guarded(view))
 app.command("import", short_help="Make a robot file of a URDF, an MJCF or a table.")(guarded(import_robot))
 app.command(short_help="Write a table in the other convention.")(guarded(convert))
 app.command(short_help="Assign DH frames to joint axes, step by step.")(guarded(frames))

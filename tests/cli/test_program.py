@@ -22,6 +22,7 @@ COMMANDS = (
     "validate",
     "fk",
     "info",
+    "view",
     "import",
     "convert",
     "frames",
@@ -66,7 +67,7 @@ def test_every_example_of_the_programs_help_works(tmp_path: Path, monkeypatch: p
         run = dh2sim(*command, *quicker.get(command[0], []))
         assert run.status == 0, line
         assert run.err == "" or command[0] in talkative, line
-    assert len(lines) == 12
+    assert len(lines) == 13
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "arm.urdf",
         "arm.yaml",
@@ -75,6 +76,7 @@ def test_every_example_of_the_programs_help_works(tmp_path: Path, monkeypatch: p
         "run-0-joints.png",
         "run-0.mp4",
         "run.zarr",
+        "stanford.html",
     ]
 
 

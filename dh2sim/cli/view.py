@@ -1,0 +1,94 @@
+"""``dh2sim view``."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from dh2sim.view.server import Viewer
+    from dh2sim.view.state import ViewState
+
+DEFAULT_PORT = 8080
+
+
+def view(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file, or the name of a built-in robot.")],
+    run: Annotated[
+        Path | None,
+        typer.Argument(metavar="RUN.zarr", help="A run of that robot, to be played.", show_default=False),
+    ] = None,
+    port: Annotated[
+        int, typer.Option(min=1, max=65535, metavar="N", help="Port, or the next that is free.")
+    ] = DEFAULT_PORT,
+    host: Annotated[str, typer.Option(help="Address to listen at. The default is this machine only.")] = "127.0.0.1",
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
+    export: Annotated[
+        Path | None, typer.Option(metavar="PAGE.html", help="Write a page that needs no server, and end.")
+    ] = None,
+    rollout: Annotated[int, typer.Option(help="Which rollout of the run is exported, from 0.")] = 0,
+) -> None:
+    """See a robot in the browser: move its joints, edit its table, read its poses.
+
+    Every page has a state of its own. Edits never touch the robot file; they can be saved as another. Ctrl-C ends it.
+
+    \b
+    Examples:
+      dh2sim view stanford
+      dh2sim view my_robot.yaml --port 9000 --no-browser
+      dh2sim view stanford run.zarr
+      dh2sim view stanford --export stanford.html
+    """
+    gc.enable()
+    from dh2sim.robot.load import load_robot
+    from dh2sim.view.opening import folder_of, open_state
+
+    state = open_state(load_robot(robot), folder_of(robot))
+    if export is None:
+        _serve(state, run, host=host, port=port, browser=browser)
+    else:
+        _export(state, run, rollout, export)
+
+
+def _serve(state: ViewState, run: Path | None, *, host: str, port: int, browser: bool) -> None:
+    """Serve pages until somebody ends it."""
+    from dh2sim.view.server import Viewer, free_port
+
+    chosen = free_port(host, port)
+    if chosen != port:
+        print(f"dh2sim: port {port} is taken; the page is at {chosen}", file=sys.stderr)
+    viewer = Viewer(state, host=host, port=chosen, run=run)
+    try:
+        print(f"{state.spec.name}: {viewer.url}  (Ctrl-C ends it)", flush=True)
+        if browser:
+            _open_browser(viewer)
+        viewer.wait()
+    finally:
+        viewer.stop()
+
+
+def _export(state: ViewState, run: Path | None, rollout: int, page: Path) -> None:
+    """Write a page that needs no server."""
+    from dh2sim.view.page_export import export_page
+
+    data = None
+    if run is not None:
+        from dh2sim.simulate.pictures.selection import open_rollout
+
+        data = open_rollout(run, rollout)
+    export_page(state.model, state.q, page, rollout=data)
+    print(f"{page}: {state.spec.name}{'' if run is None else f', rollout {rollout} of {run}'}")
+
+
+def _open_browser(viewer: Viewer) -> None:
+    """Open the page, where there is a screen: else Python would start a browser in the terminal."""
+    import webbrowser
+
+    screen = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if screen:
+        webbrowser.open(viewer.url)

@@ -1,0 +1,1 @@
+"""The browser viewer: one immutable state, a scene derived from it, widgets that only send events."""

@@ -1,0 +1,49 @@
+"""The state that a page begins with."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from dh2sim.errors import Dh2simError
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.robot.catalog import builtin_path
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.view.draft import Source, Wrong, draft_of, editable_text, read
+from dh2sim.view.state import ViewState, configurations
+
+
+def folder_of(robot: str) -> Path | None:
+    """Return where paths in a robot's file start; ``robot`` is the path of one, or a robot's name."""
+    path = Path(robot) if os.path.lexists(robot) else builtin_path(robot)
+    return None if path is None else path.absolute().parent
+
+
+def open_state(spec: RobotSpec, folder: Path | None = None) -> ViewState:
+    """Return the state that a page begins with: the robot at home.
+
+    Args:
+        spec: The robot.
+        folder: Where paths in its file start.
+
+    Raises:
+        Dh2simError: The robot cannot be shown.
+    """
+    source = Source(file="robot.yaml" if spec.source_file is None else spec.source_file.path, folder=folder)
+    text = editable_text(spec, source)
+    model = read(text, source)
+    if isinstance(model, Wrong):
+        raise Dh2simError(f"{source.file}: {model.first}")
+    return state_of(model, text, source)
+
+
+def state_of(model: RobotModel, text: str, source: Source) -> ViewState:
+    """Return the state in which a robot that was just read is at home."""
+    return ViewState(
+        model=model,
+        text=text,
+        file=source.file,
+        folder=source.folder,
+        draft=draft_of(text, model.spec),
+        q=configurations(model)["home"],
+    )

@@ -1,0 +1,117 @@
+"""The joints: a slider with a number for each, and configurations that have names."""
+
+from __future__ import annotations
+
+import math
+import secrets
+from typing import TYPE_CHECKING, Any, Final
+
+from dh2sim.robot.units import AngleUnit
+from dh2sim.view.events import Event, MoveJoint, RandomConfiguration, SetConfiguration, ShowAngles
+from dh2sim.view.panel import markup
+from dh2sim.view.panel.bound import Bound, Send, bind, on_click
+from dh2sim.view.panel.keys import KEYS
+from dh2sim.view.panel.pose import pose_lines
+from dh2sim.view.readings import readings_of
+from dh2sim.view.state import ViewState, configurations, travel
+
+if TYPE_CHECKING:
+    import viser
+
+    from dh2sim.model.robot_model import JointModel
+
+_LAST: Final = 1e9
+"""Place of what stands below the sliders, which are made anew now and then."""
+_DIGITS: Final = {"deg": 2, "rad": 4, "m": 4}
+"""Decimals that are shown of a coordinate."""
+
+
+class JointsTab:
+    """Sliders are made anew when limits, units or joints change."""
+
+    def __init__(self, client: viser.ClientHandle, tab: viser.GuiTabHandle, send: Send, state: ViewState) -> None:
+        """Add the widgets to a tab, viser's current container."""
+        self._gui = client.gui
+        self._send = send
+        self._sliders: list[Bound[float]] = []
+        self._built: object = None
+        self._units = bind(
+            self._gui.add_dropdown("Angles in", ("deg", "rad"), initial_value=state.angle.value),
+            send,
+            lambda unit: ShowAngles(unit=AngleUnit(unit)),
+        )
+        self._tab = tab
+        self._readout = self._gui.add_html("", order=_LAST)
+        self._choice: Any = None
+
+    def show(self, state: ViewState) -> None:
+        """Show a state."""
+        self._units.show(state.angle.value)
+        described = _description(state)
+        if described != self._built:
+            self._built = described
+            self._build(state)
+        for slider, joint, value in zip(self._sliders, state.model.moving_joints, state.wanted, strict=True):
+            slider.show(_shown(joint, value, state.angle))
+        caption = markup.note(f"<b>{markup.text(state.frame)}</b> in base_link")
+        self._readout.content = caption + markup.lines(pose_lines(readings_of(state), state.angle), name="readout")
+
+    def _build(self, state: ViewState) -> None:
+        for widget in [*(slider.handle for slider in self._sliders), *([self._choice] if self._choice else [])]:
+            widget.remove()
+        with self._tab:
+            self._sliders = [
+                self._slider(i, joint, state.wanted[i], state.angle)
+                for i, joint in enumerate(state.model.moving_joints)
+            ]
+            self._choice = self._gui.add_button_group("Go to", (*configurations(state.model), "random"))
+        on_click(self._choice, self._send, lambda: _configuration(str(self._choice.value)))
+
+    def _slider(self, index: int, joint: JointModel, value: float, angle: AngleUnit) -> Bound[float]:
+        lower, upper = travel(joint)
+        unit = _unit(joint, angle)
+        slider = self._gui.add_slider(
+            f"{joint.name} [{_symbol(unit)}]",
+            min=_shown(joint, lower, angle),
+            max=_shown(joint, upper, angle),
+            step=10.0 ** -_DIGITS[unit],
+            initial_value=_shown(joint, value, angle),
+            hint=_hint(index, joint),
+        )
+
+        def event(number: float) -> Event:
+            return MoveJoint(joint=index, value=math.radians(number) if unit == "deg" else number)
+
+        return bind(slider, self._send, event)
+
+
+def _configuration(name: str) -> Event:
+    return RandomConfiguration(seed=secrets.randbits(32)) if name == "random" else SetConfiguration(name=name)
+
+
+def _description(state: ViewState) -> object:
+    """Return all that the sliders depend on besides where the joints are."""
+    joints = [(joint.name, joint.joint.type, travel(joint)) for joint in state.model.moving_joints]
+    return joints, state.angle, tuple(configurations(state.model))
+
+
+def _unit(joint: JointModel, angle: AngleUnit) -> str:
+    return angle.value if joint.joint.type.turns else "m"
+
+
+def _symbol(unit: str) -> str:
+    return "°" if unit == "deg" else unit
+
+
+def _shown(joint: JointModel, value: float, angle: AngleUnit) -> float:
+    unit = _unit(joint, angle)
+    number = round(math.degrees(value) if unit == "deg" else value, _DIGITS[unit])
+    return number + 0.0
+
+
+def _hint(index: int, joint: JointModel) -> str:
+    keys = f"; keys {KEYS[index].down} and {KEYS[index].up}" if index < len(KEYS) else ""
+    limits = "turns without end" if joint.range is None else "limits of the robot file"
+    if joint.range is not None and joint.range.assumed:
+        limits = "limits assumed: the robot file gives none"
+    return f"{joint.joint.type.value}, {limits}{keys}"

@@ -1,0 +1,54 @@
+"""HTML of the panel; every text that is not ours is escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+_CELL = "padding:0.1em 0.4em;white-space:nowrap"
+_MONO = "font-family:ui-monospace,Menlo,Consolas,monospace;font-size:0.78em"
+
+
+def text(content: object) -> str:
+    """Return any text as HTML."""
+    return escape(str(content))
+
+
+def table(rows: Iterable[Sequence[str]], *, head: Sequence[str] = (), name: str = "") -> str:
+    """Return a table of numbers; cells are HTML.
+
+    Args:
+        rows: Cells.
+        head: Cells of the first line.
+        name: For tests and style sheets.
+    """
+    top = f"<tr>{''.join(f'<th style={chr(34)}{_CELL};opacity:0.65{chr(34)}>{cell}</th>' for cell in head)}</tr>"
+    body = "".join(
+        f"<tr>{''.join(f'<td style={chr(34)}{_CELL};text-align:right{chr(34)}>{cell}</td>' for cell in row)}</tr>"
+        for row in rows
+    )
+    return (
+        f'<div data-dh2sim="{escape(name)}" style="overflow-x:auto;padding:0.3em 0.6em;{_MONO}">'
+        f'<table style="border-collapse:collapse">{top if head else ""}{body}</table></div>'
+    )
+
+
+def lines(pairs: Iterable[tuple[str, str]], *, name: str = "") -> str:
+    """Return names and values below each other; both are HTML."""
+    body = "".join(
+        f'<tr><td style="{_CELL};opacity:0.65">{key}</td><td style="{_CELL}">{value}</td></tr>'
+        for key, value in pairs
+    )
+    return (
+        f'<div data-dh2sim="{escape(name)}" style="overflow-x:auto;padding:0.3em 0.6em;{_MONO}">'
+        f'<table style="border-collapse:collapse">{body}</table></div>'
+    )
+
+
+def note(content: str, *, wrong: bool = False, name: str = "") -> str:
+    """Return a line of text, HTML; empty where there is nothing to say."""
+    if not content:
+        return f'<div data-dh2sim="{escape(name)}"></div>'
+    color = "#b42318" if wrong else "inherit"
+    style = f"padding:0.3em 0.8em;font-size:0.82em;line-height:1.35;color:{color};overflow-wrap:anywhere"
+    return f'<div data-dh2sim="{escape(name)}" style="{style}">{content}</div>'

@@ -1,0 +1,101 @@
+"""Who moves the joints: the user, a simulation, or a recording."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+from dh2sim.view.panel import markup
+from dh2sim.view.panel.bound import Bound, Send, bind, on_click
+from dh2sim.view.state import Mode, ViewState
+
+if TYPE_CHECKING:
+    import viser
+
+    from dh2sim.view.physics import Drive
+    from dh2sim.view.replay import Replay
+
+_WORDS = {Mode.STILL: "me", Mode.PHYSICS: "physics", Mode.REPLAY: "the recording"}
+
+
+class Mover(Protocol):
+    """What the tab asks of its page; each call in its turn, on the page's own thread."""
+
+    @property
+    def replay(self) -> Replay | None:
+        """The run that is open, if any."""
+
+    @property
+    def motion_told(self) -> str:
+        """What there is to tell of what moves the joints."""
+
+    def be_still(self) -> None:
+        """Give the joints back to the user."""
+
+    def simulate(self, *, gravity: bool, drive: Drive) -> None:
+        """Begin a simulation where the joints are."""
+
+    def play(self, rollout: int) -> None:
+        """Play a rollout from its beginning."""
+
+    def pace(self, *, playing: bool, speed: float) -> None:
+        """Let the recording run or stand, and how fast."""
+
+    def seek(self, share: float) -> None:
+        """Show the instant at a share of the recording, from 0 to 1."""
+
+
+class MotionTab:
+    """Widgets of the simulation, and of the run if there is one."""
+
+    def __init__(self, client: viser.ClientHandle, send: Send, mover: Mover) -> None:
+        """Add the widgets to viser's current container."""
+        gui = client.gui
+        self._send, self._mover = send, mover
+        modes = [mode for mode in Mode if mode is not Mode.REPLAY or mover.replay is not None]
+        self._mode = self._chosen(gui.add_dropdown("Moved by", [_WORDS[mode] for mode in modes]))
+        self._told = gui.add_html("")
+        with gui.add_folder("Physics"):
+            self._gravity = self._chosen(gui.add_checkbox("Gravity", True))
+            self._drive = self._chosen(gui.add_dropdown("Actuators", ("position", "free")))
+            on_click(gui.add_button("Begin anew"), send, lambda: self._begin)
+        self._rollout: Any = None
+        if mover.replay is not None:
+            with gui.add_folder("Recording"):
+                self._add_recording(gui, mover.replay)
+
+    def show(self, state: ViewState) -> None:
+        """Show a state."""
+        self._mode.show(_WORDS[state.mode])
+        told = self._mover.motion_told if state.mode is not Mode.STILL else ""
+        self._told.content = markup.note(markup.text(told), name="motion")
+
+    def _chosen(self, widget: Any) -> Bound[Any]:
+        """Begin anew whenever a choice changes."""
+        return bind(widget, self._send, lambda _value: self._begin)
+
+    def _add_recording(self, gui: viser.GuiApi, replay: Replay) -> None:
+        self._rollout = gui.add_dropdown("Rollout", [str(number) for number in replay.rollouts])
+        self._playing = gui.add_checkbox("Playing", True)
+        self._speed = gui.add_dropdown("Speed", ("0.1", "0.25", "0.5", "1", "2"), initial_value="1")
+        instant = gui.add_slider("Instant [%]", min=0.0, max=100.0, step=0.1, initial_value=0.0)
+        bind(self._rollout, self._send, lambda _value: self._begin)
+        bind(self._playing, self._send, lambda _value: self._pace)
+        bind(self._speed, self._send, lambda _value: self._pace)
+        bind(instant, self._send, lambda percent: lambda: self._mover.seek(percent / 100.0))
+        if replay.note:
+            gui.add_html(markup.note(markup.text(replay.note)))
+
+    def _begin(self) -> None:
+        """Let whoever is chosen move the joints, from the beginning."""
+        chosen = self._mode.handle.value
+        if chosen == _WORDS[Mode.PHYSICS]:
+            drive = cast("Drive", self._drive.handle.value)
+            self._mover.simulate(gravity=bool(self._gravity.handle.value), drive=drive)
+        elif chosen == _WORDS[Mode.REPLAY]:
+            self._mover.play(int(self._rollout.value))
+            self._pace()
+        else:
+            self._mover.be_still()
+
+    def _pace(self) -> None:
+        self._mover.pace(playing=bool(self._playing.value), speed=float(self._speed.value))

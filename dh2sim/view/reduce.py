@@ -1,0 +1,130 @@
+"""What comes of a page when something happens: a pure function, which never raises."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import assert_never
+
+from dh2sim.export.verify import sampling_limits
+from dh2sim.kinematics.frames import frame_names
+from dh2sim.kinematics.sampling import random_configurations
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.robot.words import shown as shown_word
+from dh2sim.view import events
+from dh2sim.view.state import Goal, Mode, ViewState, configurations, travel, within
+from dh2sim.view.table_edits import reading_of, replaced, table_changed
+from dh2sim.view.trace import traced
+
+TURN_STEP = math.radians(3.0)
+"""rad: of a nudge."""
+SLIDE_STEP = 0.01
+"""Of a nudge, as a share of the travel."""
+
+
+def reduce(state: ViewState, event: events.Event) -> ViewState:
+    """Return the state after an event; what is impossible changes nothing but the notice and the marks of cells.
+
+    Args:
+        state: What the page shows.
+        event: What happens. Numbers may be anything, rows and joints may not exist.
+    """
+    return traced(state, _reduced(state, event))
+
+
+def _reduced(state: ViewState, event: events.Event) -> ViewState:
+    match event:
+        case events.EditCell() | events.SetConvention() | events.ConvertTable() | events.SetUnits():
+            return table_changed(state, event)
+        case events.ReplaceText(text=text):
+            return replaced(state, text)
+        case events.Show(part=part, on=on):
+            return replace(state, shown=state.shown | {part} if on else state.shown - {part})
+        case events.ShowAngles(unit=unit):
+            return replace(state, angle=unit)
+        case events.SelectRow(row=row):
+            known = row is None or 0 <= row < len(state.draft.rows)
+            return replace(state, selected_row=row) if known else state
+        case events.ChooseFrame(name=name):
+            return replace(state, frame=name) if name in frame_names(state.model.chain) else state
+        case events.Compare(ghost=ghost):
+            return replace(state, ghost=ghost)
+        case events.CompareReading():
+            return replace(state, ghost=reading_of(state.model))
+        case events.Tell(notice=notice):
+            return replace(state, notice=notice)
+        case events.SetMode(mode=mode):
+            # a simulation may have left the limits by a hair
+            q = within(state.model, state.q)
+            return replace(state, mode=mode, q=q, target=q if mode is Mode.PHYSICS else None, goal=None)
+        case _:
+            return _moved(state, event)
+
+
+_Motion = (
+    events.MoveJoint
+    | events.SetJoints
+    | events.Nudge
+    | events.SetConfiguration
+    | events.RandomConfiguration
+    | events.Follow
+    | events.MoveTool
+    | events.DropGoal
+)
+
+
+def _moved(state: ViewState, event: _Motion) -> ViewState:
+    model, q = state.model, state.wanted
+    match event:
+        case events.MoveJoint(joint=joint, value=value):
+            return _at(state, _exchanged(q, joint, value))
+        case events.SetJoints(q=wanted):
+            return _at(state, wanted)
+        case events.Nudge(joint=joint, direction=direction):
+            return _at(state, _nudged(state, joint, direction))
+        case events.SetConfiguration(name=name):
+            named = configurations(model)
+            if name in named:
+                return _at(state, named[name])
+            return replace(state, notice=f"There is no configuration {shown_word(name)}.")
+        case events.RandomConfiguration(seed=seed):
+            (drawn,) = random_configurations(*sampling_limits(model), 1, abs(seed)).tolist()
+            return _at(state, tuple(drawn))
+        case events.Follow(q=seen):
+            usable = state.mode is not Mode.STILL and _fits(model, seen)
+            return replace(state, q=tuple(seen)) if usable else state
+        case events.MoveTool(T_base_link_tool0=T, q=found, reached=reached):
+            if state.mode is not Mode.STILL:
+                return state
+            moved = state if found is None else _at(state, found, keep_goal=True)
+            return replace(moved, goal=Goal(T_base_link_tool0=T, reached=reached))
+        case events.DropGoal():
+            return replace(state, goal=None)
+        case _:
+            assert_never(event)
+
+
+def _at(state: ViewState, q: tuple[float, ...], *, keep_goal: bool = False) -> ViewState:
+    """Return the state with the joints somewhere; a simulation is told to bring them there, a recording is not."""
+    if state.mode is Mode.REPLAY or not _fits(state.model, q):
+        return state
+    if state.mode is Mode.PHYSICS:
+        return replace(state, target=within(state.model, q))
+    return replace(state, q=within(state.model, q), goal=state.goal if keep_goal else None, notice="")
+
+
+def _fits(model: RobotModel, q: tuple[float, ...]) -> bool:
+    return len(q) == model.chain.n and all(math.isfinite(value) for value in q)
+
+
+def _exchanged(q: tuple[float, ...], joint: int, value: float) -> tuple[float, ...]:
+    return tuple(value if i == joint else old for i, old in enumerate(q))
+
+
+def _nudged(state: ViewState, joint: int, direction: int) -> tuple[float, ...]:
+    if not 0 <= joint < len(state.q):
+        return state.wanted
+    moving = state.model.moving_joints[joint]
+    lower, upper = travel(moving)
+    step = TURN_STEP if moving.joint.type.turns else SLIDE_STEP * (upper - lower)
+    return _exchanged(state.wanted, joint, state.wanted[joint] + math.copysign(step, direction))

@@ -1,0 +1,113 @@
+"""The scene that a state stands for: a pure function."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+import numpy as np
+
+from dh2sim.kinematics.forward import forward_kinematics, frame_poses
+from dh2sim.typing import Array
+from dh2sim.view.annotations import row_annotations
+from dh2sim.view.extent import size_of, triad_length
+from dh2sim.view.ghost import ghost_configuration, ghost_scene
+from dh2sim.view.items import Color, Item, Label, Path, Scene, Solid, Triad, Vector
+from dh2sim.view.solids import orientation_of, position_of, robot_solids
+from dh2sim.view.state import Part, ViewState
+
+ROBOT: Final = "/robot"
+FRAMES: Final = "/frames"
+NAMES: Final = "/names"
+_TRACE_COLOR: Final[Color] = (0.10, 0.45, 0.85)
+_GRID_COLOR: Final[Color] = (0.82, 0.84, 0.87)
+_AXIS_COLOR: Final[Color] = (0.62, 0.65, 0.70)
+_CELLS: Final = 20
+"""Cells of the grid along each side."""
+_SEEN_THROUGH: Final = 0.35
+"""Opacity of a robot inside which something is explained."""
+_TOGETHER: Final = 0.25
+"""Frames nearer to each other than this share of their axes' length have one label."""
+_ABOVE: Final = 0.45
+"""How far above its frame a label stands, as a share of the axes' length."""
+
+
+def scene_of(state: ViewState) -> Scene:
+    """Return everything that is drawn, by name.
+
+    The pose of ``/robot/link_i`` is that of link i in base_link, of ``/frames/dh_i`` that of DH frame i.
+    """
+    return dict(_items(state))
+
+
+def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
+    shapes = Part.SHAPES in state.shown
+    explained = Part.ANNOTATIONS in state.shown and state.selected_row is not None
+    solids = robot_solids(state.model, state.q, ROBOT, opacity=_SEEN_THROUGH if explained else None)
+    yield from ((name, item) for name, item in solids.items() if shapes or not isinstance(item, Solid))
+    if Part.FRAMES in state.shown:
+        yield from _frames(state)
+    if explained and state.selected_row is not None:
+        size = triad_length(state.model)
+        row = row_annotations(state.spec, state.model.chain, state.selected_row, state.q, size, state.angle)
+        yield from row.items()
+    if Part.GHOST in state.shown and state.ghost is not None:
+        stands = ghost_configuration(state.ghost.model, state.model, state.q)
+        yield from ghost_scene(state.ghost.model, stands.q).items()
+    if Part.TRACE in state.shown and len(state.trace) > 1:
+        yield "/trace", Path(points=state.trace, color=_TRACE_COLOR, width=3.0)
+    if Part.GRID in state.shown:
+        yield from _grid(size_of(state.model))
+
+
+def _frames(state: ViewState) -> Iterator[tuple[str, Item]]:
+    length = triad_length(state.model)
+    frames = frames_of(state)
+    for name, T_base_frame in frames.items():
+        position, orientation = position_of(T_base_frame), orientation_of(T_base_frame)
+        yield f"{FRAMES}/{name}", Triad(position=position, orientation=orientation, length=length)
+    if Part.FRAME_NAMES in state.shown:
+        yield from _names({name: position_of(T) for name, T in frames.items()}, length)
+
+
+def _names(places: Mapping[str, Vector], length: float) -> Iterator[tuple[str, Item]]:
+    """Yield the frames' names, those of frames with one origin on one label."""
+    groups: list[tuple[Vector, list[str]]] = []
+    for name, place in places.items():
+        group = next((names for other, names in groups if math.dist(other, place) <= _TOGETHER * length), None)
+        if group is None:
+            groups.append((place, [name]))
+        else:
+            group.append(name)
+    for (x, y, z), names in groups:
+        text = " ".join(_braced(name) for name in names)
+        yield f"{NAMES}/{names[0]}", Label(text=text, position=(x, y, z + _ABOVE * length))
+
+
+def frames_of(state: ViewState) -> dict[str, Array]:
+    """Return the poses of DH frames dh_0 … dh_n and of tool0 in base_link, shape (4, 4) each."""
+    chain = state.model.chain
+    poses = {f"dh_{i}": np.asarray(T) for i, T in enumerate(frame_poses(chain, state.q))}
+    return {**poses, "tool0": forward_kinematics(chain, state.q)}
+
+
+def _braced(name: str) -> str:
+    return f"{{{name.removeprefix('dh_')}}}" if name.startswith("dh_") else name
+
+
+def _grid(size: float) -> Iterator[tuple[str, Item]]:
+    """Yield lines on the ground, a round number of metres apart."""
+    cell = _round_length(2.6 * size / _CELLS)
+    half = 0.5 * _CELLS * cell
+    for k in range(_CELLS + 1):
+        at = -half + k * cell
+        color = _AXIS_COLOR if 2 * k == _CELLS else _GRID_COLOR
+        yield f"/grid/x_{k}", Path(points=((at, -half, 0.0), (at, half, 0.0)), color=color, width=1.0)
+        yield f"/grid/y_{k}", Path(points=((-half, at, 0.0), (half, at, 0.0)), color=color, width=1.0)
+
+
+def _round_length(length: float) -> float:
+    """Return 1, 2 or 5 times a power of ten, about as long."""
+    unit = 10.0 ** math.floor(math.log10(length))
+    return next(step * unit for step in (1.0, 2.0, 5.0, 10.0) if length <= step * unit * 1.000001)

@@ -1,0 +1,181 @@
+"""What one page shows: one immutable value, of which the scene and the panel are derived."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from dh2sim.model.robot_model import JointModel, RobotModel
+from dh2sim.robot.spec import Convention, JointType, RobotSpec
+from dh2sim.robot.units import AngleUnit, Units
+from dh2sim.view.items import Vector
+
+Matrix: TypeAlias = tuple[tuple[float, ...], ...]
+"""A pose of shape (4, 4), as tuples, so that states compare by value."""
+
+COLUMNS: Final = ("a", "alpha", "d", "theta", "beta")
+"""Columns of numbers of the table."""
+CONVENTION: Final = "convention"
+"""The column that names a row's convention."""
+
+
+class Mode(StrEnum):
+    """Who moves the joints."""
+
+    STILL = "still"
+    """The user."""
+    PHYSICS = "physics"
+    REPLAY = "replay"
+
+
+class Part(StrEnum):
+    """What can be shown or hidden."""
+
+    SHAPES = "shapes"
+    FRAMES = "frames"
+    FRAME_NAMES = "frame names"
+    ANNOTATIONS = "annotations"
+    TRACE = "trace"
+    GHOST = "ghost"
+    GRID = "grid"
+    HANDLE = "handle"
+    """To drag tool0 by."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Complaint:
+    """What is wrong with a cell of the table."""
+
+    row: int
+    """From 0."""
+    column: str
+    """One of ``COLUMNS``, or ``CONVENTION``."""
+    text: str
+    """As typed."""
+    message: str
+    """In the words of the robot file's reader."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DraftRow:
+    """A row of the table as it is typed."""
+
+    name: str
+    type: JointType
+    convention: Convention
+    cells: tuple[str, ...]
+    """Texts of ``COLUMNS``, in the file's units; may be expressions."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Draft:
+    """The table as it is typed; where it is wrong, the robot is the one of before."""
+
+    rows: tuple[DraftRow, ...]
+    convention: Convention
+    """Of rows that name none."""
+    units: Units
+    complaints: tuple[Complaint, ...] = ()
+
+    def complaint(self, row: int, column: str) -> Complaint | None:
+        """Return what is wrong with a cell, or None."""
+        return next((found for found in self.complaints if (found.row, found.column) == (row, column)), None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goal:
+    """Where the tool is wanted."""
+
+    T_base_link_tool0: Matrix
+    reached: bool
+    """Whether the robot can bring tool0 there, and did."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ghost:
+    """A second robot, drawn pale beside the first, at the same joint coordinates."""
+
+    model: RobotModel = field(repr=False)
+    label: str
+    reading: bool = False
+    """Whether it is the first robot's own table in the other convention, and changes with it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViewState:
+    """Everything that a page shows."""
+
+    model: RobotModel = field(repr=False)
+    """Of the last table that was right."""
+    text: str = field(repr=False)
+    """The robot file that ``model`` was read from."""
+    file: str
+    """Name of that file, for messages."""
+    folder: Path | None
+    """Where paths in it start."""
+    draft: Draft
+    q: tuple[float, ...]
+    """Joint coordinates, rad and m."""
+    target: tuple[float, ...] | None = None
+    """Where a simulation's actuators hold the joints; None where there is no simulation."""
+    shown: frozenset[Part] = frozenset({Part.SHAPES, Part.FRAMES, Part.FRAME_NAMES, Part.GRID, Part.GHOST})
+    selected_row: int | None = None
+    """Row of the table that is explained, from 0."""
+    angle: AngleUnit = AngleUnit.DEG
+    """Unit that angles are shown in, outside of the table."""
+    frame: str = "tool0"
+    """Whose pose is shown; one of ``frame_names``."""
+    ghost: Ghost | None = None
+    trace: tuple[Vector, ...] = ()
+    """Where tool0 was since ``Part.TRACE`` is shown, m."""
+    goal: Goal | None = None
+    mode: Mode = Mode.STILL
+    notice: str = ""
+    """What the user is told, in a sentence or two; empty where there is nothing to tell."""
+
+    @property
+    def wanted(self) -> tuple[float, ...]:
+        """Where the user wants the joints: what sliders show."""
+        return self.q if self.target is None else self.target
+
+    @property
+    def spec(self) -> RobotSpec:
+        """The robot as its file describes it."""
+        return self.model.spec
+
+
+def travel(joint: JointModel) -> tuple[float, float]:
+    """Return the lowest and highest coordinate that a moving joint can be given, rad or m; ±π if continuous."""
+    return (-math.pi, math.pi) if joint.range is None else (joint.range.lower, joint.range.upper)
+
+
+def within(model: RobotModel, q: tuple[float, ...]) -> tuple[float, ...]:
+    """Return joint coordinates moved inside the limits; those of continuous joints are turned whole turns.
+
+    Args:
+        model: The robot.
+        q: rad and m, finite, one for each moving joint.
+    """
+    return tuple(_within(joint, value) for joint, value in zip(model.moving_joints, q, strict=True))
+
+
+def _within(joint: JointModel, value: float) -> float:
+    lower, upper = travel(joint)
+    if joint.range is None:
+        value = value if lower <= value <= upper else math.remainder(value, 2.0 * math.pi)
+    return min(max(value, lower), upper)
+
+
+def configurations(model: RobotModel) -> dict[str, tuple[float, ...]]:
+    """Return the configurations that have a name, rad and m, inside the limits: home, zero and the file's."""
+    zero = (0.0,) * model.chain.n
+    named = {name: tuple(np.asarray(vector).tolist()) for name, vector in model.spec.configurations.items()}
+    return {
+        name: within(model, vector)
+        for name, vector in {"home": tuple(model.home.tolist()), "zero": zero, **named}.items()
+    }

@@ -1,0 +1,154 @@
+"""What comes of a page when its table is edited: the robot of the new table, or the old one and marks of cells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeAlias
+
+from dh2sim.errors import Dh2simError
+from dh2sim.kinematics.frames import frame_names
+from dh2sim.model.build import build_model
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.robot.spec import Convention, JointType
+from dh2sim.robot.writing.robot_file import robot_file_text
+from dh2sim.view.draft import LONGEST_CELL, Source, Wrong, complaints_of, draft_of, read, too_long, try_cells
+from dh2sim.view.events import ConvertTable, EditCell, SetConvention, SetUnits
+from dh2sim.view.ghost import other_reading
+from dh2sim.view.state import COLUMNS, CONVENTION, Complaint, Ghost, Mode, ViewState, configurations, within
+from dh2sim.view.table_text import Cell, own_conventions
+
+TableEvent: TypeAlias = EditCell | SetConvention | ConvertTable | SetUnits
+
+_STANDS = "The robot is the one of before"
+
+
+def table_changed(state: ViewState, event: TableEvent) -> ViewState:
+    """Return the state after an edit of the table."""
+    if state.mode is not Mode.STILL:
+        return replace(state, notice="The table can be edited once physics and replay are off.")
+    match event:
+        case EditCell(row=row, column=column, text=text):
+            known = 0 <= row < len(state.draft.rows) and column in (*COLUMNS, CONVENTION)
+            return _edited(state, {(row, column): text}) if known else state
+        case SetConvention(row=row, convention=convention):
+            known = row is None or 0 <= row < len(state.draft.rows)
+            return _edited(state, _in_convention(state, row, convention)) if known else state
+        case ConvertTable(convention=convention):
+            return _converted(state, convention)
+        case SetUnits():
+            return _in_units(state, event)
+
+
+def replaced(state: ViewState, text: str) -> ViewState:
+    """Return the state with the robot of another text, if it describes one."""
+    if state.mode is not Mode.STILL:
+        return replace(state, notice="The table can be edited once physics and replay are off.")
+    model = read(text, source_of(state))
+    if isinstance(model, Wrong):
+        return replace(state, notice=f"{_STANDS}: {model.first}")
+    return _with_robot(state, text, model)
+
+
+def reading_of(model: RobotModel) -> Ghost | None:
+    """Return what the same table is in the other convention; None where that cannot be built."""
+    try:
+        return Ghost(model=build_model(other_reading(model.spec)), label="the same table, misread", reading=True)
+    except Dh2simError:
+        return None
+
+
+def source_of(state: ViewState) -> Source:
+    """Return what the text of a state's robot needs to be read."""
+    return Source(file=state.file, folder=state.folder)
+
+
+def _edited(state: ViewState, cells: Mapping[Cell, str | None]) -> ViewState:
+    """Take what is typed into cells if it describes a robot; else keep the robot and mark the cells.
+
+    Cells that were wrong before get another chance: two that are wrong alone may be right together.
+    """
+    source = source_of(state)
+    typed = {cell: text for cell, text in cells.items() if text is not None}
+    if long := too_long(typed):
+        return _marked(state, {cell: f"{text[:LONGEST_CELL]}…" for cell, text in typed.items()}, long)
+    pending: dict[Cell, str | None] = {(old.row, old.column): old.text for old in state.draft.complaints}
+    everything = try_cells(state.text, {**pending, **cells}, source)
+    if not isinstance(everything, Wrong):
+        return _with_robot(state, *everything)
+    others = {cell: text for cell, text in pending.items() if cell not in cells and text is not None}
+    alone = try_cells(state.text, cells, source) if others else everything
+    if isinstance(alone, Wrong):
+        return _marked(state, typed, alone)
+    return _with_robot(state, *alone, complaints=complaints_of(others, everything))
+
+
+def _in_convention(state: ViewState, row: int | None, convention: Convention) -> dict[Cell, str | None]:
+    """Return the cells that give a row, or all, a convention; zeros that it has no column for are taken out."""
+    named: list[int | None] = [None, *own_conventions(state.text)] if row is None else [row]
+    cells: dict[Cell, str | None] = {(one, CONVENTION): convention.value for one in named}
+    for i, spec in enumerate(state.spec.rows):
+        if row not in (None, i):
+            continue
+        if convention is not Convention.HAYATI and spec.beta == 0.0:
+            cells[i, "beta"] = None
+        if convention is Convention.HAYATI and spec.d == 0.0 and spec.type is not JointType.PRISMATIC:
+            cells[i, "d"] = None
+    return cells
+
+
+def _marked(state: ViewState, cells: Mapping[Cell, str], wrong: Wrong) -> ViewState:
+    """Return the state with complaints about cells; the robot stays."""
+    kept = tuple(old for old in state.draft.complaints if (old.row, old.column) not in cells)
+    complaints = (*kept, *complaints_of(cells, wrong))
+    draft = draft_of(state.text, state.spec, complaints)
+    return replace(state, draft=draft, notice=f"{_STANDS}: {wrong.first}")
+
+
+def _with_robot(
+    state: ViewState, text: str, model: RobotModel, *, complaints: tuple[Complaint, ...] = (), notice: str = ""
+) -> ViewState:
+    """Return the state with another robot; joints stay where they are, as far as the new limits allow."""
+    same_joints = [joint.joint.type for joint in model.joints] == [joint.joint.type for joint in state.model.joints]
+    rows = len(model.joints)
+    return replace(
+        state,
+        model=model,
+        text=text,
+        draft=draft_of(text, model.spec, complaints),
+        q=within(model, state.q) if same_joints else configurations(model)["home"],
+        frame=state.frame if state.frame in frame_names(model.chain) else "tool0",
+        selected_row=state.selected_row if state.selected_row is None or state.selected_row < rows else None,
+        ghost=reading_of(model) if state.ghost is not None and state.ghost.reading else state.ghost,
+        goal=None,
+        notice=notice,
+    )
+
+
+def _converted(state: ViewState, convention: Convention) -> ViewState:
+    from dh2sim.imports.converted import convert_robot
+
+    if convention is Convention.HAYATI:
+        return replace(state, notice="A table can be converted to standard or modified, not to Hayati.")
+    try:
+        converted = convert_robot(state.spec, convention, folder=state.folder)
+    except Dh2simError as error:
+        return replace(state, notice=f"{_STANDS}: {error}")
+    return _rewritten(state, converted.text, notes=[f"Converted: {converted.summary}.", *converted.notes])
+
+
+def _in_units(state: ViewState, event: SetUnits) -> ViewState:
+    try:
+        text = robot_file_text(state.spec, folder=state.folder, angle=event.angle, length=event.length)
+    except Dh2simError as error:
+        return replace(state, notice=f"{_STANDS}: {error}")
+    lost = ["Numbers stand where parameters stood."] if state.spec.parameters else []
+    return _rewritten(state, text, notes=lost)
+
+
+def _rewritten(state: ViewState, text: str, *, notes: list[str]) -> ViewState:
+    """Return the state with the same robot written anew, in which parameters and comments are gone."""
+    model = read(text, source_of(state))
+    if isinstance(model, Wrong):
+        return replace(state, notice=f"{_STANDS}: {model.first}")
+    return _with_robot(state, text, model, notice=" ".join(notes))

@@ -1,0 +1,47 @@
+#!/usr/bin/env python3
+"""Take docs/images/viewer.png: the viewer in a real browser, a row of the table explained in the scene.
+
+Needs the extra `test`, and Chromium.
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+from dh2sim.robot.load import load_robot
+from dh2sim.view.opening import folder_of, open_state
+from dh2sim.view.server import Viewer, free_port
+
+OUT = Path(__file__).resolve().parent.parent / "docs" / "images" / "viewer.png"
+HOST = "127.0.0.1"
+SOFTWARE = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+
+def main() -> None:
+    """Open the page, choose a row, wait until all is drawn, and take the picture."""
+    browser_path = shutil.which("chromium") or shutil.which("google-chrome")
+    viewer = Viewer(open_state(load_robot("stanford"), folder_of("stanford")), host=HOST, port=free_port(HOST, 8450))
+    try:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=browser_path, args=SOFTWARE)
+            page = browser.new_page(viewport={"width": 1280, "height": 760})
+            page.goto(viewer.url)
+            page.get_by_role("tab", name="Table").click()
+            page.get_by_text("Explain in scene").wait_for()
+            page.get_by_label("Explain in scene").click()
+            page.wait_for_timeout(8000)
+            close = page.locator(".mantine-Notification-closeButton")  # of the warning about software rendering
+            if close.count():
+                close.first.click()
+            page.wait_for_timeout(2000)
+            page.screenshot(path=OUT)
+            browser.close()
+    finally:
+        viewer.stop()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,237 @@
+"""``dh2sim view`` as a whole process, and what every robot that comes with dh2sim opens with."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.load import load_robot
+from dh2sim.view.opening import folder_of, open_state
+from dh2sim.view.scene import scene_of
+from tests.program import dh2sim, dh2sim_process, environment
+
+ADDRESS = "127.0.0.1"
+TIMEOUT = 30.0
+"""s."""
+
+
+@contextlib.contextmanager
+def serving(*arguments: str | Path) -> Iterator[subprocess.Popen[str]]:
+    """A viewer in a process of its own, which has not printed anything yet; ended with its context."""
+    # not through a shell's '&': what that starts ignores SIGINT
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dh2sim", "view", *map(str, arguments), "--no-browser"],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    with process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def first_line(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline()
+
+
+def unused_port() -> int:
+    with socket.socket() as trial:
+        trial.bind((ADDRESS, 0))
+        return int(trial.getsockname()[1])
+
+
+@contextlib.contextmanager
+def taken_port() -> Iterator[int]:
+    """A port at which somebody listens, and behind which there are others."""
+    while True:
+        with socket.socket() as listener:
+            listener.bind((ADDRESS, 0))
+            port = int(listener.getsockname()[1])
+            if port < 65000:
+                listener.listen()
+                yield port
+                return
+
+
+def is_free(port: int) -> bool:
+    with socket.socket() as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((ADDRESS, port))
+        except OSError:
+            return False
+    return True
+
+
+def page_of(url: str) -> str:
+    with urllib.request.urlopen(url, timeout=TIMEOUT) as answer:
+        assert answer.status == 200
+        return str(answer.read().decode())
+
+
+@pytest.mark.parametrize(
+    ("kind", "status", "told"),
+    [(signal.SIGINT, 130, "dh2sim: interrupted\n"), (signal.SIGTERM, 143, "")],
+    ids=["SIGINT", "SIGTERM"],
+)
+def test_it_serves_a_page_where_it_says_until_it_is_ended(kind: signal.Signals, status: int, told: str) -> None:
+    port = unused_port()
+    with serving("stanford", "--port", str(port)) as process:
+        assert first_line(process) == f"stanford: http://{ADDRESS}:{port}  (Ctrl-C ends it)\n"
+        assert page_of(f"http://{ADDRESS}:{port}").lstrip().lower().startswith("<!doctype html")
+        process.send_signal(kind)
+        started = time.monotonic()
+        out, err = process.communicate(timeout=TIMEOUT)
+        assert time.monotonic() - started < 5.0
+    assert (process.returncode, out, err) == (status, "", told)
+    assert is_free(port)
+
+
+def test_it_ends_at_once_though_a_page_is_open() -> None:
+    client = pytest.importorskip("websockets.sync.client")
+    import viser
+
+    port = unused_port()
+    with serving("stanford", "--port", str(port)) as process:
+        first_line(process)
+        protocols = [f"viser-v{viser.__version__}"]
+        with client.connect(f"ws://{ADDRESS}:{port}", subprotocols=protocols, max_size=None) as connection:
+            connection.recv(timeout=TIMEOUT)
+            process.send_signal(signal.SIGINT)
+            started = time.monotonic()
+            out, err = process.communicate(timeout=TIMEOUT)
+            assert time.monotonic() - started < 5.0
+    assert (process.returncode, out, err) == (130, "", "dh2sim: interrupted\n")
+    assert is_free(port)
+
+
+def test_an_interruption_while_it_starts_is_no_traceback() -> None:
+    for delay in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6):
+        with serving("stanford", "--port", str(unused_port())) as process:
+            time.sleep(delay)
+            process.send_signal(signal.SIGINT)
+            err = process.communicate(timeout=TIMEOUT)[1]
+        # before the program listens, the signal itself ends the process
+        assert (process.returncode, err) in [(130, "dh2sim: interrupted\n"), (-signal.SIGINT, "")] or (
+            process.returncode == -signal.SIGINT and "dh2sim" not in err
+        ), delay
+
+
+def test_it_can_only_be_reached_from_this_machine_unless_it_is_told_otherwise() -> None:
+    with serving("stanford", "--port", str(port := unused_port())) as process:
+        first_line(process)
+        # every address in 127.0.0.0/8 is this machine's; one that was not asked for is not listened at
+        with socket.socket() as other:
+            assert other.connect_ex(("127.0.0.2", port)) != 0
+    with serving("stanford", "--port", str(port := unused_port()), "--host", "0.0.0.0") as process:
+        assert first_line(process) == f"stanford: http://{ADDRESS}:{port}  (Ctrl-C ends it)\n"
+        with socket.socket() as other:
+            assert other.connect_ex(("127.0.0.2", port)) == 0
+
+
+def test_of_a_taken_port_it_takes_the_next_that_is_free_and_says_so() -> None:
+    with taken_port() as port, serving("stanford", "--port", str(port)) as process:
+        found = re.fullmatch(
+            rf"stanford: http://{re.escape(ADDRESS)}:(\d+)  \(Ctrl-C ends it\)\n", first_line(process)
+        )
+        assert found is not None
+        chosen = int(found.group(1))
+        assert port < chosen < port + 100
+        assert "<html" in page_of(f"http://{ADDRESS}:{chosen}")
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=TIMEOUT)
+    assert err == f"dh2sim: port {port} is taken; the page is at {chosen}\ndh2sim: interrupted\n"
+    assert process.returncode == 130
+
+
+def test_a_second_viewer_stands_beside_the_first() -> None:
+    port = unused_port()
+    with serving("stanford", "--port", str(port)) as first:
+        first_line(first)
+        with serving("scara", "--port", str(port)) as second:
+            assert first_line(second) != f"scara: http://{ADDRESS}:{port}  (Ctrl-C ends it)\n"
+
+
+def test_a_robot_that_there_is_not_is_refused() -> None:
+    done = dh2sim("view", "stanfrod", "--no-browser")
+    assert (done.status, done.out) == (2, "")
+    assert done.err.startswith("dh2sim: there is no file and no robot named 'stanfrod'. Did you mean 'stanford'?")
+
+
+@pytest.mark.parametrize(
+    ("host", "told"),
+    [
+        # an address that is set aside for documentation, RFC 5737: no machine has it
+        ("192.0.2.1", "dh2sim: cannot listen at 192.0.2.1, port 8080: Cannot assign requested address\n"),
+        ("256.0.0.1", "dh2sim: cannot listen at 256.0.0.1, port 8080: Name or service not known\n"),
+    ],
+)
+def test_an_address_that_nobody_can_listen_at_is_refused(host: str, told: str) -> None:
+    done = dh2sim_process("view", "stanford", "--no-browser", "--host", host)
+    assert (done.status, done.out, done.err) == (2, "", told)
+
+
+@pytest.mark.parametrize("port", ["0", "65536", "-1", "eighty"])
+def test_a_number_that_is_no_port_is_refused(port: str) -> None:
+    done = dh2sim("view", "stanford", "--no-browser", "--port", port)
+    assert (done.status, done.out) == (2, "")
+    assert "Invalid value for '--port'" in done.err
+
+
+def test_a_page_is_exported_as_one_file_and_nothing_else(tmp_path: Path) -> None:
+    done = dh2sim_process("view", "stanford", "--export", "page.html", cwd=tmp_path)
+    assert (done.status, done.out, done.err) == (0, "page.html: stanford\n", "")
+    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert text.lstrip().lower().startswith("<!doctype html")
+    assert not re.findall(r'(?:src|href)="https?:', text), "it needs no network"
+
+
+def test_an_exported_page_replaces_the_one_that_stands_there(tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    assert dh2sim("view", "scara", "--export", page).status == 0
+    scara = page.read_bytes()
+    assert dh2sim("view", "stanford", "--export", page).status == 0
+    assert page.read_bytes() != scara
+    assert b"stanford" in page.read_bytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
+
+
+def test_a_page_that_cannot_be_written_is_told_of(tmp_path: Path) -> None:
+    done = dh2sim_process("view", "stanford", "--export", "nowhere/page.html", cwd=tmp_path)
+    assert (done.status, done.out) == (2, "")
+    assert done.err == "dh2sim: cannot write 'nowhere/page.html': there is no folder 'nowhere'\n"
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_there_is_not_is_refused_before_anything_is_served(tmp_path: Path) -> None:
+    done = dh2sim_process("view", "stanford", "run.zarr", "--no-browser", cwd=tmp_path)
+    assert (done.status, done.out, done.err) == (2, "", "dh2sim: there is no 'run.zarr'\n")
+
+
+@pytest.mark.parametrize("robot", builtin_robots())
+def test_every_robot_that_comes_with_dh2sim_opens_at_home_where_its_table_has_it(robot: str) -> None:
+    spec = load_robot(robot)
+    state = open_state(spec, folder_of(robot))
+    assert (state.spec.name, state.draft.complaints, state.notice) == (spec.name, (), "")
+    scene = scene_of(state)
+    assert {f"/robot/link_{i}" for i in range(1, len(spec.rows) + 1)} <= set(scene)
+    expected = table_tool_pose(spec, state.model.home)
+    assert np.allclose(scene["/frames/tool0"].position, expected[:3, 3], rtol=0, atol=1e-12)

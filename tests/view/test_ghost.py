@@ -1,0 +1,153 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from dh2sim.errors import ConfigurationError
+from dh2sim.kinematics.forward import joint_poses
+from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.model.build import build_model
+from dh2sim.robot.spec import Limits, RobotSpec, Row
+from dh2sim.typing import Array
+from dh2sim.view.ghost import Gap, ghost_configuration, ghost_scene, other_reading, reading_gap, told_reading
+from dh2sim.view.items import Placed, Solid
+from tests.kinematics.robots import HAYATI, MODIFIED, ODD_ARM, STANDARD, row
+from tests.robots.samples import robot
+from tests.strategies import robots_with_joint_vectors
+
+
+def limited(entry: Row, lower: float, upper: float) -> Row:
+    return replace(entry, limits=Limits(position=(lower, upper)))
+
+
+def arm(name: str, *rows: Row, **more: Array) -> RobotSpec:
+    return RobotSpec(name=name, rows=rows, configurations=more)
+
+
+def test_a_ghost_is_the_robot_in_one_translucent_colour() -> None:
+    model = build_model(ODD_ARM)
+    q = model.home + 0.1
+    scene = ghost_scene(model, q, (0.1, 0.2, 0.3), 0.25)
+    assert scene["/ghost"] == Placed()
+    solids = [item for item in scene.values() if isinstance(item, Solid)]
+    assert len(solids) == sum(len(link.shapes) for link in model.all_links)
+    assert {(solid.color, solid.opacity) for solid in solids} == {((0.1, 0.2, 0.3), 0.25)}
+    for i, T in enumerate(joint_poses(model.chain, q), start=1):
+        np.testing.assert_allclose(scene[f"/ghost/link_{i}"].position, T[:3, 3], rtol=0, atol=1e-15)
+    assert all(name == "/ghost" or name.startswith("/ghost/") for name in scene)
+
+
+def test_a_ghost_needs_a_joint_vector_of_its_own_length() -> None:
+    with pytest.raises(ConfigurationError, match="expected 5 joint coordinates"):
+        ghost_scene(build_model(ODD_ARM), np.zeros(6))
+
+
+def test_joints_are_matched_by_name_whatever_their_order() -> None:
+    here = build_model(arm("here", row("a", a=0.3), row("b", a=0.2), row("c", a=0.1)))
+    there = build_model(arm("there", row("c", a=0.4), row("a", a=0.1)))
+    found = ghost_configuration(there, here, [0.1, 0.2, 0.3])
+    assert found.q.tolist() == [0.3, 0.1]
+    assert found.notes == ()
+
+
+def test_joints_are_matched_by_order_where_no_name_is_the_same_and_the_rest_stays_at_home() -> None:
+    here = build_model(arm("here", row("a", a=0.3), row("b", a=0.2)))
+    there = build_model(
+        arm("there", row("one", a=0.4), row("two", a=0.1), row("three", a=0.1), home=np.array([0.5, 0.6, 0.7]))
+    )
+    found = ghost_configuration(there, here, [0.1, 0.2])
+    assert found.q.tolist() == [0.1, 0.2, 0.7]
+    assert found.notes == ("there has joints that here does not have, which stay at home: three.",)
+
+
+def test_an_angle_is_never_taken_for_a_length() -> None:
+    here = build_model(arm("here", row("a", a=0.3), row("b", "prismatic", a=0.2)))
+    there = build_model(arm("there", row("a", "prismatic", a=0.4), row("b", "prismatic", a=0.1)))
+    found = ghost_configuration(there, here, [1.5, 0.1])
+    assert found.q.tolist() == [there.home[0], 0.1]
+    assert found.notes == ("there has joints that here does not have, which stay at home: a.",)
+
+
+def test_a_ghost_stops_at_its_limits() -> None:
+    here = build_model(arm("here", row("a", a=0.3), row("b", a=0.3), row("c", "continuous", a=0.3)))
+    there = build_model(
+        arm("there", limited(row("a", a=0.4), -1.0, 0.5), limited(row("b", a=0.1), -0.5, 1.0), row("c", "continuous"))
+    )
+    found = ghost_configuration(there, here, [2.0, -2.0, 9.0])
+    assert found.q.tolist() == [0.5, -0.5, 9.0]
+    assert found.notes == ("there stops at the limits of: a, b.",)
+
+
+def test_the_other_reading_has_the_same_numbers_in_the_other_convention() -> None:
+    read = other_reading(ODD_ARM)
+    assert [entry.convention for entry in read.rows] == [
+        STANDARD if entry.convention is MODIFIED else MODIFIED for entry in ODD_ARM.rows
+    ]
+    for name in ("name", "type", "a", "alpha", "d", "theta", "beta", "flip", "limits"):
+        assert [getattr(entry, name) for entry in read.rows] == [getattr(entry, name) for entry in ODD_ARM.rows]
+    assert (read.name, read.convention) == ("odd_misread", MODIFIED)
+    assert read.base is ODD_ARM.base
+    assert read.tool is ODD_ARM.tool
+
+
+def test_reading_twice_in_the_other_convention_is_reading_in_the_right_one() -> None:
+    back = other_reading(other_reading(ODD_ARM))
+    assert [entry.convention for entry in back.rows] == [entry.convention for entry in ODD_ARM.rows]
+
+
+def test_hayati_rows_have_no_other_reading() -> None:
+    mixed = RobotSpec(name="m", rows=(row("one", convention=HAYATI, beta=0.1), row("two", a=0.1)))
+    assert [entry.convention for entry in other_reading(mixed).rows] == [HAYATI, MODIFIED]
+    pure = RobotSpec(name="h", rows=(row("one", convention=HAYATI, a=0.3, beta=0.1),))
+    assert told_reading(pure, [0.3]) == "All rows are Hayati rows, which have no other reading."
+
+
+@given(robots_with_joint_vectors(max_rows=6))
+def test_the_gap_is_the_one_between_the_tables_themselves(drawn: tuple[RobotSpec, Array]) -> None:
+    spec, vectors = drawn
+    gap = reading_gap(spec, vectors[0])
+    here, there = table_tool_pose(spec, vectors[0]), table_tool_pose(other_reading(spec), vectors[0])
+    assert gap.distance == pytest.approx(np.linalg.norm(there[:3, 3] - here[:3, 3]), rel=1e-9, abs=1e-12)
+    cosine = 0.5 * (np.trace(here[:3, :3].T @ there[:3, :3]) - 1.0)
+    assert math.cos(gap.angle) == pytest.approx(cosine, abs=1e-12)
+
+
+def test_the_puma_misread_is_told_in_metres_and_degrees() -> None:
+    q = np.radians([10.0, -40.0, 20.0, 30.0, 50.0, 60.0])
+    spec = robot("puma560")
+    here, there = table_tool_pose(spec, q), table_tool_pose(other_reading(spec), q)
+    distance = np.linalg.norm(there[:3, 3] - here[:3, 3])
+    angle = np.degrees(np.arccos(0.5 * (np.trace(here[:3, :3].T @ there[:3, :3]) - 1.0)))
+    assert told_reading(spec, q) == (
+        f"Read as standard, this table puts tool0 {distance:.3g} m away and turned by {angle:.3g}°."
+    )
+
+
+def test_mixed_conventions_are_swapped() -> None:
+    assert told_reading(ODD_ARM, np.zeros(5)).startswith(
+        "Read with standard and modified swapped, this table puts tool0 "
+    )
+
+
+@pytest.mark.parametrize(
+    ("gap", "sentence"),
+    [
+        (Gap(distance=0.0, angle=0.0), "This puts tool0 at the same pose."),
+        (Gap(distance=1e-12, angle=1e-12), "This puts tool0 at the same pose."),
+        (Gap(distance=0.123456, angle=0.0), "This puts tool0 0.123 m away."),
+        (Gap(distance=0.0, angle=math.pi), "This puts tool0 turned by 180°."),
+        (Gap(distance=1234.5, angle=0.5), "This puts tool0 1230 m away and turned by 28.6°."),
+        (Gap(distance=1.5e-5, angle=1e-6), "This puts tool0 0.000015 m away and turned by 0.0000573°."),
+    ],
+)
+def test_a_gap_is_told_in_three_digits(gap: Gap, sentence: str) -> None:
+    assert gap.told("This") == sentence
+
+
+def test_a_table_of_parallel_axes_is_told_to_be_the_same_where_it_is() -> None:
+    spec = RobotSpec(name="turner", rows=(row("a", d=0.2), row("b", d=0.3)))
+    assert told_reading(spec, [0.3, 0.4]) == "Read as modified, this table puts tool0 at the same pose."

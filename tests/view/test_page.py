@@ -1,0 +1,203 @@
+"""The page in a real browser: what it shows is what the library computes."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from dh2sim.engines.mujoco_engine import MujocoEngine
+from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.robot.load import load_robot, parse_robot
+from dh2sim.robot.spec import Convention, RobotSpec
+from dh2sim.view.server import Viewer
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Locator, Page
+
+HOME = load_robot("stanford").configurations["home"].tolist()
+DEADLINE = 20.0
+"""s."""
+
+OpenPage = Callable[[], "Page"]
+
+
+def shown(page: Page, name: str) -> str:
+    """The text of a part of the panel."""
+    return page.locator(f'[data-dh2sim="{name}"]').first.inner_text()
+
+
+def xyz(page: Page) -> list[float]:
+    """The position that the page shows, m."""
+    found = re.search(r"xyz \[m\]\s+(\S+) (\S+) (\S+)", shown(page, "readout"))
+    assert found is not None
+    return [float(number) for number in found.groups()]
+
+
+def wait_until(holds: Callable[[], bool], what: str) -> None:
+    end = time.monotonic() + DEADLINE
+    while not holds():
+        assert time.monotonic() < end, what
+        time.sleep(0.05)
+
+
+def wait_for_position(page: Page, spec: RobotSpec, q: list[float]) -> None:
+    """Wait until the page shows where the table has tool0."""
+    expected = table_tool_pose(spec, q)[:3, 3]
+    wait_until(lambda: bool(np.allclose(xyz(page), expected, rtol=0, atol=1.1e-6)), f"{xyz(page)} is not {expected}")
+
+
+def field(page: Page, label: str) -> Locator:
+    """The field that can be typed into beside a label."""
+    name = page.locator("label", has_text=re.compile(f"^{re.escape(label)}$"))
+    return name.locator("xpath=ancestor::*[.//input[not(@type='hidden')]][1]//input[not(@type='hidden')]").first
+
+
+def choose(page: Page, label: str, option: str) -> None:
+    field(page, label).click()
+    page.get_by_role("option", name=option, exact=True).click()
+
+
+def open_tab(page: Page, name: str) -> None:
+    page.get_by_role("tab", name=name).click()
+
+
+def test_joints_are_moved_by_number_slider_key_and_name(open_page: OpenPage, tmp_path: Path) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    wait_for_position(page, spec, HOME)
+    q = list(HOME)
+    field(page, "joint_1 [°]").fill("-45.5")
+    q[0] = math.radians(-45.5)
+    wait_for_position(page, spec, q)
+    page.get_by_role("slider").nth(2).focus()
+    page.keyboard.press("End")
+    q[2] = 1.27
+    wait_for_position(page, spec, q)
+    page.locator("canvas").first.focus()
+    page.keyboard.press("6")
+    q[1] += math.radians(3.0)
+    wait_for_position(page, spec, q)
+    page.screenshot(path=tmp_path / "joints.png")
+    page.get_by_role("button", name="zero").click()
+    wait_for_position(page, spec, [0.0] * 6)
+    assert field(page, "joint_1 [°]").input_value() == "0"
+
+
+def test_a_number_beyond_a_limit_stops_there_and_nonsense_moves_nothing(open_page: OpenPage) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    field(page, "joint_5 [°]").fill("1000")
+    wait_for_position(page, spec, [*HOME[:4], math.pi / 2, HOME[5]])
+    field(page, "joint_5 [°]").fill("-")
+    field(page, "joint_1 [°]").fill("abc")
+    field(page, "joint_3 [m]").fill("0.1")
+    wait_for_position(page, spec, [*HOME[:2], 0.1, HOME[3], math.pi / 2, HOME[5]])
+
+
+def test_pages_have_states_of_their_own_and_a_reload_begins_anew(open_page: OpenPage, viewer: Viewer) -> None:
+    first, second, spec = open_page(), open_page(), load_robot("stanford")
+    first.get_by_role("button", name="zero").click()
+    wait_for_position(first, spec, [0.0] * 6)
+    wait_for_position(second, spec, HOME)
+    first.reload()
+    first.get_by_role("tab", name="Joints").wait_for()
+    wait_for_position(first, spec, HOME)
+    wait_until(lambda: len(viewer.pages) == 2, "the page of before the reload is closed")
+
+
+def test_the_table_is_edited_marked_and_read_another_way(open_page: OpenPage, tmp_path: Path) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    open_tab(page, "Table")
+    choose(page, "Edit row", "2: joint_2")
+    field(page, "d").fill("d2 + 0.1")
+    wait_until(lambda: "d2 + 0.1" in shown(page, "table"), "the cell")
+    open_tab(page, "Joints")
+    edited = parse_robot(spec.source_file.text.replace("d: d2", "d: 0.25"))  # type: ignore[union-attr]
+    wait_for_position(page, edited, HOME)
+    open_tab(page, "Table")
+    field(page, "α").fill("90 +")
+    wait_until(lambda: "it ends too early" in shown(page, "complaint"), "the complaint")
+    assert shown(page, "notice") == "The robot is the one of before: joints[1].alpha: in '90 +': it ends too early"
+    page.screenshot(path=tmp_path / "table.png")
+    open_tab(page, "Joints")
+    wait_for_position(page, edited, HOME)
+    open_tab(page, "Table")
+    field(page, "α").fill("pi / pi * 45")
+    choose(page, "convention", "modified")
+    wait_until(lambda: "modified" in shown(page, "table"), "the convention")
+    open_tab(page, "Joints")
+    text = edited.source_file.text.replace(  # type: ignore[union-attr]
+        "alpha: 90, d: 0.25", "alpha: 45, d: 0.25, convention: modified"
+    )
+    other = parse_robot(text)
+    assert other.rows[1].convention is Convention.MODIFIED
+    wait_for_position(page, other, HOME)
+
+
+def test_the_pose_is_shown_in_every_form_beside_that_of_mujoco(open_page: OpenPage, tmp_path: Path) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    open_tab(page, "Pose")
+    wait_until(lambda: "MuJoCo has it" in shown(page, "mujoco"), "MuJoCo's pose")
+    matrix = np.array(shown(page, "matrix").split(), dtype=np.float64).reshape(4, 4)
+    assert np.allclose(matrix, table_tool_pose(spec, HOME), rtol=0, atol=1e-6)
+    found = re.search(r"MuJoCo has it (\S+) m and (\S+) rad", shown(page, "mujoco"))
+    assert found is not None
+    assert all(float(number) < 1e-12 for number in found.groups())
+    page.screenshot(path=tmp_path / "pose.png")
+
+
+def test_physics_moves_the_robot_until_it_is_given_back(open_page: OpenPage, tmp_path: Path) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    open_tab(page, "Motion")
+    choose(page, "Actuators", "free")
+    choose(page, "Moved by", "physics")
+    wait_until(lambda: "Simulated: 0" not in shown(page, "motion"), "a second is simulated")
+    page.screenshot(path=tmp_path / "motion.png")
+    open_tab(page, "Joints")
+    home = table_tool_pose(spec, HOME)[:3, 3]
+    wait_until(lambda: math.dist(xyz(page), home) > 0.1, "the arm falls")
+    open_tab(page, "Motion")
+    choose(page, "Moved by", "me")
+    open_tab(page, "Joints")
+    page.get_by_role("button", name="home").click()
+    wait_for_position(page, spec, HOME)
+
+
+def test_files_are_handed_out_as_edited_and_the_model_matches_the_table(open_page: OpenPage, tmp_path: Path) -> None:
+    page = open_page()
+    open_tab(page, "Table")
+    field(page, "a").fill("0.123")
+    wait_until(lambda: "0.123" in shown(page, "table"), "the cell")
+    open_tab(page, "Files")
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Save robot file").click()
+    assert saved.value.suggested_filename == "stanford.yaml"
+    text = saved.value.path().read_text(encoding="utf-8")
+    robot = parse_robot(text)
+    assert robot.rows[0].a == 0.123
+    assert "# printed in the slides" in text, "comments are kept"
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Save MJCF").click()
+    saved.value.save_as(tmp_path / "stanford.xml")
+    engine = MujocoEngine(tmp_path / "stanford.xml", [row.name for row in robot.moving_rows], len(robot.rows))
+    tool = engine.frame_poses(np.array([HOME]))[0, engine.frames.index("tool0")]
+    assert np.allclose(tool, table_tool_pose(robot, HOME), rtol=0, atol=1e-12)
+    wait_until(lambda: "stanford.xml: off the table by at most" in shown(page, "notice"), "the comparison")
+
+
+def test_a_page_of_somebody_else_is_turned_away(viewer: Viewer) -> None:
+    client = pytest.importorskip("websockets.sync.client")
+    closed = pytest.importorskip("websockets.exceptions").ConnectionClosed
+    import viser
+
+    address, protocols = viewer.url.replace("http", "ws"), [f"viser-v{viser.__version__}"]
+    with client.connect(address, origin=viewer.url, subprotocols=protocols) as connection:
+        connection.recv(timeout=DEADLINE)
+    for origin in ("http://elsewhere.example", f"http://elsewhere.example:{viewer.port}", "null"):
+        with client.connect(address, origin=origin, subprotocols=protocols) as connection, pytest.raises(closed):
+            connection.recv(timeout=DEADLINE)

@@ -1,0 +1,125 @@
+"""The scene of a state: where things stand is what the table says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from dh2sim.kinematics.forward import joint_poses
+from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
+from dh2sim.robot.load import load_robot
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.typing import Array
+from dh2sim.view.events import CompareReading, Event, MoveJoint, SelectRow, SetJoints, Show
+from dh2sim.view.items import Label, Path, Scene, Solid, Triad
+from dh2sim.view.opening import open_state
+from dh2sim.view.reduce import reduce
+from dh2sim.view.scene import scene_of
+from dh2sim.view.state import Part, ViewState, within
+from tests.strategies import robots_with_joint_vectors
+from tests.view.test_solids import matrix
+
+STANFORD = open_state(load_robot("stanford"))
+
+
+def after(state: ViewState, *happened: Event) -> ViewState:
+    for event in happened:
+        state = reduce(state, event)
+    return state
+
+
+def below(scene: Scene, root: str) -> set[str]:
+    return {name for name in scene if name.startswith(f"{root}/")}
+
+
+@settings(max_examples=40)
+@given(robots_with_joint_vectors(max_rows=6))
+def test_links_and_frames_stand_where_the_table_has_them(robot: tuple[RobotSpec, Array]) -> None:
+    spec, vectors = robot
+    opened = open_state(spec)
+    state = after(opened, SetJoints(q=tuple(vectors[0].tolist())))
+    assert state.q == within(opened.model, tuple(vectors[0].tolist()))
+    scene = scene_of(state)
+    scale = max(1.0, state.model.reach)
+    frames = table_frame_poses(state.spec, state.q)
+    for i, T in enumerate(frames):
+        assert np.allclose(matrix(scene[f"/frames/dh_{i}"]), T, rtol=0, atol=1e-12 * scale)
+    assert np.allclose(
+        matrix(scene["/frames/tool0"]), table_tool_pose(state.spec, state.q), rtol=0, atol=1e-12 * scale
+    )
+    for i, T in enumerate(joint_poses(state.model.chain, state.q), start=1):
+        assert np.allclose(matrix(scene[f"/robot/link_{i}"]), T, rtol=0, atol=1e-12 * scale)
+        # link i carries DH frame i
+        carried = matrix(scene[f"/robot/link_{i}"]) @ state.model.chain.joints[i - 1].T_joint_dh
+        assert np.allclose(carried, frames[i], rtol=0, atol=1e-12 * scale)
+
+
+def test_a_move_changes_poses_and_no_solid() -> None:
+    before, moved = scene_of(STANFORD), scene_of(after(STANFORD, MoveJoint(joint=0, value=-1.0)))
+    assert before.keys() == moved.keys()
+    changed = {name for name in before if before[name] != moved[name]}
+    assert changed >= {f"/robot/link_{i}" for i in range(1, 7)}
+    assert not any(isinstance(before[name], Solid) for name in changed)
+    assert "/robot/base_link" not in changed
+
+
+@pytest.mark.parametrize(
+    ("part", "kind", "root"),
+    [
+        (Part.SHAPES, Solid, "/robot"),
+        (Part.FRAMES, Triad, "/frames"),
+        (Part.FRAME_NAMES, Label, "/names"),
+        (Part.GRID, Path, "/grid"),
+    ],
+)
+def test_what_is_hidden_is_not_in_the_scene(part: Part, kind: type, root: str) -> None:
+    def found(state: ViewState) -> set[str]:
+        scene = scene_of(state)
+        return {name for name in below(scene, root) if isinstance(scene[name], kind)}
+
+    assert found(STANFORD)
+    assert not found(after(STANFORD, Show(part=part, on=False)))
+
+
+def test_frames_with_one_origin_have_one_label_and_every_frame_is_named_once() -> None:
+    scene = scene_of(STANFORD)
+    texts = [item.text for name, item in scene.items() if isinstance(item, Label)]
+    assert texts == ["{0}", "{1}", "{2}", "{3} {4} {5}", "{6} tool0"]
+
+
+def test_the_row_that_is_chosen_is_explained_inside_a_robot_that_can_be_seen_through() -> None:
+    assert not below(scene_of(STANFORD), "/row")
+    explained = scene_of(after(STANFORD, SelectRow(row=1), Show(part=Part.ANNOTATIONS, on=True)))
+    labels = {item.text for name in below(explained, "/row") if isinstance(item := explained[name], Label)}
+    assert "α₂ = 90°" in labels
+    assert all(item.opacity < 0.5 for item in explained.values() if isinstance(item, Solid))
+
+
+def test_the_ghost_stands_where_the_other_reading_puts_it() -> None:
+    state = after(STANFORD, CompareReading(), MoveJoint(joint=1, value=0.3))
+    assert state.ghost is not None
+    scene, ghost = scene_of(state), state.ghost.model
+    frames = table_frame_poses(ghost.spec, state.q)
+    for i, joint in enumerate(ghost.chain.joints, start=1):
+        assert np.allclose(matrix(scene[f"/ghost/link_{i}"]) @ joint.T_joint_dh, frames[i], rtol=0, atol=1e-12)
+    assert not below(scene_of(after(state, Show(part=Part.GHOST, on=False))), "/ghost")
+
+
+def test_the_trace_is_a_line_through_where_the_tool_was() -> None:
+    state = after(
+        STANFORD, Show(part=Part.TRACE, on=True), MoveJoint(joint=0, value=0.0), MoveJoint(joint=1, value=0.0)
+    )
+    trace = scene_of(state)["/trace"]
+    assert isinstance(trace, Path)
+    qs = [STANFORD.q, (0.0, *STANFORD.q[1:]), (0.0, 0.0, *STANFORD.q[2:])]
+    assert np.allclose(trace.points, [table_tool_pose(STANFORD.spec, q)[:3, 3] for q in qs], rtol=0, atol=1e-12)
+
+
+def test_the_grid_has_round_cells_whatever_the_robots_size() -> None:
+    for name in ("stanford", "puma560", "ssrms", "planar_2r"):
+        scene = scene_of(open_state(load_robot(name)))
+        lines = [scene[f"/grid/x_{k}"] for k in (0, 1)]
+        xs = [line.points[0][0] for line in lines if isinstance(line, Path)]
+        digits = f"{xs[1] - xs[0]:.3e}"
+        assert digits[:5] in ("1.000", "2.000", "5.000")
