@@ -76,9 +76,11 @@ def _links(robot: SerialRobot, recovery: Recovery) -> list[LinkSpec]:
 
 def _limits(limits: Limits, row: Row, tolerances: Tolerances) -> Limits:
     """Return limits that are as simple as the table: a file's 2.9670597 rad may have been meant for 170 degrees."""
+    simple = simple_turn if row.type.turns else simple_length
+    if limits.velocity is not None:
+        limits = replace(limits, velocity=simple(limits.velocity, tolerances) or limits.velocity)
     if limits.position is None:
         return limits
-    simple = simple_turn if row.type.turns else simple_length
     lower, upper = (simple(value, tolerances) for value in limits.position)
     return replace(limits, position=(lower, upper)) if lower < upper else limits
 

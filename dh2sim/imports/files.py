@@ -152,5 +152,6 @@ def _table(data: bytes, file: str, options: ImportOptions, folder: Path | None) 
         angle=options.angle,
         length=options.length,
         name=options.name,
+        tolerance=options.tolerance,
         folder=folder,
     )
