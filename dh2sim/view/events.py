@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 
 from dh2sim.robot.spec import Convention
 from dh2sim.robot.units import AngleUnit, LengthUnit
-from dh2sim.view.state import Ghost, Matrix, Mode, Part
+from dh2sim.view.state import Ghost, Matrix, Mode, Part, Pull
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,6 +67,30 @@ class SetMode:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Pause:
+    """Let the simulation or the recording stand, or go on."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """Make a single time step of the simulation, or go to the recording's next instant; then stand."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PullLink:
+    """Pull at a link of a simulated robot with the mouse, or go on so with the mouse elsewhere."""
+
+    pull: Pull
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LetGo:
+    """Pull no more."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EditCell:
     """Type into a cell of the table."""
 
@@ -111,10 +135,10 @@ class ReplaceText:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SelectRow:
-    """Choose the row that is explained."""
+    """Choose the row that is edited, and explained."""
 
-    row: int | None
-    """From 0; None for no row."""
+    row: int
+    """From 0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,6 +205,10 @@ Event: TypeAlias = (
     | RandomConfiguration
     | Follow
     | SetMode
+    | Pause
+    | Step
+    | PullLink
+    | LetGo
     | EditCell
     | SetConvention
     | ConvertTable

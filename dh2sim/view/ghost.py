@@ -139,6 +139,14 @@ def told_reading(spec: RobotSpec, q: ArrayLike) -> str:
     return reading_gap(spec, q).told(f"Read {way}, this table")
 
 
+def told_ghost(ghost: RobotModel, robot: RobotModel, q: ArrayLike) -> str:
+    """Return where a ghost has its tool when it stands as the robot does at ``q``, shape (n,); and why not."""
+    stands = ghost_configuration(ghost, robot, q)
+    distance, angle = pose_errors(forward_kinematics(ghost.chain, stands.q), forward_kinematics(robot.chain, q))
+    gap = Gap(distance=float(distance), angle=float(angle))
+    return " ".join([gap.told(ghost.name), *stands.notes])
+
+
 def _pairs(ghost: RobotModel, robot: RobotModel) -> dict[int, int]:
     """Return which joint of the robot moves along with each joint of the ghost; both are numbers of moving joints."""
     places = {joint.name: i for i, joint in enumerate(robot.moving_joints)}

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final, Protocol
+
+import numpy as np
 
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.view.physics import Drive, Physics
 from dh2sim.view.physics_pace import RealTime
 from dh2sim.view.replay import Replay
-from dh2sim.view.state import Mode, ViewState
+from dh2sim.view.state import Mode, Pull, ViewState
 
 PICTURES: Final = 30.0
 """A second, at most."""
@@ -23,18 +26,25 @@ class Motion(Protocol):
     pictures: float
     """A second, at most."""
 
-    def pace(self, *, playing: bool, speed: float) -> None:
-        """Run or stand, and how fast; a simulation only knows real time."""
+    def pace(self, speed: float) -> None:
+        """Say how fast; a simulation only knows real time."""
 
     def seek(self, share: float) -> None:
         """Go to the instant at a share of a recording, from 0 to 1."""
 
     def tick(self, now: float, state: ViewState) -> tuple[float, ...]:
-        """Return where the joints are at a reading of the clock, s; rad and m."""
+        """Return where the joints are at a reading of the clock, s; rad and m.
+
+        The state says whether time goes on, how many single steps were asked for, and what is pulled at.
+        """
+
+    @property
+    def share(self) -> float:
+        """Which share of a recording is behind, from 0 to 1; 0 for a simulation."""
 
     @property
     def told(self) -> str:
-        """What the user is told of it, a sentence; may be empty."""
+        """What the user is told of it, a sentence or two; may be empty."""
 
 
 class Simulation:
@@ -54,8 +64,10 @@ class Simulation:
         self.physics = Physics(model, q, gravity=gravity, drive=drive)
         self._pace = RealTime()
         self._targets = q
+        self._steps = 0
+        self._pull: Pull | None = None
 
-    def pace(self, *, playing: bool, speed: float) -> None:
+    def pace(self, speed: float) -> None:
         """Take no notice: simulated time goes with the clock."""
 
     def seek(self, share: float) -> None:
@@ -66,18 +78,43 @@ class Simulation:
         if state.wanted != self._targets:
             self._targets = state.wanted
             self.physics.set_targets(self._targets)
-        self._pace.simulated(self.physics.advance(self._pace.due(now), time_budget_s=_SHARE / PICTURES))
+        if state.pull != self._pull:
+            self._pull = state.pull
+            self._pull_at(state.pull)
+        if state.paused:
+            self._pace.restart()
+            for _ in range(state.steps - self._steps):
+                self.physics.step()
+        else:
+            self._pace.simulated(self.physics.advance(self._pace.due(now), time_budget_s=_SHARE / PICTURES))
+        self._steps = state.steps
         return tuple(self.physics.q.tolist())
+
+    def _pull_at(self, pull: Pull | None) -> None:
+        if pull is None:
+            self.physics.release()
+        else:
+            self.physics.drag(pull.link, pull.point_in_link, pull.target)
+
+    @property
+    def share(self) -> float:
+        """None of it is behind: a simulation has no end."""
+        return 0.0
 
     @property
     def told(self) -> str:
-        """Why it has stopped, or how fast it goes."""
+        """Why it has stopped, or how fast it goes; and how hard the mouse pulls."""
         if self.physics.stopped:
             return self.physics.stopped
         factor = self._pace.factor
-        slow = factor is not None and factor < 0.9
-        pace = f", {factor:.2f} of real time" if slow else ""
-        return f"Simulated: {self.physics.time:.1f} s{pace}."
+        pace = "" if factor is None else f", {factor:.2f} of real time"
+        return f"Simulated: {self.physics.time:.3f} s{pace}.{self._told_pull()}"
+
+    def _told_pull(self) -> str:
+        pushing = self.physics.pushing
+        if self._pull is None or pushing is None:
+            return ""
+        return f" {self._pull.link} is pulled at with {math.hypot(*pushing[1]):.3g} N."
 
 
 class Recording:
@@ -101,23 +138,37 @@ class Recording:
         """Of the instant that is shown, s."""
         self.speed = 1.0
         """Seconds of the recording in a second."""
-        self.playing = True
         self._last: float | None = None
+        self._steps = 0
 
-    def pace(self, *, playing: bool, speed: float) -> None:
-        """Run or stand, and how many seconds of the recording in a second."""
-        self.playing, self.speed = playing, speed
+    def pace(self, speed: float) -> None:
+        """Say how many seconds of the recording are shown in a second."""
+        self.speed = speed
 
     def seek(self, share: float) -> None:
         """Show the instant at a share of the recording, from 0 to 1."""
         self.time = min(max(share, 0.0), 1.0) * self.duration
 
-    def tick(self, now: float, _state: ViewState) -> tuple[float, ...]:
+    def tick(self, now: float, state: ViewState) -> tuple[float, ...]:
         """Return where the joints were at the recording's time, rad and m; moves that on if it plays."""
-        if self.playing and self._last is not None and self.duration > 0.0:
+        if state.paused:
+            for _ in range(state.steps - self._steps):
+                self.time = self._next_instant()
+        elif self._last is not None and self.duration > 0.0:
             self.time = (self.time + (now - self._last) * self.speed) % self.duration
-        self._last = now
+        self._last, self._steps = now, state.steps
         return tuple(self._replay.q_at(self._rollout, self.time).tolist())
+
+    def _next_instant(self) -> float:
+        """Return when the next positions were recorded, s; the first ones after the last."""
+        times = self._replay.times(self._rollout)
+        shown = int(np.abs(times - self.time).argmin())
+        return float(times[(shown + 1) % len(times)])
+
+    @property
+    def share(self) -> float:
+        """Which share of it is behind, from 0 to 1."""
+        return self.time / self.duration if self.duration > 0.0 else 0.0
 
     @property
     def told(self) -> str:

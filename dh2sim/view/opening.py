@@ -6,11 +6,13 @@ import os
 from pathlib import Path
 
 from dh2sim.errors import Dh2simError
+from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.catalog import builtin_path
+from dh2sim.robot.load import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.view.draft import Source, Wrong, draft_of, editable_text, read
-from dh2sim.view.state import ViewState, configurations
+from dh2sim.view.state import Ghost, ViewState, configurations
 
 
 def folder_of(robot: str) -> Path | None:
@@ -35,6 +37,15 @@ def open_state(spec: RobotSpec, folder: Path | None = None) -> ViewState:
     if isinstance(model, Wrong):
         raise Dh2simError(f"{source.file}: {model.first}")
     return state_of(model, text, source)
+
+
+def builtin_ghost(name: str) -> Ghost:
+    """Return a robot that comes with dh2sim, to stand beside the one that a page shows.
+
+    Raises:
+        Dh2simError: There is no such robot, or its file is damaged.
+    """
+    return Ghost(model=build_model(load_robot(builtin_path(name) or name)), label=name)
 
 
 def state_of(model: RobotModel, text: str, source: Source) -> ViewState:

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, TypeAlias
 from dh2sim.errors import Dh2simError
 from dh2sim.export.render import Format
 from dh2sim.view.downloads import model_file
-from dh2sim.view.events import Event, Follow, ReplaceText, SetMode, Tell
+from dh2sim.view.events import Compare, Event, Follow, ReplaceText, SetMode, Tell
+from dh2sim.view.link_grabs import LinkGrabs
+from dh2sim.view.opening import builtin_ghost
 from dh2sim.view.painter import Painter
 from dh2sim.view.panel.files import FileActions
 from dh2sim.view.panel.panel import Panel
@@ -51,6 +53,7 @@ class Page:
         self._queue: queue.SimpleQueue[tuple[Task, Callable[[], None] | None] | None] = queue.SimpleQueue()
         self._painter = Painter(client.scene)
         self._handle = ToolHandle(client.scene, self.send, lambda: self.state, self.apply)
+        self._grabs = LinkGrabs(self._painter, self.send, lambda: self.state)
         self._thread = threading.Thread(target=self._work, name=f"page-{client.client_id}", daemon=True)
 
     def start(self) -> None:
@@ -71,7 +74,7 @@ class Page:
             self._painter.draw(scene_of(self.state))
         self._do(self._open_run, None)
         files = FileActions(save=self.save, export=self.export, back=self.back)
-        self._panel = Panel(self.client, self.send, self.state, files, self)
+        self._panel = Panel(self.client, self.send, self.state, files, self, self.compare)
         self._show()
         while self._take():
             self._show()
@@ -121,6 +124,7 @@ class Page:
         with self.client.atomic():
             self._painter.draw(scene_of(self.state))
         self._handle.show(self.state)
+        self._grabs.show(self.state)
         self._panel.show(self.state)
         self.client.flush()
         if self._queue.empty():
@@ -141,10 +145,19 @@ class Page:
         """Return to the robot file that was opened."""
         self.apply(ReplaceText(text=self._opened))
 
+    def compare(self, robot: str) -> None:
+        """Draw a robot that comes with dh2sim beside the one that is shown."""
+        self.apply(Compare(ghost=builtin_ghost(robot)))
+
     @property
     def motion_told(self) -> str:
         """What there is to tell of what moves the joints."""
         return "" if self._motion is None else self._motion.told
+
+    @property
+    def motion_share(self) -> float:
+        """Which share of the recording is behind, from 0 to 1."""
+        return 0.0 if self._motion is None else self._motion.share
 
     def be_still(self) -> None:
         """Give the joints back to the user."""
@@ -168,10 +181,10 @@ class Page:
             self._motion = motion.Recording(self.replay, rollout)
             self.apply(SetMode(mode=Mode.REPLAY))
 
-    def pace(self, *, playing: bool, speed: float) -> None:
-        """Let the recording run or stand, and how fast."""
+    def pace(self, speed: float) -> None:
+        """Say how fast the recording is played."""
         if self._motion is not None:
-            self._motion.pace(playing=playing, speed=speed)
+            self._motion.pace(speed)
 
     def seek(self, share: float) -> None:
         """Show the instant at a share of the recording, from 0 to 1."""

@@ -43,6 +43,10 @@ class Painter:
             self._drawn[name] = scene[name]
         return len(gone) + len(changed)
 
+    def solids(self) -> dict[str, Any]:
+        """Return viser's handles of the surfaces that are drawn, by name."""
+        return {name: self._handles[name] for name, item in self._drawn.items() if isinstance(item, Solid)}
+
     def _paint(self, name: str, item: Item) -> None:
         old = self._drawn.get(name)
         if old is not None and _look(old) == _look(item):

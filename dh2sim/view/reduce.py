@@ -12,7 +12,7 @@ from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.words import shown as shown_word
 from dh2sim.view import events
-from dh2sim.view.state import Goal, Mode, ViewState, configurations, travel, within
+from dh2sim.view.state import Goal, Mode, Pull, ViewState, configurations, travel, within
 from dh2sim.view.table_edits import reading_of, replaced, table_changed
 from dh2sim.view.trace import traced
 
@@ -43,8 +43,7 @@ def _reduced(state: ViewState, event: events.Event) -> ViewState:
         case events.ShowAngles(unit=unit):
             return replace(state, angle=unit)
         case events.SelectRow(row=row):
-            known = row is None or 0 <= row < len(state.draft.rows)
-            return replace(state, selected_row=row) if known else state
+            return replace(state, selected_row=row) if 0 <= row < len(state.draft.rows) else state
         case events.ChooseFrame(name=name):
             return replace(state, frame=name) if name in frame_names(state.model.chain) else state
         case events.Compare(ghost=ghost):
@@ -56,7 +55,16 @@ def _reduced(state: ViewState, event: events.Event) -> ViewState:
         case events.SetMode(mode=mode):
             # a simulation may have left the limits by a hair
             q = within(state.model, state.q)
-            return replace(state, mode=mode, q=q, target=q if mode is Mode.PHYSICS else None, goal=None)
+            target = q if mode is Mode.PHYSICS else None
+            return replace(state, mode=mode, q=q, target=target, goal=None, paused=False, steps=0, pull=None)
+        case events.Pause(on=on):
+            return state if state.mode is Mode.STILL else replace(state, paused=on)
+        case events.Step():
+            return state if state.mode is Mode.STILL else replace(state, paused=True, steps=state.steps + 1)
+        case events.PullLink(pull=pull):
+            return replace(state, pull=pull) if _can_be_pulled(state, pull) else state
+        case events.LetGo():
+            return replace(state, pull=None)
         case _:
             return _moved(state, event)
 
@@ -111,6 +119,13 @@ def _at(state: ViewState, q: tuple[float, ...], *, keep_goal: bool = False) -> V
     if state.mode is Mode.PHYSICS:
         return replace(state, target=within(state.model, q))
     return replace(state, q=within(state.model, q), goal=state.goal if keep_goal else None, notice="")
+
+
+def _can_be_pulled(state: ViewState, pull: Pull) -> bool:
+    """Whether a robot is simulated that has the link, and all numbers are finite."""
+    links = {link.name for link in state.model.links}
+    finite = all(math.isfinite(value) for value in (*pull.point_in_link, *pull.target))
+    return state.mode is Mode.PHYSICS and pull.link in links and finite
 
 
 def _fits(model: RobotModel, q: tuple[float, ...]) -> bool:

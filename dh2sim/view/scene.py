@@ -14,12 +14,14 @@ from dh2sim.view.annotations import row_annotations
 from dh2sim.view.extent import size_of, triad_length
 from dh2sim.view.ghost import ghost_configuration, ghost_scene
 from dh2sim.view.items import Color, Item, Label, Path, Scene, Solid, Triad, Vector
+from dh2sim.view.pull import pull_arrow
 from dh2sim.view.solids import orientation_of, position_of, robot_solids
 from dh2sim.view.state import Part, ViewState
 
 ROBOT: Final = "/robot"
 FRAMES: Final = "/frames"
 NAMES: Final = "/names"
+PULL: Final = "/pull"
 _TRACE_COLOR: Final[Color] = (0.10, 0.45, 0.85)
 _GRID_COLOR: Final[Color] = (0.82, 0.84, 0.87)
 _AXIS_COLOR: Final[Color] = (0.62, 0.65, 0.70)
@@ -43,18 +45,20 @@ def scene_of(state: ViewState) -> Scene:
 
 def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
     shapes = Part.SHAPES in state.shown
-    explained = Part.ANNOTATIONS in state.shown and state.selected_row is not None
+    explained = Part.ANNOTATIONS in state.shown
     solids = robot_solids(state.model, state.q, ROBOT, opacity=_SEEN_THROUGH if explained else None)
     yield from ((name, item) for name, item in solids.items() if shapes or not isinstance(item, Solid))
     if Part.FRAMES in state.shown:
         yield from _frames(state)
-    if explained and state.selected_row is not None:
+    if explained:
         size = triad_length(state.model)
         row = row_annotations(state.spec, state.model.chain, state.selected_row, state.q, size, state.angle)
         yield from row.items()
     if Part.GHOST in state.shown and state.ghost is not None:
         stands = ghost_configuration(state.ghost.model, state.model, state.q)
         yield from ghost_scene(state.ghost.model, stands.q).items()
+    if state.pull is not None:
+        yield PULL, pull_arrow(state.model, state.q, state.pull)
     if Part.TRACE in state.shown and len(state.trace) > 1:
         yield "/trace", Path(points=state.trace, color=_TRACE_COLOR, width=3.0)
     if Part.GRID in state.shown:

@@ -1,7 +1,8 @@
 """Links as solids made of triangles: one way for the robot, the ghost and the page.
 
 ``robot_solids`` gives all of a robot at a configuration, ``link_solids`` what hangs below a link's frame. Triangles
-are made once for every shape and mesh and then shared, so that scenes of the same robot compare quickly.
+are made once for every size of a shape and every mesh file and then shared, so that scenes compare quickly, those of
+an edited robot too.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ SIDES = 32
 """Of a round shape's cross-section; its corners lie on the true surface, and so it is up to 1.5 % too small."""
 RINGS = 8
 """Between the equator and the pole of a capsule's end."""
-_CACHED = 4096
+_SHAPES_KEPT = 512
+"""Of about a quarter of a megabyte each; a robot has three for every joint."""
+_MESHES_KEPT = 32
 
 Triangles: TypeAlias = tuple[tuple[Vector, ...], tuple[tuple[int, int, int], ...]]
 """Vertices, m, and the three corners of every face, anticlockwise from outside."""
@@ -91,31 +94,39 @@ def robot_solids(
     return items
 
 
-@lru_cache(maxsize=_CACHED)
 def shape_triangles(shape: Shape) -> Triangles:
     """Return a shape as a closed surface, in the shape's own frame; the rim of a cylinder has its points twice."""
-    match shape.kind:
+    return _shape_triangles(shape.kind, shape.radius, shape.length)
+
+
+@lru_cache(maxsize=_SHAPES_KEPT)
+def _shape_triangles(kind: ShapeKind, radius: float, length: float) -> Triangles:
+    half = 0.5 * length
+    match kind:
         case ShapeKind.CYLINDER:
-            half = 0.5 * shape.length
             # the ends have points of their own: so their rims are drawn sharp
             below, side, above = (
-                [(0.0, -half), (shape.radius, -half)],
-                [(shape.radius, -half), (shape.radius, half)],
-                [(shape.radius, half), (0.0, half)],
+                [(0.0, -half), (radius, -half)],
+                [(radius, -half), (radius, half)],
+                [(radius, half), (0.0, half)],
             )
             return _joined([_turned(profile) for profile in (below, side, above)])
         case ShapeKind.CAPSULE:
-            return _turned(_capsule_profile(shape.radius, 0.5 * shape.length))
+            return _turned(_capsule_profile(radius, half))
 
 
-@lru_cache(maxsize=_CACHED)
 def mesh_triangles(mesh: MeshAsset) -> Triangles:
     """Return a mesh in its own frame, m; corners that coincide become one."""
+    return _mesh_triangles(mesh.data, mesh.scale)
+
+
+@lru_cache(maxsize=_MESHES_KEPT)
+def _mesh_triangles(data: bytes, scale: float) -> Triangles:
     record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    count = (len(mesh.data) - STL_HEADER) // STL_FACE
-    corners = np.frombuffer(mesh.data, dtype=record, count=count, offset=STL_HEADER)["corners"].reshape(-1, 3)
+    count = (len(data) - STL_HEADER) // STL_FACE
+    corners = np.frombuffer(data, dtype=record, count=count, offset=STL_HEADER)["corners"].reshape(-1, 3)
     points, indices = np.unique(corners, axis=0, return_inverse=True)
-    scaled = points.astype(np.float64) * mesh.scale
+    scaled = points.astype(np.float64) * scale
     return (
         tuple((x, y, z) for x, y, z in scaled.tolist()),
         tuple((a, b, c) for a, b, c in indices.reshape(-1, 3).tolist()),

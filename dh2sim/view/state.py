@@ -97,6 +97,17 @@ class Goal:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Pull:
+    """A link that the mouse pulls at, in a simulation."""
+
+    link: str
+    point_in_link: Vector
+    """Where it was grabbed, in the link's frame, m."""
+    target: Vector
+    """Where the mouse is, in base_link, m."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Ghost:
     """A second robot, drawn pale beside the first, at the same joint coordinates."""
 
@@ -124,7 +135,7 @@ class ViewState:
     target: tuple[float, ...] | None = None
     """Where a simulation's actuators hold the joints; None where there is no simulation."""
     shown: frozenset[Part] = frozenset({Part.SHAPES, Part.FRAMES, Part.FRAME_NAMES, Part.GRID, Part.GHOST})
-    selected_row: int | None = None
+    selected_row: int = 0
     """Row of the table that is explained, from 0."""
     angle: AngleUnit = AngleUnit.DEG
     """Unit that angles are shown in, outside of the table."""
@@ -135,6 +146,11 @@ class ViewState:
     """Where tool0 was since ``Part.TRACE`` is shown, m."""
     goal: Goal | None = None
     mode: Mode = Mode.STILL
+    paused: bool = False
+    """Whether the simulation or the recording stands."""
+    steps: int = 0
+    """Single steps that were asked for since it began."""
+    pull: Pull | None = None
     notice: str = ""
     """What the user is told, in a sentence or two; empty where there is nothing to tell."""
 

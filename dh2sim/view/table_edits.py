@@ -118,7 +118,7 @@ def _with_robot(
         draft=draft_of(text, model.spec, complaints),
         q=within(model, state.q) if same_joints else configurations(model)["home"],
         frame=state.frame if state.frame in frame_names(model.chain) else "tool0",
-        selected_row=state.selected_row if state.selected_row is None or state.selected_row < rows else None,
+        selected_row=min(state.selected_row, rows - 1),
         ghost=reading_of(model) if state.ghost is not None and state.ghost.reading else state.ghost,
         goal=None,
         notice=notice,

@@ -13,7 +13,15 @@ from dh2sim.kinematics.table import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import Limits, RobotSpec, Row
 from dh2sim.typing import Array
-from dh2sim.view.ghost import Gap, ghost_configuration, ghost_scene, other_reading, reading_gap, told_reading
+from dh2sim.view.ghost import (
+    Gap,
+    ghost_configuration,
+    ghost_scene,
+    other_reading,
+    reading_gap,
+    told_ghost,
+    told_reading,
+)
 from dh2sim.view.items import Placed, Solid
 from tests.kinematics.robots import HAYATI, MODIFIED, ODD_ARM, STANDARD, row
 from tests.robots.samples import robot
@@ -80,6 +88,19 @@ def test_a_ghost_stops_at_its_limits() -> None:
     found = ghost_configuration(there, here, [2.0, -2.0, 9.0])
     assert found.q.tolist() == [0.5, -0.5, 9.0]
     assert found.notes == ("there stops at the limits of: a, b.",)
+
+
+def test_another_robot_is_told_by_where_its_tool_is_and_by_what_it_cannot_do() -> None:
+    here, there = build_model(robot("puma560")), build_model(robot("planar_2r"))
+    q = np.radians([10.0, -40.0, 20.0, 30.0, 50.0, 60.0])
+    stands = ghost_configuration(there, here, q)
+    ours, theirs = table_tool_pose(robot("puma560"), q), table_tool_pose(robot("planar_2r"), stands.q)
+    distance = np.linalg.norm(theirs[:3, 3] - ours[:3, 3])
+    angle = np.degrees(np.arccos(0.5 * (np.trace(ours[:3, :3].T @ theirs[:3, :3]) - 1.0)))
+    assert told_ghost(there, here, q) == (f"planar_2r puts tool0 {distance:.3g} m away and turned by {angle:.3g}°.")
+    limited_there = build_model(arm("there", limited(row("a", a=0.3), -1.0, 0.5)))
+    wide = build_model(arm("here", limited(row("a", a=0.3), -1.0, 2.5)))
+    assert told_ghost(limited_there, wide, [2.0]).endswith(" there stops at the limits of: a.")
 
 
 def test_the_other_reading_has_the_same_numbers_in_the_other_convention() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,13 +13,16 @@ import numpy as np
 import pytest
 
 from dh2sim.engines.mujoco_engine import MujocoEngine
-from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
 from dh2sim.robot.load import load_robot, parse_robot
 from dh2sim.robot.spec import Convention, RobotSpec
+from dh2sim.view.ghost import told_reading
 from dh2sim.view.server import Viewer
 
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
+
+    from dh2sim.view.page import Page as ServedPage
 
 HOME = load_robot("stanford").configurations["home"].tolist()
 DEADLINE = 20.0
@@ -156,7 +159,12 @@ def test_physics_moves_the_robot_until_it_is_given_back(open_page: OpenPage, tmp
     open_tab(page, "Motion")
     choose(page, "Actuators", "free")
     choose(page, "Moved by", "physics")
-    wait_until(lambda: "Simulated: 0" not in shown(page, "motion"), "a second is simulated")
+    wait_until(lambda: simulated(page) >= 1.0, "a second is simulated")
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Play").wait_for()
+    before = simulated(page)
+    page.get_by_role("button", name="Step", exact=True).click()
+    wait_until(lambda: simulated(page) == pytest.approx(before + 0.002), "a time step")
     page.screenshot(path=tmp_path / "motion.png")
     open_tab(page, "Joints")
     home = table_tool_pose(spec, HOME)[:3, 3]
@@ -166,6 +174,70 @@ def test_physics_moves_the_robot_until_it_is_given_back(open_page: OpenPage, tmp
     open_tab(page, "Joints")
     page.get_by_role("button", name="home").click()
     wait_for_position(page, spec, HOME)
+
+
+def simulated(page: Page) -> float:
+    """The simulated time that the page shows, s."""
+    found = re.match(r"Simulated: (\S+) s", shown(page, "motion"))
+    return float(found.group(1)) if found else -1.0
+
+
+def test_a_link_is_pulled_at_with_the_mouse(open_page: OpenPage, viewer: Viewer, tmp_path: Path) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    open_tab(page, "Motion")
+    choose(page, "Moved by", "physics")
+    wait_until(lambda: simulated(page) > 0.1, "the simulation runs")
+    (served,) = viewer.pages
+    shoulder, wrist = table_frame_poses(spec, HOME)[[2, 3], :3, 3]
+    x, y = pixel(page, served, 0.5 * (shoulder + wrist))  # amid link 3, a long beam
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 40, y, steps=4)
+    page.mouse.move(x + 60, y - 10, steps=4)
+    wait_until(lambda: served.state.pull is not None, "the link is grabbed")
+    pull = served.state.pull
+    assert pull is not None
+    assert pull.link == "link_3"
+    wait_until(lambda: f"{pull.link} is pulled at with" in shown(page, "motion"), "it is told")
+    wait_until(lambda: math.dist(pixel(page, served, target(served)), (x + 60, y - 10)) < 3.0, "the mouse is there")
+    page.screenshot(path=tmp_path / "pull.png")
+    page.mouse.up()
+    wait_until(lambda: served.state.pull is None, "the link is let go")
+    wait_until(lambda: "pulled" not in shown(page, "motion"), "no more is told")
+
+
+def target(served: ServedPage) -> Sequence[float]:
+    """Where the mouse pulls to, m."""
+    pull = served.state.pull
+    assert pull is not None
+    return pull.target
+
+
+def pixel(page: Page, served: ServedPage, point: Sequence[float]) -> tuple[float, float]:
+    """Where a point of base_link, m, is on the page: the camera is a pinhole that looks along its z."""
+    camera, box = served.client.camera, page.locator("canvas").first.bounding_box()
+    assert box is not None
+    w, *v = camera.wxyz.tolist()
+    offset = np.subtract(point, camera.position)
+    right, down, ahead = offset + 2.0 * np.cross(v, np.cross(v, offset) - w * offset)  # turned back
+    focal = 0.5 * box["height"] / math.tan(0.5 * camera.fov)
+    return (
+        box["x"] + 0.5 * box["width"] + focal * float(right / ahead),
+        box["y"] + 0.5 * box["height"] + focal * float(down / ahead),
+    )
+
+
+def test_another_robot_or_the_table_misread_stands_beside_as_a_ghost(open_page: OpenPage, tmp_path: Path) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    open_tab(page, "Show")
+    choose(page, "Ghost is", "the table misread")
+    wait_until(lambda: "Read as modified, this table puts tool0 " in shown(page, "ghost"), "the misread table")
+    assert shown(page, "ghost") == told_reading(spec, HOME)
+    choose(page, "Ghost is", "scara")
+    wait_until(lambda: shown(page, "ghost").startswith("scara puts tool0 "), "another robot")
+    page.screenshot(path=tmp_path / "ghost.png")
+    choose(page, "Ghost is", "nobody")
+    wait_until(lambda: not shown(page, "ghost"), "no ghost")
 
 
 def test_files_are_handed_out_as_edited_and_the_model_matches_the_table(open_page: OpenPage, tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +15,11 @@ from dh2sim.robot.load import load_robot
 from dh2sim.view.motion import Recording, Simulation
 from dh2sim.view.opening import open_state
 from dh2sim.view.replay import Replay, open_replay
+from dh2sim.view.state import Pull
 from tests.program import dh2sim
 
 STANFORD = open_state(load_robot("stanford"))
+PAUSED = replace(STANFORD, paused=True)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +36,8 @@ def test_a_simulation_goes_with_the_clock_and_holds_the_robot_where_it_was() -> 
         q = simulation.tick(now, STANFORD)
     assert 0.0 < simulation.physics.time <= 0.15 + 1e-9
     assert np.allclose(q, STANFORD.q, rtol=0, atol=1e-3)
-    assert simulation.told.startswith("Simulated: 0.")
+    assert re.fullmatch(r"Simulated: 0\.\d{3} s, \d\.\d\d of real time\.", simulation.told)
+    assert simulation.share == 0.0
 
 
 def test_a_simulated_robot_follows_the_targets() -> None:
@@ -54,6 +59,50 @@ def test_a_robot_that_nothing_drives_falls() -> None:
     assert height < table_tool_pose(STANFORD.spec, STANFORD.q)[2, 3] - 0.05
 
 
+def test_a_simulation_stands_while_it_is_paused_and_makes_the_steps_that_were_asked_for() -> None:
+    simulation = Simulation(STANFORD.model, STANFORD.q, gravity=True, drive="free")
+    step = simulation.physics.timestep
+    simulation.tick(0.0, STANFORD)
+    simulation.tick(5.0, PAUSED)
+    assert simulation.physics.time == 0.0
+    for steps, now in ((1, 5.1), (1, 5.2), (4, 5.3)):
+        simulation.tick(now, replace(PAUSED, steps=steps))
+        assert simulation.physics.time == pytest.approx(steps * step)
+    assert simulation.told == f"Simulated: {4 * step:.3f} s."
+    simulation.tick(9.0, replace(STANFORD, steps=4))
+    assert simulation.physics.time == pytest.approx(4 * step), "the pause is not made up for"
+    simulation.tick(9.05, replace(STANFORD, steps=4))
+    assert simulation.physics.time > 4 * step
+
+
+def test_a_link_that_is_pulled_at_comes_to_the_mouse_until_it_is_let_go() -> None:
+    simulation = Simulation(STANFORD.model, STANFORD.q, gravity=False, drive="free")
+    pull = Pull(link="link_3", point_in_link=(0.0, 0.0, 0.1), target=(0.5, 0.5, 0.5))
+    pulled = replace(STANFORD, pull=pull)
+    simulation.tick(0.0, pulled)
+    assert simulation.physics.pushing is not None
+    point, force = simulation.physics.pushing
+    before = math.dist(point, pull.target)
+    assert simulation.told == f"Simulated: 0.000 s. link_3 is pulled at with {np.linalg.norm(force):.3g} N."
+    for k in range(1, 41):
+        simulation.tick(0.05 * k, pulled)
+    assert math.dist(simulation.physics.pushing[0], pull.target) < 0.5 * before
+    simulation.tick(2.05, STANFORD)
+    assert np.allclose(simulation.physics._data.qfrc_applied, 0.0)
+    assert "pulled" not in simulation.told
+
+
+def test_a_paused_recording_goes_from_one_recorded_instant_to_the_next(replay: Replay) -> None:
+    recording, times = Recording(replay, 0), replay.times(0)
+    assert recording.tick(0.0, replace(PAUSED, steps=2)) == tuple(replay.q_at(0, times[2]).tolist())
+    assert recording.time == times[2]
+    recording.tick(7.0, replace(PAUSED, steps=3))
+    assert recording.time == times[3]
+    recording.seek(1.0)
+    recording.tick(7.0, replace(PAUSED, steps=4))
+    assert recording.time == times[0]
+
+
 def test_a_recording_is_played_by_the_clock_again_and_again(replay: Replay) -> None:
     recording = Recording(replay, 1)
     assert recording.duration == pytest.approx(1.0)
@@ -68,10 +117,10 @@ def test_a_recording_can_be_stopped_slowed_down_and_wound(replay: Replay) -> Non
     recording.tick(0.0, STANFORD)
     recording.seek(0.5)
     assert recording.tick(0.0, STANFORD) == tuple(replay.q_at(0, 0.5).tolist())
-    recording.pace(playing=False, speed=1.0)
-    recording.tick(0.3, STANFORD)
+    assert recording.share == pytest.approx(0.5)
+    recording.tick(0.3, PAUSED)
     assert recording.time == 0.5
-    recording.pace(playing=True, speed=0.25)
+    recording.pace(0.25)
     recording.tick(0.7, STANFORD)
     assert recording.time == pytest.approx(0.6)
     recording.seek(7.0)

@@ -123,3 +123,10 @@ def test_the_grid_has_round_cells_whatever_the_robots_size() -> None:
         xs = [line.points[0][0] for line in lines if isinstance(line, Path)]
         digits = f"{xs[1] - xs[0]:.3e}"
         assert digits[:5] in ("1.000", "2.000", "5.000")
+
+
+def test_the_row_that_is_edited_is_the_one_that_is_explained_from_the_beginning() -> None:
+    explained = scene_of(after(STANFORD, Show(part=Part.ANNOTATIONS, on=True)))
+    chosen = scene_of(after(STANFORD, SelectRow(row=0), Show(part=Part.ANNOTATIONS, on=True)))
+    assert any(name.startswith("/row/") for name in explained)
+    assert explained == chosen

@@ -13,6 +13,7 @@ from dh2sim.kinematics.transforms import identity, pose_from_rpy
 from dh2sim.model.build import build_model
 from dh2sim.model.meshes import MeshAsset
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
+from dh2sim.robot.load import load_robot
 from dh2sim.view.items import Item, Placed, Solid
 from dh2sim.view.solids import link_solids, mesh_triangles, orientation_of, position_of, robot_solids, shape_triangles
 from tests.model.samples import ODD_ROBOT
@@ -68,9 +69,38 @@ def test_a_cylinder_is_as_long_and_as_wide_as_it_should_be_and_its_ends_have_poi
     assert not set(np.array(faces)[flat].ravel()) & set(np.array(faces)[~flat].ravel())
 
 
-def test_triangles_are_made_once_for_each_shape() -> None:
+def test_triangles_are_made_once_for_each_size_of_a_shape() -> None:
     made = shape(ShapeKind.CAPSULE, 0.1, 0.2)
-    assert shape_triangles(made) is shape_triangles(made)
+    assert shape_triangles(made) is shape_triangles(shape(ShapeKind.CAPSULE, 0.1, 0.2))
+    others = [
+        shape(ShapeKind.CYLINDER, 0.1, 0.2),
+        shape(ShapeKind.CAPSULE, 0.2, 0.2),
+        shape(ShapeKind.CAPSULE, 0.1, 0.1),
+    ]
+    assert all(shape_triangles(other) != shape_triangles(made) for other in others)
+
+
+def test_a_table_read_anew_shares_the_triangles_of_the_shapes_that_stay() -> None:
+    read, again = (build_model(load_robot("stanford")) for _ in range(2))
+    before, after = (robot_solids(model, model.home, "/robot") for model in (read, again))
+    solids = [name for name, item in before.items() if isinstance(item, Solid)]
+    assert solids
+    for name in solids:
+        here, there = before[name], after[name]
+        assert isinstance(here, Solid)
+        assert isinstance(there, Solid)
+        assert here.vertices is there.vertices
+
+
+def test_a_mesh_read_again_is_not_cut_up_again() -> None:
+    data = b"\0" * 80 + struct.pack("<I", 1) + struct.pack("<12fH", 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)
+
+    def asset(scale: float) -> MeshAsset:
+        own = bytes(bytearray(data))  # another object
+        return MeshAsset(file_name="m.stl", data=own, scale=scale, T_dh_mesh=identity(), converted_from=None)
+
+    assert mesh_triangles(asset(1.0)) is mesh_triangles(asset(1.0))
+    assert mesh_triangles(asset(2.0))[0][1] == (0.0, 2.0, 0.0)
 
 
 def test_a_mesh_is_read_with_its_scale_and_corners_that_coincide_become_one() -> None:

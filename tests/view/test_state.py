@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from dh2sim.robot.writing.robot_file import robot_file_text
 from dh2sim.view import events
 from dh2sim.view.opening import open_state
 from dh2sim.view.reduce import reduce
-from dh2sim.view.state import COLUMNS, Complaint, Mode, Part, ViewState, travel
+from dh2sim.view.state import COLUMNS, Complaint, Mode, Part, Pull, ViewState, travel
 from tests.strategies import robot_specs
 
 STANFORD = open_state(load_robot("stanford"))
@@ -54,12 +55,24 @@ anything: st.SearchStrategy[events.Event] = st.one_of(
     st.builds(events.RandomConfiguration, seed=st.integers()),
     st.builds(events.Follow, q=st.lists(numbers, min_size=6, max_size=6).map(tuple)),
     st.builds(events.SetMode, mode=st.sampled_from(Mode)),
+    st.builds(events.Pause, on=st.booleans()),
+    st.builds(events.Step),
+    st.builds(
+        events.PullLink,
+        pull=st.builds(
+            Pull,
+            link=st.sampled_from(["base_link", "link_1", "link_6", ""]),
+            point_in_link=st.tuples(numbers, numbers, numbers),
+            target=st.tuples(numbers, numbers, numbers),
+        ),
+    ),
+    st.builds(events.LetGo),
     st.builds(events.EditCell, row=rows, column=st.sampled_from([*COLUMNS, "convention", "link"]), text=typed),
     st.builds(events.SetConvention, row=st.none() | rows, convention=st.sampled_from(Convention)),
     st.builds(events.ConvertTable, convention=st.sampled_from(Convention)),
     st.builds(events.SetUnits, angle=st.sampled_from(AngleUnit), length=st.sampled_from(LengthUnit)),
     st.builds(events.ReplaceText, text=st.sampled_from([STANFORD.text, "", "name: x"])),
-    st.builds(events.SelectRow, row=st.none() | rows),
+    st.builds(events.SelectRow, row=rows),
     st.builds(events.Show, part=st.sampled_from(Part), on=st.booleans()),
     st.builds(events.ShowAngles, unit=st.sampled_from(AngleUnit)),
     st.builds(events.ChooseFrame, name=st.sampled_from(["tool0", "dh_3", "link_1", "dh_99", ""])),
@@ -88,7 +101,7 @@ def assert_sound(state: ViewState) -> None:
     described = parse_robot(state.text)
     assert np.array_equal(table_tool_pose(described, state.q), table_tool_pose(state.spec, state.q))
     assert len(state.draft.rows) == len(state.spec.rows)
-    assert state.selected_row is None or 0 <= state.selected_row < len(state.spec.rows)
+    assert 0 <= state.selected_row < len(state.spec.rows)
     wrong = {(found.row, found.column) for found in state.draft.complaints}
     assert len(wrong) == len(state.draft.complaints)
 
@@ -284,6 +297,32 @@ def test_while_physics_is_on_the_user_moves_what_the_actuators_hold() -> None:
     assert moved.wanted == (math.radians(170), STANFORD.q[1], STANFORD.q[2] + 0.0127, *STANFORD.q[3:])
     still = after(moved, events.SetMode(mode=Mode.STILL))
     assert still.wanted == STANFORD.q
+
+
+def test_what_moves_is_paused_and_stepped_and_begins_anew_running() -> None:
+    assert after(STANFORD, events.Pause(on=True), events.Step()) == STANFORD
+    for mode in (Mode.PHYSICS, Mode.REPLAY):
+        moving = after(STANFORD, events.SetMode(mode=mode))
+        assert (moving.paused, moving.steps) == (False, 0)
+        stepped = after(moving, events.Step(), events.Step())
+        assert (stepped.paused, stepped.steps) == (True, 2)
+        going = after(stepped, events.Pause(on=False))
+        assert (going.paused, going.steps) == (False, 2)
+        anew = after(stepped, events.SetMode(mode=mode))
+        assert (anew.paused, anew.steps) == (False, 0)
+
+
+def test_only_links_of_a_simulated_robot_are_pulled_at() -> None:
+    pull = Pull(link="link_3", point_in_link=(0.0, 0.1, 0.0), target=(1.0, 0.0, 0.0))
+    assert after(STANFORD, events.PullLink(pull=pull)).pull is None
+    driven = after(STANFORD, events.SetMode(mode=Mode.PHYSICS), events.PullLink(pull=pull))
+    assert driven.pull == pull
+    further = replace(pull, target=(1.0, 1.0, 0.0))
+    assert after(driven, events.PullLink(pull=further)).pull == further
+    for wrong in (replace(pull, link="base_link"), replace(pull, target=(math.nan, 0.0, 0.0))):
+        assert after(driven, events.PullLink(pull=wrong)).pull == pull
+    assert after(driven, events.LetGo()).pull is None
+    assert after(driven, events.SetMode(mode=Mode.STILL)).pull is None
 
 
 def test_nobody_moves_the_joints_of_a_recording() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+from dh2sim.view.events import Pause, Step
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
 from dh2sim.view.state import Mode, ViewState
@@ -37,8 +38,12 @@ class Mover(Protocol):
     def play(self, rollout: int) -> None:
         """Play a rollout from its beginning."""
 
-    def pace(self, *, playing: bool, speed: float) -> None:
-        """Let the recording run or stand, and how fast."""
+    @property
+    def motion_share(self) -> float:
+        """Which share of the recording is behind, from 0 to 1."""
+
+    def pace(self, speed: float) -> None:
+        """Say how fast the recording is played."""
 
     def seek(self, share: float) -> None:
         """Show the instant at a share of the recording, from 0 to 1."""
@@ -54,11 +59,18 @@ class MotionTab:
         modes = [mode for mode in Mode if mode is not Mode.REPLAY or mover.replay is not None]
         self._mode = self._chosen(gui.add_dropdown("Moved by", [_WORDS[mode] for mode in modes]))
         self._told = gui.add_html("")
+        self._paused = False
+        self._pause = gui.add_button("Pause", disabled=True)
+        self._step = gui.add_button("Step", disabled=True, hint="One time step, or the recording's next instant")
+        on_click(self._pause, send, lambda: Pause(on=not self._paused))
+        on_click(self._step, send, Step)
         with gui.add_folder("Physics"):
             self._gravity = self._chosen(gui.add_checkbox("Gravity", True))
             self._drive = self._chosen(gui.add_dropdown("Actuators", ("position", "free")))
             on_click(gui.add_button("Begin anew"), send, lambda: self._begin)
+            gui.add_html(markup.note("Drag a link in the scene to pull at it."))
         self._rollout: Any = None
+        self._instant: Bound[float] | None = None
         if mover.replay is not None:
             with gui.add_folder("Recording"):
                 self._add_recording(gui, mover.replay)
@@ -66,8 +78,19 @@ class MotionTab:
     def show(self, state: ViewState) -> None:
         """Show a state."""
         self._mode.show(_WORDS[state.mode])
+        self._show_pause(state)
+        if self._instant is not None:
+            self._instant.show(round(100.0 * self._mover.motion_share, 1))
         told = self._mover.motion_told if state.mode is not Mode.STILL else ""
         self._told.content = markup.note(markup.text(told), name="motion")
+
+    def _show_pause(self, state: ViewState) -> None:
+        still = state.mode is Mode.STILL
+        if still != self._pause.disabled:
+            self._pause.disabled = self._step.disabled = still
+        if state.paused != self._paused:
+            self._paused = state.paused
+            self._pause.label = "Play" if state.paused else "Pause"
 
     def _chosen(self, widget: Any) -> Bound[Any]:
         """Begin anew whenever a choice changes."""
@@ -75,13 +98,11 @@ class MotionTab:
 
     def _add_recording(self, gui: viser.GuiApi, replay: Replay) -> None:
         self._rollout = gui.add_dropdown("Rollout", [str(number) for number in replay.rollouts])
-        self._playing = gui.add_checkbox("Playing", True)
         self._speed = gui.add_dropdown("Speed", ("0.1", "0.25", "0.5", "1", "2"), initial_value="1")
         instant = gui.add_slider("Instant [%]", min=0.0, max=100.0, step=0.1, initial_value=0.0)
         bind(self._rollout, self._send, lambda _value: self._begin)
-        bind(self._playing, self._send, lambda _value: self._pace)
         bind(self._speed, self._send, lambda _value: self._pace)
-        bind(instant, self._send, lambda percent: lambda: self._mover.seek(percent / 100.0))
+        self._instant = bind(instant, self._send, lambda percent: lambda: self._mover.seek(percent / 100.0))
         if replay.note:
             gui.add_html(markup.note(markup.text(replay.note)))
 
@@ -98,4 +119,4 @@ class MotionTab:
             self._mover.be_still()
 
     def _pace(self) -> None:
-        self._mover.pace(playing=bool(self._playing.value), speed=float(self._speed.value))
+        self._mover.pace(float(self._speed.value))

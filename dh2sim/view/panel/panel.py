@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from dh2sim.view.panel import markup
@@ -23,7 +24,13 @@ class Panel:
     """All widgets of a page."""
 
     def __init__(
-        self, client: viser.ClientHandle, send: Send, state: ViewState, files: FileActions, mover: Mover
+        self,
+        client: viser.ClientHandle,
+        send: Send,
+        state: ViewState,
+        files: FileActions,
+        mover: Mover,
+        compare: Callable[[str], None],
     ) -> None:
         """Add the widgets.
 
@@ -33,6 +40,7 @@ class Panel:
             state: To begin with.
             files: What the buttons for files do.
             mover: What lets somebody else move the joints.
+            compare: Draws a robot that comes with dh2sim, given its name, beside the one that is shown.
         """
         client.gui.set_panel_label(f"dh2sim · {state.spec.name}")
         self._notice = client.gui.add_html("")
@@ -46,7 +54,7 @@ class Panel:
         with tabs.add_tab("Motion"):
             self._motion = MotionTab(client, send, mover)
         with tabs.add_tab("Show"):
-            self._parts = ShowTab(client, send, state)
+            self._parts = ShowTab(client, send, state, compare)
         with tabs.add_tab("Files"):
             add_files(client, send, files)
         add_keys(client, send)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
+from dh2sim.robot.catalog import builtin_robots
 from dh2sim.view.events import Compare, CompareReading, Event, Show
-from dh2sim.view.ghost import told_reading
+from dh2sim.view.ghost import told_ghost, told_reading
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Send, bind
 from dh2sim.view.panel.keys import KEYS
@@ -28,20 +30,23 @@ _WORDS = {
 
 
 _NOBODY, _MISREAD = "nobody", "the table misread"
-_GHOSTS: dict[str, Event] = {_NOBODY: Compare(ghost=None), _MISREAD: CompareReading()}
 
 
 class ShowTab:
     """A box to tick for each part of the scene."""
 
-    def __init__(self, client: viser.ClientHandle, send: Send, state: ViewState) -> None:
-        """Add the widgets to viser's current container."""
+    def __init__(
+        self, client: viser.ClientHandle, send: Send, state: ViewState, compare: Callable[[str], None]
+    ) -> None:
+        """Add the widgets to viser's current container; ``compare`` draws a robot of a name as the ghost."""
         self._boxes = {
             part: bind(client.gui.add_checkbox(words, part in state.shown), send, partial(_event, part))
             for part, words in _WORDS.items()
         }
-        comparison = client.gui.add_dropdown("Ghost is", tuple(_GHOSTS), initial_value=_chosen(state))
-        self._ghost = bind(comparison, send, lambda words: _GHOSTS[words])
+        comparison = client.gui.add_dropdown(
+            "Ghost is", (_NOBODY, _MISREAD, *builtin_robots()), initial_value=_chosen(state)
+        )
+        self._ghost = bind(comparison, send, partial(_ghost, compare))
         self._gap = client.gui.add_html("")
         pairs = [(f"joint {i}", f"{pair.down} less, {pair.up} more") for i, pair in enumerate(KEYS, start=1)]
         with client.gui.add_folder("Keys", expand_by_default=False):
@@ -57,11 +62,23 @@ class ShowTab:
 
 
 def _chosen(state: ViewState) -> str:
-    return _NOBODY if state.ghost is None else _MISREAD
+    if state.ghost is None:
+        return _NOBODY
+    return _MISREAD if state.ghost.reading else state.ghost.label
+
+
+def _ghost(compare: Callable[[str], None], chosen: str) -> Event | Callable[[], None]:
+    if chosen == _NOBODY:
+        return Compare(ghost=None)
+    return CompareReading() if chosen == _MISREAD else partial(compare, chosen)
 
 
 def _told(state: ViewState) -> str:
-    return told_reading(state.spec, state.q) if state.ghost is not None and state.ghost.reading else ""
+    if state.ghost is None:
+        return ""
+    if state.ghost.reading:
+        return told_reading(state.spec, state.q)
+    return told_ghost(state.ghost.model, state.model, state.q)
 
 
 def _event(part: Part, on: bool) -> Show:

@@ -53,8 +53,8 @@ class TableTab:
         self._overview.content = overview(state)
         if _names(state) != self._rows:
             self._rows = self._chooser.handle.options = _names(state)
-        self._chooser.show(self._rows[state.selected_row or 0])
-        self._row = state.selected_row or 0
+        self._chooser.show(self._rows[state.selected_row])
+        self._row = state.selected_row
         row = state.draft.rows[self._row]
         for (column, cell), text in zip(self._cells.items(), row.cells, strict=True):
             cell.show(text)

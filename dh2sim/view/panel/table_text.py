@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dh2sim.robot.spec import Convention, JointType
+from dh2sim.robot.spec import Convention
 from dh2sim.robot.units import AngleUnit
 from dh2sim.view.panel import markup
 from dh2sim.view.state import Complaint, Draft, ViewState
@@ -30,8 +30,10 @@ def _row(state: ViewState, i: int, *, hayati: bool) -> list[str]:
     cells = [_cell(state, i, column, text) for column, text in zip(columns, row.cells, strict=False)]
     flips = [spec.flip for spec in state.spec.rows]
     variable = _variable(i, flip=flips[i])
-    cells[2] += variable if row.type is JointType.PRISMATIC else ""
-    cells[3] += variable if row.type.turns else ""
+    if row.type.moves:
+        moved = 3 if row.type.turns else 2
+        marked = state.draft.complaint(i, columns[moved]) is not None
+        cells[moved] = f"{variable} + {cells[moved]}" if marked else variable + _offset(row.cells[moved])
     return [number, markup.text(row.name), *cells, row.convention.value]
 
 
@@ -43,7 +45,23 @@ def _cell(state: ViewState, row: int, column: str, text: str) -> str:
 
 
 def _variable(i: int, *, flip: bool) -> str:
-    return f" {'−' if flip else '+'} q<sub>{i + 1}</sub>"
+    return f"{'−' if flip else ''}q<sub>{i + 1}</sub>"
+
+
+def _offset(text: str) -> str:
+    """Return what follows a joint's variable: nothing where the offset is zero."""
+    number = text.strip().removeprefix("+").strip()
+    if not number or _is_zero(number):
+        return ""
+    sign, rest = ("−", number[1:].strip()) if number.startswith("-") else ("+", number)
+    return f" {sign} {markup.text(rest)}"
+
+
+def _is_zero(text: str) -> bool:
+    try:
+        return float(text) == 0.0
+    except ValueError:  # an expression
+        return False
 
 
 def _legend(draft: Draft) -> str:

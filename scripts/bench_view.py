@@ -1,0 +1,258 @@
+#!/usr/bin/env python3
+"""The part of ``scripts/bench`` that measures the viewer in a real browser, which draws without a graphics card.
+
+scripts/bench_view.py --minutes 3    this part alone, clicking at random for so long
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import random
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from scripts.bench_view_pages import OPTIONS, click, opened, program, shows_robot
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+    from dh2sim.view.page import Page as ViewerPage
+
+Row = tuple[str, str, str, bool | None]
+
+MOVES = 50
+SECONDS = 8.0
+"""For how long frames are counted."""
+WARM_UP = 20.0
+"""s of clicking, before memory is measured."""
+WATCH = """() => {
+    const readout = () => document.querySelector('[data-dh2sim="readout"]')?.textContent;
+    const before = readout();
+    window.moved = new Promise((done, failed) => {
+        let pressed;
+        addEventListener("keydown", () => { pressed = performance.now(); }, { capture: true, once: true });
+        const observer = new MutationObserver(() => {
+            if (readout() === before || pressed === undefined) return;
+            observer.disconnect();
+            const told = performance.now() - pressed;
+            const painted = () => done([told, performance.now() - pressed]);
+            requestAnimationFrame(() => requestAnimationFrame(painted));
+        });
+        observer.observe(document.body, { subtree: true, childList: true, characterData: true });
+        setTimeout(() => failed(new Error("the pose did not change")), 20000);
+    });
+}"""
+"""Promises the ms from the next key to the pose that is shown next, and to the frame that is painted then."""
+FRAMES = """(seconds) => new Promise((done) => {
+    const start = performance.now();
+    let count = 0;
+    const frame = () => {
+        count += 1;
+        const passed = (performance.now() - start) / 1000;
+        if (passed < seconds) requestAnimationFrame(frame); else done(count / passed);
+    };
+    requestAnimationFrame(frame);
+})"""
+"""Frames a second."""
+
+
+def view(minutes: float = 2.0) -> Iterator[Row]:
+    """First picture, delay of a slider, frames a second of a long chain, and memory after clicking at random."""
+    what = "viewer in a browser"
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError as error:
+        yield what, f"not measured ({error})", "", None
+        return
+    if chromium is None:
+        yield what, "not measured (there is no Chromium)", "", None
+        return
+    with sync_playwright() as playwright:
+        options = [*OPTIONS, "--disable-background-networking"]
+        browser = playwright.chromium.launch(executable_path=chromium, args=options)
+        try:
+            yield from _first_pictures(browser)
+            yield from _delays(browser)
+            yield from _long_chain(browser)
+            yield from _memory(browser, minutes)
+        finally:
+            browser.close()
+
+
+def _first_pictures(browser: Browser) -> Iterator[Row]:
+    """From the command to the robot on the screen; each time with a browser that runs, but has nothing in store."""
+    panels, pictures = [], []
+    for _ in range(5):
+        start = time.perf_counter()
+        with program() as (_process, url):
+            page = opened(browser, url)
+            panels.append(time.perf_counter() - start)
+            while not shows_robot(page):
+                pass
+            pictures.append(time.perf_counter() - start)
+            page.context.close()
+    panel, picture = statistics.median(panels), statistics.median(pictures)
+    told = f"{picture:.1f} s ({min(pictures):.1f} to {max(pictures):.1f}; panel {panel:.1f} s)"
+    yield "view: from the command to the robot on the screen", told, "3 s", picture <= 3.0
+
+
+def _delays(browser: Browser) -> Iterator[Row]:
+    """From the key that moves a slider to the pose in the page, as the page's own clock has it."""
+    with program() as (_process, url):
+        for drawing, words in ((True, ", drawn in software"), (False, ", drawing left out")):
+            page = opened(browser, url, drawing=drawing)
+            told, painted = _slider_delays(page)
+            page.context.close()
+            yield _row(f"view: slider to the pose in the page{words}", told, 50.0)
+            yield _row(f"view: slider to the frame after it{words}", painted, None)
+
+
+def _slider_delays(page: Page) -> tuple[list[float], list[float]]:
+    time.sleep(3.0)  # the fading in of the first picture
+    page.get_by_role("slider").first.focus()
+    delays = []
+    for k in range(MOVES + 5):
+        page.evaluate(WATCH)
+        page.keyboard.press("ArrowRight" if k % 10 < 5 else "ArrowLeft")
+        delays.append(page.evaluate("() => window.moved"))
+        time.sleep(0.1)
+    told, painted = zip(*delays[5:], strict=True)  # without the first, which are slower
+    return list(told), list(painted)
+
+
+def _long_chain(browser: Browser) -> Iterator[Row]:
+    """60 joints: the server's own time for a move, and frames a second while a joint moves and while none does."""
+    from dh2sim import parse_robot
+    from dh2sim.view.opening import open_state
+    from dh2sim.view.server import Viewer
+
+    viewer = Viewer(open_state(parse_robot(_chain(60))))
+    try:
+        for drawing, words in ((True, "drawn in software"), (False, "drawing left out")):
+            shown = opened(browser, viewer.url, drawing=drawing)
+            while drawing and not shows_robot(shown, share=0.002):
+                pass
+            time.sleep(3.0)
+            page = viewer.pages[-1]
+            yield _row(f"view: 60 joints, event to sent to the browser, {words}", _server_times(page), 50.0)
+            still = shown.evaluate(FRAMES, SECONDS)
+            with _moving(page):
+                moving = shown.evaluate(FRAMES, SECONDS)
+            told = f"{moving:.0f} ({still:.0f} while none moves)"
+            yield f"view: 60 joints, frames a second, {words}", told, "30", moving >= 30.0
+            shown.context.close()
+    finally:
+        viewer.stop()
+
+
+def _server_times(page: ViewerPage) -> list[float]:
+    """From an event to the end of its drawing, ms; one event at a time."""
+    from dh2sim.view.events import MoveJoint
+
+    sent, flush = threading.Event(), page.client.flush
+
+    def flushed() -> None:
+        flush()
+        sent.set()
+
+    page.client.flush = flushed  # type: ignore[method-assign]
+    times = []
+    for k in range(MOVES):
+        sent.clear()
+        start = time.perf_counter()
+        page.send(MoveJoint(joint=k % 60, value=0.02 * (k % 7)))
+        if not sent.wait(20.0):
+            raise TimeoutError("the page does not draw")
+        times.append(1e3 * (time.perf_counter() - start))
+        time.sleep(0.1)
+    page.client.flush = flush  # type: ignore[method-assign]
+    return times
+
+
+@contextlib.contextmanager
+def _moving(page: ViewerPage) -> Iterator[None]:
+    """A joint that moves 30 times a second."""
+    from dh2sim.view.events import MoveJoint
+
+    ended = threading.Event()
+
+    def move() -> None:
+        k = 0
+        while not ended.wait(1.0 / 30.0):
+            k += 1
+            page.send(MoveJoint(joint=5, value=0.01 * (k % 50)))
+
+    mover = threading.Thread(target=move)
+    mover.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        mover.join()
+
+
+def _memory(browser: Browser, minutes: float) -> Iterator[Row]:
+    """Memory of the server after clicking at random, of that after a warm-up."""
+    what = f"view: memory after {minutes:g} minutes of clicking, times"
+    if not Path("/proc/self/status").exists():
+        yield what, "not measured (there is no /proc)", "1.1", None
+        return
+    rng = random.Random(0)
+    with program() as (process, url):
+        page = opened(browser, url, drawing=False)
+        click(page, rng, WARM_UP)
+        before = _resident(process)
+        count = click(page, rng, 60.0 * minutes)
+        time.sleep(1.0)
+        after = _resident(process)
+        page.context.close()
+    told = f"{after / before:.2f} ({before / 1e6:.0f} to {after / 1e6:.0f} MB, {count} clicks)"
+    yield what, told, "1.1", after <= 1.1 * before
+
+
+def _resident(process: subprocess.Popen[str]) -> int:
+    """Memory of a process, bytes."""
+    found = re.search(r"VmRSS:\s+(\d+) kB", Path(f"/proc/{process.pid}/status").read_text(encoding="ascii"))
+    assert found is not None
+    return int(found.group(1)) * 1024
+
+
+def _chain(joints: int) -> str:
+    rows = "".join(
+        f"  - {{type: revolute, a: 0.1, alpha: {90 * (i % 2)}, d: 0.02, theta: 0}}\n" for i in range(joints)
+    )
+    return f"name: chain\nconvention: standard\nunits: {{angle: deg}}\njoints:\n{rows}"
+
+
+def _row(what: str, times: list[float], target: float | None) -> Row:
+    """Tell times, ms."""
+    middle, most = statistics.median(times), statistics.quantiles(times, n=10)[-1]
+    met = None if target is None else middle <= target
+    return what, f"{middle:.0f} ms (90 %: {most:.0f} ms)", "" if target is None else f"{target:.0f} ms", met
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--minutes", type=float, default=2.0, help="of clicking at random")
+    for what, figure, target, met in view(parser.parse_args().minutes):
+        words = {True: "met", False: "MISSED", None: ""}[met]
+        print(f"{what}: {figure}; target {target or 'none'} {words}".rstrip(), flush=True)
+    print(f"load: {' '.join(f'{load:.1f}' for load in os.getloadavg())}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,107 @@
+"""The viewer in a browser, as ``scripts/bench_view.py`` opens it, looks at it, and clicks in it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import random
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Locator, Page
+
+OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+NO_DRAWING = """
+for (const call of ["clear", "drawArrays", "drawElements", "drawArraysInstanced", "drawElementsInstanced"])
+    WebGL2RenderingContext.prototype[call] = () => {};
+"""
+"""Leaves out what a graphics card would do, which without one takes most of a processor's time."""
+
+
+@contextlib.contextmanager
+def program() -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """The program itself, once it tells where it serves, and that address."""
+    command = [sys.executable, "-m", "dh2sim", "view", "stanford", "--no-browser", "--port", "8700"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        try:
+            assert process.stdout is not None
+            found = re.search(r"http://\S+", process.stdout.readline())
+            if found is None:
+                raise RuntimeError("dh2sim view does not serve")
+            yield process, found.group()
+        finally:
+            process.terminate()
+
+
+def opened(browser: Browser, url: str, *, drawing: bool = True) -> Page:
+    """A page in a window of its own, once its panel is there."""
+    page = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
+    if not drawing:
+        page.add_init_script(NO_DRAWING)
+    page.goto(url)
+    page.get_by_role("tab", name="Joints").wait_for()
+    return page
+
+
+def shows_robot(page: Page, share: float = 0.01) -> bool:
+    """Whether a share of the picture is dark, as a robot is; the ground is light."""
+    from PIL import Image
+
+    canvas = page.locator("canvas").first.bounding_box()
+    if canvas is None:
+        return False
+    with Image.open(io.BytesIO(page.screenshot(clip=canvas))) as picture:
+        grey = picture.convert("L")
+        return sum(grey.histogram()[:128]) >= share * grey.width * grey.height
+
+
+def click(page: Page, rng: random.Random, seconds: float) -> int:
+    """Do anything, for so long; return how often. Every page is left for a new one now and then."""
+    end, count = time.monotonic() + seconds, 0
+    while time.monotonic() < end:
+        count += 1
+        if count % 100 == 0:
+            page.reload()
+            page.get_by_role("tab", name="Joints").wait_for()
+        match rng.choices(("joint", "configuration", "cell", "convention", "physics"), (6, 3, 3, 2, 1))[0]:
+            case "joint":
+                _tab(page, "Joints")
+                page.get_by_role("slider").nth(rng.randrange(6)).focus()
+                for _ in range(rng.randint(1, 8)):
+                    page.keyboard.press(rng.choice(("ArrowLeft", "ArrowRight", "Home", "End")))
+            case "configuration":
+                _tab(page, "Joints")
+                page.get_by_role("button", name=rng.choice(("home", "zero", "printed", "random")), exact=True).click()
+            case "cell":
+                _tab(page, "Table")
+                _choose(page, "Edit row", rng.randrange(6))
+                _field(page, rng.choice("aαdθ")).fill(rng.choice(("0", "0.1", "90", "pi/2", "d2", "-45", "90 +")))
+            case "convention":
+                _tab(page, "Table")
+                _choose(page, "convention", rng.randrange(3))
+            case _:
+                _tab(page, "Motion")
+                _choose(page, "Moved by", 1)
+                time.sleep(rng.uniform(0.0, 1.0))
+                _choose(page, "Moved by", 0)
+    return count
+
+
+def _tab(page: Page, name: str) -> None:
+    page.get_by_role("tab", name=name).click()
+
+
+def _choose(page: Page, label: str, number: int) -> None:
+    _field(page, label).click()
+    page.get_by_role("option").nth(number).click()
+
+
+def _field(page: Page, label: str) -> Locator:
+    """What can be typed into beside a label."""
+    name = page.locator("label", has_text=re.compile(f"^{re.escape(label)}$")).locator("visible=true")
+    return name.locator("xpath=ancestor::*[.//input[not(@type='hidden')]][1]//input[not(@type='hidden')]").first

@@ -1,0 +1,46 @@
+"""Where a link is grabbed, and the arrow that shows the pull."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from dh2sim.robot.load import load_robot
+from dh2sim.simulate.physics.trial import compile_model
+from dh2sim.view.items import Arrow
+from dh2sim.view.opening import open_state
+from dh2sim.view.pull import grabbed_point
+from dh2sim.view.scene import scene_of
+from dh2sim.view.state import Mode, Pull
+
+STANFORD = open_state(load_robot("stanford"))
+Q = (0.3, -0.4, 0.35, 0.5, -0.6, 0.7)
+
+
+def in_base_link(link: str, point: tuple[float, float, float]) -> np.ndarray:
+    """Where MuJoCo has a point of a link with the joints at ``Q``, m."""
+    model = compile_model(STANFORD.model)
+    data = mujoco.MjData(model)
+    data.qpos[:] = Q
+    mujoco.mj_kinematics(model, data)
+    body = model.body(link).id
+    return np.asarray(data.xpos[body] + data.xmat[body].reshape(3, 3) @ np.array(point))
+
+
+@pytest.mark.parametrize("link", ["link_1", "link_3", "link_6"])
+def test_the_point_that_is_grabbed_is_the_one_of_the_link_that_is_there(link: str) -> None:
+    point = (0.02, -0.1, 0.3)
+    assert grabbed_point(STANFORD.model, Q, link, in_base_link(link, point)) == pytest.approx(point, abs=1e-12)
+
+
+def test_an_arrow_goes_from_the_grabbed_point_to_the_mouse() -> None:
+    pull = Pull(link="link_3", point_in_link=(0.0, 0.05, 0.1), target=(1.0, 2.0, 3.0))
+    pulled = replace(STANFORD, q=Q, mode=Mode.PHYSICS, pull=pull)
+    arrow = scene_of(pulled)["/pull"]
+    assert isinstance(arrow, Arrow)
+    assert arrow.start == pytest.approx(in_base_link("link_3", pull.point_in_link), abs=1e-12)
+    assert arrow.end == pull.target
+    assert "/pull" not in scene_of(replace(pulled, pull=None))
