@@ -45,6 +45,8 @@ def view(
       dh2sim view stanford --export stanford.html
     """
     gc.enable()
+    if rollout != 0 and (export is None or run is None):
+        raise typer.BadParameter("only with a run and --export: the page lets one choose", param_hint="--rollout")
     from dh2sim.robot.load import load_robot
     from dh2sim.view.opening import folder_of, open_state
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -30,6 +31,7 @@ class Eye:
     look_at: Vector
 
 
+@lru_cache(maxsize=8)  # every scene asks, and a model never changes
 def size_of(model: RobotModel) -> float:
     """Return the diagonal of the box around base_link and all frames at home, m; positive, the same at every q."""
     size = float(np.linalg.norm(np.ptp(_corners(model), axis=0)))

@@ -64,6 +64,11 @@ class Page:
         """End, once what is queued is done."""
         self._queue.put(None)
 
+    def join(self, patience: float) -> None:
+        """Wait until it has ended, for so many seconds at most."""
+        if self._thread.is_alive():
+            self._thread.join(patience)
+
     def send(self, task: Task, *, seen: Callable[[], None] | None = None) -> None:
         """Queue an event, or something to do in its turn; from any thread."""
         self._queue.put((task, seen))

@@ -29,6 +29,10 @@ LOOPBACK: Final = ("127.0.0.1", "localhost", "::1")
 PORTS_TRIED: Final = 100
 
 
+PATIENCE = 2.0
+"""s that a page is given to end what it does."""
+
+
 class Viewer:
     """Serves pages until it is stopped."""
 
@@ -55,7 +59,8 @@ class Viewer:
         self._server = quiet_server(host, port)
         self.port: int = self._server.get_port()
         _dress(self._server, state)
-        threading.Thread(target=_warm_up, name="warm-up", daemon=True).start()
+        self._warm_up = threading.Thread(target=_warm_up, name="warm-up", daemon=True)
+        self._warm_up.start()
         self._server._websock_server.on_client_connect(self._check)
         self._server.on_client_connect(self._open)
         self._server.on_client_disconnect(self._close)
@@ -79,9 +84,13 @@ class Viewer:
 
     def stop(self) -> None:
         """Close all pages, and end."""
-        for page in self.pages:
+        pages = self.pages
+        for page in pages:
             page.close()
+        for page in pages:
+            page.join(PATIENCE)
         stop_quietly(self._server)
+        self._warm_up.join()  # Python must not end while a library is loaded: that is a crash
 
     async def _check(self, connection: infra.WebsockClientConnection) -> None:
         """Turn away whoever comes from elsewhere, before anything is told."""
@@ -132,6 +141,8 @@ def free_port(host: str, port: int) -> int:
                 trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 trial.bind((host, candidate))
                 return int(trial.getsockname()[1])
+        except UnicodeError as error:  # of a name that cannot be one
+            raise Dh2simError(f"cannot listen at {host}, port {candidate}: that is no address") from error
         except OSError as error:
             if error.errno != errno.EADDRINUSE:
                 raise Dh2simError(f"cannot listen at {host}, port {candidate}: {error.strerror or error}") from error
