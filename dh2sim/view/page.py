@@ -29,7 +29,15 @@ if TYPE_CHECKING:
     from dh2sim.view.physics import Drive
     from dh2sim.view.replay import Replay
 
+GONE = ("on a closed connection", "Event loop is closed")
+"""In what viser and asyncio say where a browser is gone: a warning (an error where warnings are), and an error."""
+
 Task: TypeAlias = "Event | Callable[[], None]"
+
+
+def says_that_nobody_is_there(error: Exception) -> bool:
+    """Whether an error only says that the browser was closed, or the server stopped."""
+    return any(words in str(error) for words in GONE)
 
 
 class Page:
@@ -54,7 +62,7 @@ class Page:
         self._painter = Painter(client.scene)
         self._handle = ToolHandle(client.scene, self.send, lambda: self.state, self.apply)
         self._grabs = LinkGrabs(self._painter, self.send, lambda: self.state)
-        self._thread = threading.Thread(target=self._work, name=f"page-{client.client_id}", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=f"page-{client.client_id}", daemon=True)
 
     def start(self) -> None:
         """Draw, and begin to work through events."""
@@ -72,6 +80,14 @@ class Page:
     def send(self, task: Task, *, seen: Callable[[], None] | None = None) -> None:
         """Queue an event, or something to do in its turn; from any thread."""
         self._queue.put((task, seen))
+
+    def _run(self) -> None:
+        """Work, until the page is closed; a browser that is gone may be noticed while something is sent to it."""
+        try:
+            self._work()
+        except (UserWarning, RuntimeError) as error:
+            if not says_that_nobody_is_there(error):
+                raise
 
     def _work(self) -> None:
         """Draw; then wait for events, and draw what came of them."""

@@ -9,6 +9,7 @@ import io
 import socket
 import threading
 import time
+import warnings
 from collections.abc import Mapping
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Final
@@ -158,6 +159,8 @@ def quiet_server(host: str, port: int) -> viser.ViserServer:
     """Start a server; viser's own words about it are dropped."""
     import viser
 
+    # pages notice by themselves that their browser is gone
+    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection", category=UserWarning)
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host=host, port=port, verbose=False)
     server.request_share_url = _refuse_to_share  # type: ignore[method-assign]

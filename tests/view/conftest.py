@@ -15,7 +15,7 @@ from dh2sim.view.server import Viewer
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
 
-TIMEOUT = 30_000
+TIMEOUT = 60_000
 """ms that a page may take to show something: a browser without a graphics card is slow."""
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from dh2sim.view.page import Page as ServedPage
 
 HOME = load_robot("stanford").configurations["home"].tolist()
-DEADLINE = 20.0
+DEADLINE = 60.0
 """s."""
 
 OpenPage = Callable[[], "Page"]
