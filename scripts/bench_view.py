@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The part of ``scripts/bench`` that measures the viewer in a real browser, which draws without a graphics card.
 
-scripts/bench_view.py --minutes 3    this part alone, clicking at random for so long
+scripts/bench_view.py --minutes 3       this part alone, clicking at random for so long
+scripts/bench_view.py --only delays     of this part, first pictures, delays, a long chain, or memory
 """
 
 from __future__ import annotations
@@ -17,13 +18,14 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from scripts.bench_view_pages import OPTIONS, click, opened, program, shows_robot
+from scripts.bench_view_pages import OPTIONS, click, opened, program
+from scripts.bench_view_probes import FIRST_PICTURE, FRAMES, NO_DRAWING, NUMBERS, POSES
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -35,40 +37,16 @@ Row = tuple[str, str, str, bool | None]
 MOVES = 50
 SECONDS = 8.0
 """For how long frames are counted."""
-WARM_UP = 20.0
-"""s of clicking, before memory is measured."""
-WATCH = """() => {
-    const readout = () => document.querySelector('[data-dh2sim="readout"]')?.textContent;
-    const before = readout();
-    window.moved = new Promise((done, failed) => {
-        let pressed;
-        addEventListener("keydown", () => { pressed = performance.now(); }, { capture: true, once: true });
-        const observer = new MutationObserver(() => {
-            if (readout() === before || pressed === undefined) return;
-            observer.disconnect();
-            const told = performance.now() - pressed;
-            const painted = () => done([told, performance.now() - pressed]);
-            requestAnimationFrame(() => requestAnimationFrame(painted));
-        });
-        observer.observe(document.body, { subtree: true, childList: true, characterData: true });
-        setTimeout(() => failed(new Error("the pose did not change")), 20000);
-    });
-}"""
-"""Promises the ms from the next key to the pose that is shown next, and to the frame that is painted then."""
-FRAMES = """(seconds) => new Promise((done) => {
-    const start = performance.now();
-    let count = 0;
-    const frame = () => {
-        count += 1;
-        const passed = (performance.now() - start) / 1000;
-        if (passed < seconds) requestAnimationFrame(frame); else done(count / passed);
-    };
-    requestAnimationFrame(frame);
-})"""
-"""Frames a second."""
+WARM_UP = 60.0
+"""s of clicking, before memory is measured: until then libraries are loaded, and what is kept is filled."""
+FIRST_PAINT = "() => performance.timeOrigin + performance.getEntriesByName('first-contentful-paint')[0].startTime"
+"""ms since 1970."""
 
 
-def view(minutes: float = 2.0) -> Iterator[Row]:
+PARTS = ("first", "delays", "chain", "memory")
+
+
+def view(minutes: float = 2.0, parts: Sequence[str] = PARTS) -> Iterator[Row]:
     """First picture, delay of a slider, frames a second of a long chain, and memory after clicking at random."""
     what = "viewer in a browser"
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -84,53 +62,59 @@ def view(minutes: float = 2.0) -> Iterator[Row]:
         options = [*OPTIONS, "--disable-background-networking"]
         browser = playwright.chromium.launch(executable_path=chromium, args=options)
         try:
-            yield from _first_pictures(browser)
-            yield from _delays(browser)
-            yield from _long_chain(browser)
-            yield from _memory(browser, minutes)
+            measures: list[Callable[[], Iterator[Row]]] = [
+                lambda: _first_pictures(browser),
+                lambda: _delays(browser),
+                lambda: _long_chain(browser),
+                lambda: _memory(browser, minutes),
+            ]
+            for part, measure in zip(PARTS, measures, strict=True):
+                if part in parts:
+                    yield from measure()
         finally:
             browser.close()
 
 
 def _first_pictures(browser: Browser) -> Iterator[Row]:
     """From the command to the robot on the screen; each time with a browser that runs, but has nothing in store."""
-    panels, pictures = [], []
+    paints, robots = [], []
     for _ in range(5):
-        start = time.perf_counter()
+        start = time.time()
         with program() as (_process, url):
-            page = opened(browser, url)
-            panels.append(time.perf_counter() - start)
-            while not shows_robot(page):
-                pass
-            pictures.append(time.perf_counter() - start)
+            page = opened(browser, url, FIRST_PICTURE)
+            page.wait_for_function("() => window.robotShown !== undefined")
+            robots.append(1e-3 * page.evaluate("() => window.robotShown") - start)
+            paints.append(1e-3 * page.evaluate(FIRST_PAINT) - start)
             page.context.close()
-    panel, picture = statistics.median(panels), statistics.median(pictures)
-    told = f"{picture:.1f} s ({min(pictures):.1f} to {max(pictures):.1f}; panel {panel:.1f} s)"
-    yield "view: from the command to the robot on the screen", told, "3 s", picture <= 3.0
+    for what, times in (("first paint", paints), ("robot on the screen", robots)):
+        middle = statistics.median(times)
+        told = f"{middle:.1f} s ({min(times):.1f} to {max(times):.1f})"
+        yield f"view: from the command to the {what}", told, "3 s", middle <= 3.0
 
 
 def _delays(browser: Browser) -> Iterator[Row]:
-    """From the key that moves a slider to the pose in the page, as the page's own clock has it."""
+    """From the key that moves a slider to the robot's pose, as the page's own clock has it."""
     with program() as (_process, url):
-        for drawing, words in ((True, ", drawn in software"), (False, ", drawing left out")):
-            page = opened(browser, url, drawing=drawing)
-            told, painted = _slider_delays(page)
+        for scripts, words in (((POSES,), ", drawn in software"), ((POSES, NO_DRAWING), ", drawing left out")):
+            page = opened(browser, url, *scripts)
+            posed, painted, told = _slider_delays(page)
             page.context.close()
-            yield _row(f"view: slider to the pose in the page{words}", told, 50.0)
+            yield _row(f"view: slider to the robot's pose{words}", posed, 50.0)
             yield _row(f"view: slider to the frame after it{words}", painted, None)
+            yield _row(f"view: slider to the pose in numbers{words}", told, None)
 
 
-def _slider_delays(page: Page) -> tuple[list[float], list[float]]:
+def _slider_delays(page: Page) -> tuple[list[float], list[float], list[float]]:
     time.sleep(3.0)  # the fading in of the first picture
     page.get_by_role("slider").first.focus()
-    delays = []
-    for k in range(MOVES + 5):
-        page.evaluate(WATCH)
-        page.keyboard.press("ArrowRight" if k % 10 < 5 else "ArrowLeft")
-        delays.append(page.evaluate("() => window.moved"))
-        time.sleep(0.1)
-    told, painted = zip(*delays[5:], strict=True)  # without the first, which are slower
-    return list(told), list(painted)
+    told = []
+    for _ in range(MOVES + 5):
+        page.evaluate(NUMBERS)
+        page.keyboard.press("ArrowRight")  # on and on: to poses where it was not before
+        told.append(page.evaluate("() => window.moved"))
+        time.sleep(0.2)
+    posed, painted = page.evaluate("() => [window.posed, window.painted]")
+    return posed[5:], painted[5:], told[5:]  # without the first, which are slower
 
 
 def _long_chain(browser: Browser) -> Iterator[Row]:
@@ -141,10 +125,10 @@ def _long_chain(browser: Browser) -> Iterator[Row]:
 
     viewer = Viewer(open_state(parse_robot(_chain(60))))
     try:
-        for drawing, words in ((True, "drawn in software"), (False, "drawing left out")):
-            shown = opened(browser, viewer.url, drawing=drawing)
-            while drawing and not shows_robot(shown, share=0.002):
-                pass
+        for scripts, words in (((), "drawn in software"), ((NO_DRAWING,), "drawing left out")):
+            shown = opened(browser, viewer.url, FIRST_PICTURE, *scripts)
+            if not scripts:
+                shown.wait_for_function("() => window.robotShown !== undefined")
             time.sleep(3.0)
             page = viewer.pages[-1]
             yield _row(f"view: 60 joints, event to sent to the browser, {words}", _server_times(page), 50.0)
@@ -212,7 +196,7 @@ def _memory(browser: Browser, minutes: float) -> Iterator[Row]:
         return
     rng = random.Random(0)
     with program() as (process, url):
-        page = opened(browser, url, drawing=False)
+        page = opened(browser, url, NO_DRAWING)
         click(page, rng, WARM_UP)
         before = _resident(process)
         count = click(page, rng, 60.0 * minutes)
@@ -248,7 +232,9 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=2.0, help="of clicking at random")
-    for what, figure, target, met in view(parser.parse_args().minutes):
+    parser.add_argument("--only", action="append", choices=PARTS, help="a part to be measured; may be repeated")
+    wish = parser.parse_args()
+    for what, figure, target, met in view(wish.minutes, wish.only or PARTS):
         words = {True: "met", False: "MISSED", None: ""}[met]
         print(f"{what}: {figure}; target {target or 'none'} {words}".rstrip(), flush=True)
     print(f"load: {' '.join(f'{load:.1f}' for load in os.getloadavg())}")

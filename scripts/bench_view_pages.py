@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import random
 import re
 import subprocess
@@ -16,11 +15,6 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
 
 OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-NO_DRAWING = """
-for (const call of ["clear", "drawArrays", "drawElements", "drawArraysInstanced", "drawElementsInstanced"])
-    WebGL2RenderingContext.prototype[call] = () => {};
-"""
-"""Leaves out what a graphics card would do, which without one takes most of a processor's time."""
 
 
 @contextlib.contextmanager
@@ -38,26 +32,14 @@ def program() -> Iterator[tuple[subprocess.Popen[str], str]]:
             process.terminate()
 
 
-def opened(browser: Browser, url: str, *, drawing: bool = True) -> Page:
-    """A page in a window of its own, once its panel is there."""
+def opened(browser: Browser, url: str, *scripts: str) -> Page:
+    """A page in a window of its own, once its panel is there; ``scripts`` run before those of the page."""
     page = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
-    if not drawing:
-        page.add_init_script(NO_DRAWING)
-    page.goto(url)
+    for script in scripts:
+        page.add_init_script(script)
+    page.goto(url, wait_until="commit")
     page.get_by_role("tab", name="Joints").wait_for()
     return page
-
-
-def shows_robot(page: Page, share: float = 0.01) -> bool:
-    """Whether a share of the picture is dark, as a robot is; the ground is light."""
-    from PIL import Image
-
-    canvas = page.locator("canvas").first.bounding_box()
-    if canvas is None:
-        return False
-    with Image.open(io.BytesIO(page.screenshot(clip=canvas))) as picture:
-        grey = picture.convert("L")
-        return sum(grey.histogram()[:128]) >= share * grey.width * grey.height
 
 
 def click(page: Page, rng: random.Random, seconds: float) -> int:
