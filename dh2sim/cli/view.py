@@ -10,11 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dh2sim.cli.robot_file import require_free
+
 if TYPE_CHECKING:
     from dh2sim.view.server import Viewer
     from dh2sim.view.state import ViewState
 
 DEFAULT_PORT = 8080
+NEVER = "never"
+"""When pages are shared over the open net."""
 
 
 def view(
@@ -27,10 +31,14 @@ def view(
         int, typer.Option(min=1, max=65535, metavar="N", help="Port, or the next that is free.")
     ] = DEFAULT_PORT,
     host: Annotated[str, typer.Option(help="Address to listen at. The default is this machine only.")] = "127.0.0.1",
+    share: Annotated[
+        str, typer.Option(metavar="never", help="Pages are never shared over the open net; viser's tunnel is off.")
+    ] = NEVER,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
     export: Annotated[
         Path | None, typer.Option(metavar="PAGE.html", help="Write a page that needs no server, and end.")
     ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Let --export write over a file that exists.")] = False,
     rollout: Annotated[int, typer.Option(help="Which rollout of the run is exported, from 0.")] = 0,
 ) -> None:
     """See a robot in the browser: move its joints, edit its table, read its poses.
@@ -45,8 +53,15 @@ def view(
       dh2sim view stanford --export stanford.html
     """
     gc.enable()
+    if share != NEVER:
+        raise typer.BadParameter(
+            "pages are never shared over the open net; 'never' is all there is", param_hint="--share"
+        )
+    if force and export is None:
+        raise typer.BadParameter("only with --export: nothing else is written", param_hint="--force")
     if rollout != 0 and (export is None or run is None):
         raise typer.BadParameter("only with a run and --export: the page lets one choose", param_hint="--rollout")
+    require_free(export, force=force)
     from dh2sim.robot.load import load_robot
     from dh2sim.view.opening import folder_of, open_state
 
@@ -59,11 +74,14 @@ def view(
 
 def _serve(state: ViewState, run: Path | None, *, host: str, port: int, browser: bool) -> None:
     """Serve pages until somebody ends it."""
-    from dh2sim.view.server import Viewer, free_port
+    from dh2sim.view.server import EVERY_ADDRESS, Viewer, free_port, is_private
 
     chosen = free_port(host, port)
     if chosen != port:
         print(f"dh2sim: port {port} is taken; the page is at {chosen}", file=sys.stderr)
+    if not is_private(host):
+        where = "any of its addresses" if host in EVERY_ADDRESS else host
+        print(f"dh2sim: anyone who can reach this machine at {where} can open the page", file=sys.stderr)
     viewer = Viewer(state, host=host, port=chosen, run=run)
     try:
         print(f"{state.spec.name}: {viewer.url}  (Ctrl-C ends it)", flush=True)

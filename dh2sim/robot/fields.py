@@ -29,8 +29,8 @@ class Context:
 
     parameters: Mapping[str, float]
     """Evaluated; NaN for a parameter that is wrong, which has been reported."""
-    directory: Path
-    """Where paths in the file start."""
+    directory: Path | None
+    """Where paths in the file start; None where it may name no files."""
 
 
 def name_problem(value: object, what: str = "a name") -> str | None:
@@ -143,6 +143,8 @@ def _ordered(limits: tuple[float, float]) -> tuple[float, float]:
 def _mesh_file(value: object, info: ValidationInfo) -> Path:
     text = _text(value)
     directory = _context(info).directory
+    if directory is None:  # nothing is looked for: an answer would tell what there is on this machine
+        _fail(f"found {shown(text)}; a robot file that was uploaded cannot name mesh files")
     path = directory / text
     if path.suffix.lower() not in MESH_SUFFIXES:
         _fail(f"{shown(text)} is no mesh file that can be read; allowed: {listed(MESH_SUFFIXES)}")

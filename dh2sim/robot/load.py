@@ -44,13 +44,16 @@ def load_robot(path_or_name: str | os.PathLike[str]) -> RobotSpec:
     return parse_robot(data, file=file, directory=path.parent)
 
 
-def parse_robot(text: str | bytes, *, file: str = "<string>", directory: Path | None = None) -> RobotSpec:
+def parse_robot(
+    text: str | bytes, *, file: str = "<string>", directory: Path | None = None, mesh_files: bool = True
+) -> RobotSpec:
     """Return the robot that the text of a robot file describes.
 
     Args:
         text: The file's content.
         file: Its name, for messages.
         directory: Where paths in it start; by default the current folder.
+        mesh_files: Whether it may name mesh files; if not, no path in it is followed.
 
     Raises:
         RobotFileError: The text is wrong; the error holds everything that is.
@@ -60,7 +63,8 @@ def parse_robot(text: str | bytes, *, file: str = "<string>", directory: Path | 
     decoded = decode(data, report)
     root = compose(decoded, report)
     parameters = evaluate_parameters(root, report)
-    context = Context(parameters=parameters, directory=directory or Path.cwd())
+    folder = directory or Path.cwd()
+    context = Context(parameters=parameters, directory=folder if mesh_files else None)
     entry = read_structure(root, context, report)
     check(root, parameters, report)
     if entry is None or report.problems:

@@ -21,6 +21,8 @@ LONGEST_CELL: Final = 200
 """Characters that may be typed into a cell."""
 GREATEST_REACH: Final = 1e6
 """m: larger robots cannot be drawn in single precision."""
+MOST_UPLOADED: Final = 200
+"""Joints, and configurations that have names, of a robot whose file was uploaded."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,7 +32,7 @@ class Source:
     file: str
     """Its name, for messages."""
     folder: Path | None
-    """Where paths in it start."""
+    """Where paths in it start; None where it has no folder: then it may name no files."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,6 +40,13 @@ class Wrong:
     """Why a text describes no robot: a message for each place, such as ``joints[2].alpha``."""
 
     messages: Mapping[str, str]
+    lines: tuple[str, ...] = ()
+    """All of them as the reader tells them, with lines and columns, where it is the reader who complains."""
+
+    @property
+    def told(self) -> str:
+        """All that is wrong, a line for each."""
+        return "\n".join(self.lines) or self.first
 
     @property
     def first(self) -> str:
@@ -45,12 +54,16 @@ class Wrong:
         return next((f"{path}: {message}" if path else message for path, message in self.messages.items()), "")
 
 
-def read(text: str, source: Source) -> RobotModel | Wrong:
+def read(text: str | bytes, source: Source) -> RobotModel | Wrong:
     """Return the robot that a text describes, or why it describes none that can be shown."""
     try:
-        model = build_model(parse_robot(text, file=source.file, directory=source.folder))
+        spec = parse_robot(text, file=source.file, directory=source.folder, mesh_files=source.folder is not None)
+        if source.folder is None and (long := _too_much(spec)):
+            return Wrong(messages={"": f"{source.file}: {long}"})
+        model = build_model(spec)
     except RobotFileError as error:
-        return Wrong(messages={problem.path: problem.message for problem in reversed(error.problems)})
+        messages = {problem.path: problem.message for problem in reversed(error.problems)}
+        return Wrong(messages=messages, lines=tuple(str(problem) for problem in error.problems))
     except Dh2simError as error:
         return Wrong(messages={"": str(error)})
     except (OverflowError, ZeroDivisionError, ValueError):
@@ -60,6 +73,14 @@ def read(text: str, source: Source) -> RobotModel | Wrong:
             messages={"": f"the robot would reach {model.reach:.3g} m; at most {GREATEST_REACH:g} m are shown"}
         )
     return model
+
+
+def _too_much(spec: RobotSpec) -> str:
+    """Return why a robot of somebody else is not even built: it would keep this machine busy for long."""
+    for what, count in {"joints": len(spec.rows), "configurations": len(spec.configurations)}.items():
+        if count > MOST_UPLOADED:
+            return f"the robot has {count} {what}; at most {MOST_UPLOADED} are shown of one that was uploaded"
+    return ""
 
 
 def editable_text(spec: RobotSpec, source: Source) -> str:

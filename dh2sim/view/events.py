@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal, TypeAlias
 
 from dh2sim.robot.spec import Convention
@@ -57,6 +58,10 @@ class Follow:
 
     q: tuple[float, ...]
     """rad and m."""
+    T_world_base_link: Matrix | None = None
+    """Where a recording has base_link; None where that stands still."""
+    leaps: bool = False
+    """Whether the way from where the joints were is left out: a recording begins, ends or is wound."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,6 +139,23 @@ class ReplaceText:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OpenText:
+    """Open another robot file, one that was uploaded or the one opened at first; its robot is at home."""
+
+    text: str | bytes = field(repr=False)
+    """The file's content."""
+    file: str
+    """Its name, for messages."""
+    folder: Path | None = None
+    """Where paths in it start; None of a file that was uploaded, which may name no files."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Undo:
+    """Take the last edit of the table back."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SelectRow:
     """Choose the row that is edited, and explained."""
 
@@ -174,11 +196,6 @@ class MoveTool:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DropGoal:
-    """Want the tool nowhere."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Compare:
     """Draw a second robot beside the first, or none."""
 
@@ -214,12 +231,13 @@ Event: TypeAlias = (
     | ConvertTable
     | SetUnits
     | ReplaceText
+    | OpenText
+    | Undo
     | SelectRow
     | Show
     | ShowAngles
     | ChooseFrame
     | MoveTool
-    | DropGoal
     | Compare
     | CompareReading
     | Tell

@@ -5,20 +5,26 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from dh2sim.kinematics.forward import forward_kinematics, frame_poses, joint_poses
-from dh2sim.kinematics.transforms import identity
+from dh2sim.kinematics.transforms import compose
+from dh2sim.model.meshes import MeshAsset
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.view.items import Vector
+from dh2sim.view.solids import mesh_triangles
+from dh2sim.view.stance import stance_of
 
 FIELD: Final = math.radians(45.0)
 """Angle that the camera sees from top to bottom, rad."""
 _TRIAD: Final = 0.13
 """Length of a frame's axes, as a share of the robot's size."""
+_NARROWEST: Final = 0.2
+"""Aspect of pictures that the robot still fits into."""
 _DIRECTION: Final = (0.62, -0.68, 0.42)
 """From the robot to the eye."""
 
@@ -43,35 +49,51 @@ def triad_length(model: RobotModel) -> float:
     return _TRIAD * size_of(model)
 
 
-def eye_of(model: RobotModel) -> Eye:
-    """Return where the whole robot at home is seen from, with room around it."""
+def eye_of(model: RobotModel, aspect: float = 1.0) -> Eye:
+    """Return where the whole robot at home is seen from, with room around it.
+
+    Args:
+        model: The robot.
+        aspect: Width of the picture over its height; in a narrow one the eye stands farther away.
+    """
     corners = np.vstack([_corners(model), _ends(model)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     centre = 0.5 * (low + high)
     radius = max(0.55 * float(np.linalg.norm(high - low)), 0.5 * size_of(model))
     way = np.array(_DIRECTION) / np.linalg.norm(_DIRECTION)
-    position = centre + radius / math.sin(0.5 * FIELD) * way
+    half = math.atan(math.tan(0.5 * FIELD) * min(max(aspect, _NARROWEST), 1.0))
+    position = centre + radius / math.sin(half) * way
     return Eye(position=_vector(position), look_at=_vector(centre))
 
 
 def _corners(model: RobotModel) -> Array:
     """Return the origins of base_link and of all frames at home, m, shape (count, 3)."""
-    frames = frame_poses(model.chain, model.home)[:, :3, 3]
-    tool = forward_kinematics(model.chain, model.home)[:3, 3]
-    return np.vstack([np.zeros(3), frames, tool])
+    stance = stance_of(model, model.home)
+    return np.vstack([np.zeros(3), stance.frames[:, :3, 3], stance.tool0[:3, 3]])
 
 
 def _ends(model: RobotModel) -> Array:
-    """Return the ends of all links' shapes at home, m, shape (count, 3)."""
-    poses = [identity(), *joint_poses(model.chain, model.home)]
-    return np.array(
-        [
-            T[:3, :3] @ end + T[:3, 3]
-            for link, T in zip(model.all_links, poses, strict=True)
-            for shape in link.shapes
-            for end in shape.ends
-        ]
-    ).reshape(-1, 3)
+    """Return points around what shows the links at home, m, shape (count, 3)."""
+    stance = stance_of(model, model.home)
+    points = [np.empty((0, 3))]
+    for link, T_base_link, T_base_dh in zip(model.all_links, stance.links, stance.frames, strict=True):
+        if link.mesh is None:
+            points += [_placed(T_base_link, shape.ends) for shape in link.shapes]
+        else:
+            points.append(_placed(compose(T_base_dh, link.mesh.T_dh_mesh), _box(link.mesh)))
+    return np.vstack(points)
+
+
+@lru_cache(maxsize=64)
+def _box(mesh: MeshAsset) -> Array:
+    """Return the corners of the box around a mesh in its own frame, m, shape (8, 3)."""
+    vertices = np.array(mesh_triangles(mesh)[0])
+    return np.array(list(product(*np.stack([vertices.min(axis=0), vertices.max(axis=0)], axis=1))))
+
+
+def _placed(T: Array, points: ArrayLike) -> Array:
+    """Return points, shape (count, 3), that are given in a frame."""
+    return np.asarray(points) @ T[:3, :3].T + T[:3, 3]
 
 
 def _vector(values: Array) -> Vector:

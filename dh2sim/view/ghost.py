@@ -47,14 +47,17 @@ class Gap:
 
     def told(self, what: str) -> str:
         """Return a sentence: ``what`` puts tool0 so far off."""
-        if self.distance <= SAME_PLACE and self.angle <= SAME_PLACE:
-            return f"{what} puts tool0 at the same pose."
+        return f"{what} puts tool0 {self.text}."
+
+    @property
+    def text(self) -> str:
+        """How far it is off, such as ``0.1 m away and turned by 3°``."""
         parts = []
         if self.distance > SAME_PLACE:
             parts.append(f"{_digits(self.distance)} m away")
         if self.angle > SAME_PLACE:
             parts.append(f"turned by {_digits(math.degrees(self.angle))}°")
-        return f"{what} puts tool0 {' and '.join(parts)}."
+        return " and ".join(parts) or "at the same pose"
 
 
 def ghost_scene(model: RobotModel, q: ArrayLike, color: Color = PALE, opacity: float = OPACITY) -> Scene:

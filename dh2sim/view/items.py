@@ -49,10 +49,32 @@ class Triad(Placed):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Triads(Placed):
+    """The axes of many frames, as one item: a browser draws them much faster so."""
+
+    positions: tuple[Vector, ...]
+    """m."""
+    orientations: tuple[Quaternion, ...]
+    length: float
+    """m."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Path(Placed):
     """A line through points; an arc, a trace, a dashed axis."""
 
     points: tuple[Vector, ...] = field(repr=False)
+    """m."""
+    color: Color
+    width: float = 2.0
+    """Pixels."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lines(Placed):
+    """Lines of their own, each from one point to another."""
+
+    segments: tuple[tuple[Vector, Vector], ...] = field(repr=False)
     """m."""
     color: Color
     width: float = 2.0
@@ -78,6 +100,6 @@ class Label(Placed):
     color: Color = (0.1, 0.1, 0.1)
 
 
-Item: TypeAlias = Placed | Solid | Triad | Path | Arrow | Label
+Item: TypeAlias = Placed | Solid | Triad | Triads | Path | Lines | Arrow | Label
 Scene: TypeAlias = Mapping[str, Item]
 """Items by name."""

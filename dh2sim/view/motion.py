@@ -11,7 +11,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.view.physics import Drive, Physics
 from dh2sim.view.physics_pace import RealTime
 from dh2sim.view.replay import Replay
-from dh2sim.view.state import Mode, Pull, ViewState
+from dh2sim.view.state import Matrix, Mode, Pull, ViewState
 
 PICTURES: Final = 30.0
 """A second, at most."""
@@ -37,6 +37,14 @@ class Motion(Protocol):
 
         The state says whether time goes on, how many single steps were asked for, and what is pulled at.
         """
+
+    @property
+    def T_world_base_link(self) -> Matrix | None:
+        """Where a recording had base_link at the last tick; None where that stands still."""
+
+    @property
+    def leaps(self) -> bool:
+        """Whether the last tick left out the way there: a recording began, ended or was wound."""
 
     @property
     def share(self) -> float:
@@ -67,6 +75,11 @@ class Simulation:
         self._steps = 0
         self._pull: Pull | None = None
 
+    def act(self, *, gravity: bool, drive: Drive) -> None:
+        """Change what acts on the robot from now on; it goes on as fast as it is."""
+        self.physics.set_gravity(gravity)
+        self.physics.set_drive(drive)
+
     def pace(self, speed: float) -> None:
         """Take no notice: simulated time goes with the clock."""
 
@@ -95,6 +108,16 @@ class Simulation:
             self.physics.release()
         else:
             self.physics.drag(pull.link, pull.point_in_link, pull.target)
+
+    @property
+    def T_world_base_link(self) -> Matrix | None:
+        """None: base_link stands still."""
+        return None
+
+    @property
+    def leaps(self) -> bool:
+        """No."""
+        return False
 
     @property
     def share(self) -> float:
@@ -138,8 +161,11 @@ class Recording:
         """Of the instant that is shown, s."""
         self.speed = 1.0
         """Seconds of the recording in a second."""
+        self.leaps = True
+        """Whether the last tick left out the way there."""
         self._last: float | None = None
         self._steps = 0
+        self._wound = True
 
     def pace(self, speed: float) -> None:
         """Say how many seconds of the recording are shown in a second."""
@@ -148,14 +174,17 @@ class Recording:
     def seek(self, share: float) -> None:
         """Show the instant at a share of the recording, from 0 to 1."""
         self.time = min(max(share, 0.0), 1.0) * self.duration
+        self._wound = True
 
     def tick(self, now: float, state: ViewState) -> tuple[float, ...]:
         """Return where the joints were at the recording's time, rad and m; moves that on if it plays."""
+        before = self.time
         if state.paused:
             for _ in range(state.steps - self._steps):
                 self.time = self._next_instant()
         elif self._last is not None and self.duration > 0.0:
             self.time = (self.time + (now - self._last) * self.speed) % self.duration
+        self.leaps, self._wound = self._wound or self.time < before, False
         self._last, self._steps = now, state.steps
         return tuple(self._replay.q_at(self._rollout, self.time).tolist())
 
@@ -164,6 +193,12 @@ class Recording:
         times = self._replay.times(self._rollout)
         shown = int(np.abs(times - self.time).argmin())
         return float(times[(shown + 1) % len(times)])
+
+    @property
+    def T_world_base_link(self) -> Matrix | None:
+        """Where base_link is; None in a run in which it does not float."""
+        T = self._replay.base_at(self._rollout, self.time)
+        return None if T is None else tuple(tuple(row) for row in T.tolist())
 
     @property
     def share(self) -> float:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from dh2sim.errors import Dh2simError
+from dh2sim.errors import Dh2simError, UnknownRobotError
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.catalog import builtin_path
+from dh2sim.robot.catalog import builtin_path, builtin_robots
 from dh2sim.robot.load import load_robot
 from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.words import did_you_mean, shown
 from dh2sim.view.draft import Source, Wrong, draft_of, editable_text, read
 from dh2sim.view.state import Ghost, ViewState, configurations
 
@@ -26,12 +27,13 @@ def open_state(spec: RobotSpec, folder: Path | None = None) -> ViewState:
 
     Args:
         spec: The robot.
-        folder: Where paths in its file start.
+        folder: Where paths in its file start; by default the current folder.
 
     Raises:
         Dh2simError: The robot cannot be shown.
     """
-    source = Source(file="robot.yaml" if spec.source_file is None else spec.source_file.path, folder=folder)
+    file = "robot.yaml" if spec.source_file is None else spec.source_file.path
+    source = Source(file=file, folder=folder or Path.cwd())
     text = editable_text(spec, source)
     model = read(text, source)
     if isinstance(model, Wrong):
@@ -45,7 +47,10 @@ def builtin_ghost(name: str) -> Ghost:
     Raises:
         Dh2simError: There is no such robot, or its file is damaged.
     """
-    return Ghost(model=build_model(load_robot(builtin_path(name) or name)), label=name)
+    path = builtin_path(name)
+    if path is None:  # a page may ask for any name: none of them becomes a path
+        raise UnknownRobotError(f"there is no robot named {shown(name)}.{did_you_mean(name, builtin_robots())}")
+    return Ghost(model=build_model(load_robot(path)), label=name)
 
 
 def state_of(model: RobotModel, text: str, source: Source) -> ViewState:
@@ -58,3 +63,8 @@ def state_of(model: RobotModel, text: str, source: Source) -> ViewState:
         draft=draft_of(text, model.spec),
         q=configurations(model)["home"],
     )
+
+
+def is_same_file(state: ViewState, other: ViewState) -> bool:
+    """Whether two states show the same robot file, edited or not."""
+    return (state.file, state.folder) == (other.file, other.folder)

@@ -4,29 +4,25 @@ from __future__ import annotations
 
 import queue
 import threading
-import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
 from dh2sim.errors import Dh2simError
-from dh2sim.export.render import Format
-from dh2sim.view.downloads import model_file
-from dh2sim.view.events import Compare, Event, Follow, ReplaceText, SetMode, Tell
+from dh2sim.view.camera import Watch
+from dh2sim.view.events import Event, Tell
 from dh2sim.view.link_grabs import LinkGrabs
-from dh2sim.view.opening import builtin_ghost
+from dh2sim.view.mover import Mover
 from dh2sim.view.painter import Painter
-from dh2sim.view.panel.files import FileActions
 from dh2sim.view.panel.panel import Panel
 from dh2sim.view.reduce import reduce
+from dh2sim.view.robot_files import RobotFiles
 from dh2sim.view.scene import scene_of
-from dh2sim.view.state import Mode, ViewState
+from dh2sim.view.state import ViewState
 from dh2sim.view.tool_handle import ToolHandle
 
 if TYPE_CHECKING:
     import viser
 
-    from dh2sim.view.motion import Motion
-    from dh2sim.view.physics import Drive
     from dh2sim.view.replay import Replay
 
 GONE = ("on a closed connection", "Event loop is closed")
@@ -54,13 +50,13 @@ class Page:
         self.client = client
         self.state = state
         """Of the page's own thread; others may read it."""
-        self.replay: Replay | None = None
-        self._open_replay = replay
-        self._opened = state.text
-        self._motion: Motion | None = None
+        self.mover = Mover(lambda: self.state, self.apply, replay)
+        self._files = RobotFiles(lambda: self.state, self.apply, self._hand_out, self._exchanged)
         self._queue: queue.SimpleQueue[tuple[Task, Callable[[], None] | None] | None] = queue.SimpleQueue()
+        self._closed = threading.Event()
         self._painter = Painter(client.scene)
         self._handle = ToolHandle(client.scene, self.send, lambda: self.state, self.apply)
+        self._watch = Watch(client.camera, lambda: self.state.model, self.send)
         self._grabs = LinkGrabs(self._painter, self.send, lambda: self.state)
         self._thread = threading.Thread(target=self._run, name=f"page-{client.client_id}", daemon=True)
 
@@ -69,8 +65,14 @@ class Page:
         self._thread.start()
 
     def close(self) -> None:
-        """End, once what is queued is done."""
+        """End, once what is being done is done."""
+        self._closed.set()
         self._queue.put(None)
+
+    @property
+    def works(self) -> bool:
+        """Whether it has not ended yet."""
+        return self._thread.is_alive()
 
     def join(self, patience: float) -> None:
         """Wait until it has ended, for so many seconds at most."""
@@ -91,38 +93,28 @@ class Page:
 
     def _work(self) -> None:
         """Draw; then wait for events, and draw what came of them."""
-        with self.client.atomic():
-            self._painter.draw(scene_of(self.state))
-        self._do(self._open_run, None)
-        files = FileActions(save=self.save, export=self.export, back=self.back)
-        self._panel = Panel(self.client, self.send, self.state, files, self, self.compare)
+        self._draw()
+        self._do(self.mover.open_run, None)
+        self._panel = Panel(self.client, self.send, self.state, self._files, self.mover)
         self._show()
         while self._take():
             self._show()
 
-    def _open_run(self) -> None:
-        self.replay = self._open_replay()
-
     def _take(self) -> bool:
         """Work through all that is queued, or what moves the joints; false where the page is closed."""
         try:
-            task = self._queue.get(timeout=None if self._motion is None else 1.0 / self._motion.pictures)
+            task = self._queue.get(timeout=self.mover.patience)
         except queue.Empty:
-            self._tick()
+            self.mover.tick()
             return True
-        while task is not None:
+        while task is not None and not self._closed.is_set():
             self._do(*task)
             try:
                 task = self._queue.get_nowait()
             except queue.Empty:
-                self._tick()
+                self.mover.tick()
                 return True
         return False
-
-    def _tick(self) -> None:
-        """Let what moves the joints move them."""
-        if self._motion is not None:
-            self.apply(Follow(q=self._motion.tick(time.monotonic(), self.state)))
 
     def _do(self, task: Task, seen: Callable[[], None] | None) -> None:
         if seen is not None:
@@ -142,72 +134,25 @@ class Page:
         self.state = reduce(self.state, event)
 
     def _show(self) -> None:
-        with self.client.atomic():
-            self._painter.draw(scene_of(self.state))
+        self._draw()
         self._handle.show(self.state)
         self._grabs.show(self.state)
         self._panel.show(self.state)
         self.client.flush()
-        if self._queue.empty():
+        if self._queue.empty() and not self._closed.is_set():
             self._panel.settle(self.state)
 
-    def save(self) -> None:
-        """Hand out the robot file as it is edited."""
-        name = f"{self.state.spec.name}.yaml"
-        self.client.send_file_download(name, self.state.text.encode(), save_immediately=True)
+    def _draw(self) -> None:
+        """Send the robot, before all that takes time to be told of it."""
+        with self.client.atomic():
+            self._painter.draw(scene_of(self.state))
+        self.client.flush()
 
-    def export(self, wanted: Format) -> None:
-        """Hand out a model, compared with the table before."""
-        made = model_file(self.state.model, wanted)
-        self.client.send_file_download(made.name, made.data, save_immediately=True)
-        self.apply(Tell(notice=f"{made.name}: {made.summary}."))
+    def _hand_out(self, name: str, content: bytes) -> None:
+        """Make the browser save a file."""
+        self.client.send_file_download(name, content, save_immediately=True)
 
-    def back(self) -> None:
-        """Return to the robot file that was opened."""
-        self.apply(ReplaceText(text=self._opened))
-
-    def compare(self, robot: str) -> None:
-        """Draw a robot that comes with dh2sim beside the one that is shown."""
-        self.apply(Compare(ghost=builtin_ghost(robot)))
-
-    @property
-    def motion_told(self) -> str:
-        """What there is to tell of what moves the joints."""
-        return "" if self._motion is None else self._motion.told
-
-    @property
-    def motion_share(self) -> float:
-        """Which share of the recording is behind, from 0 to 1."""
-        return 0.0 if self._motion is None else self._motion.share
-
-    def be_still(self) -> None:
-        """Give the joints back to the user."""
-        self._motion = None
-        self.apply(SetMode(mode=Mode.STILL))
-
-    def simulate(self, *, gravity: bool, drive: Drive) -> None:
-        """Begin a simulation where the joints are."""
-        from dh2sim.view import motion
-
-        self.be_still()
-        self._motion = motion.Simulation(self.state.model, self.state.q, gravity=gravity, drive=drive)
-        self.apply(SetMode(mode=Mode.PHYSICS))
-
-    def play(self, rollout: int) -> None:
-        """Play a rollout from its beginning."""
-        from dh2sim.view import motion
-
-        self.be_still()
-        if self.replay is not None:
-            self._motion = motion.Recording(self.replay, rollout)
-            self.apply(SetMode(mode=Mode.REPLAY))
-
-    def pace(self, speed: float) -> None:
-        """Say how fast the recording is played."""
-        if self._motion is not None:
-            self._motion.pace(speed)
-
-    def seek(self, share: float) -> None:
-        """Show the instant at a share of the recording, from 0 to 1."""
-        if self._motion is not None:
-            self._motion.seek(share)
+    def _exchanged(self) -> None:
+        """Another robot is shown: whole, and moved by nobody but the user."""
+        self.mover.forget()
+        self._watch.look()

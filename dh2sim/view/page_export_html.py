@@ -6,11 +6,9 @@ is played back by the same code that draws for a server.
 
 from __future__ import annotations
 
-import contextlib
 import html
-import io
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -18,6 +16,7 @@ import numpy as np
 from dh2sim.view.items import Scene
 from dh2sim.view.page_export_extent import Extent
 from dh2sim.view.painter import Painter
+from dh2sim.view.quiet_server import server_for_nobody
 
 if TYPE_CHECKING:
     import viser
@@ -42,7 +41,7 @@ def page_html(moments: Sequence[tuple[float, Scene]], *, title: str, extent: Ext
         title: Of the page.
         extent: What the camera looks at first.
     """
-    with _server() as server:
+    with server_for_nobody() as server:
         _look_at(server, extent)
         _add_ground(server, extent)
         painter = Painter(server.scene)
@@ -57,20 +56,6 @@ def page_html(moments: Sequence[tuple[float, Scene]], *, title: str, extent: Ext
             recording.insert_sleep(_LAST)
         page = recording.as_html()
     return page.replace(_TITLE, f"<title>{html.escape(title)}</title>", 1)
-
-
-@contextlib.contextmanager
-def _server() -> Iterator[viser.ViserServer]:
-    """Give a server that nobody connects to: viser records only what a server sends."""
-    import viser
-
-    with contextlib.redirect_stdout(io.StringIO()):  # it tells its address, whether it is asked to or not
-        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
-        yield server
-    finally:
-        with contextlib.redirect_stdout(io.StringIO()):
-            server.stop()
 
 
 def _look_at(server: viser.ViserServer, extent: Extent) -> None:

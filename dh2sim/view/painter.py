@@ -2,11 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dh2sim.view.items import Arrow, Color, Item, Label, Path, Placed, Scene, Solid, Triad
+from dh2sim.typing import Array
+from dh2sim.view.batches import batched
+from dh2sim.view.items import (
+    Arrow,
+    Color,
+    Item,
+    Label,
+    Lines,
+    Path,
+    Placed,
+    Scene,
+    Solid,
+    Triad,
+    Triads,
+    Vector,
+)
 
 if TYPE_CHECKING:
     import viser
@@ -33,6 +50,7 @@ class Painter:
         Returns:
             How many items were added, changed or removed.
         """
+        scene = batched(scene)
         gone = [name for name in self._drawn if name not in scene]
         for name in sorted(gone, reverse=True):  # what is below a name comes before it
             self._handles.pop(name).remove()
@@ -51,7 +69,13 @@ class Painter:
         old = self._drawn.get(name)
         if old is not None and _look(old) == _look(item):
             handle = self._handles[name]
-            handle.position, handle.wxyz = item.position, item.orientation
+            # what stays is not even mentioned: viser takes a while to find out that nothing is to be sent
+            if item.position != old.position:
+                handle.position = item.position
+            if item.orientation != old.orientation:
+                handle.wxyz = item.orientation
+            if isinstance(item, Triads):
+                handle.batched_positions, handle.batched_wxyzs = _arrays(item)
         else:
             self._handles[name] = self._added(name, item)
 
@@ -77,11 +101,20 @@ class Painter:
                     origin_color=(90, 90, 95),
                     **pose,
                 )
-            case Path():
-                points = np.array(item.points, dtype=np.float32)
+            case Triads():
+                positions, orientations = _arrays(item)
+                return self._scene.add_batched_axes(
+                    name,
+                    batched_positions=positions,
+                    batched_wxyzs=orientations,
+                    axes_length=item.length,
+                    axes_radius=_SHAFT * item.length,
+                    **pose,
+                )
+            case Path() | Lines():
                 return self._scene.add_line_segments(
                     name,
-                    points=np.stack([points[:-1], points[1:]], axis=1),
+                    points=np.array(_segments(item), dtype=np.float32).reshape(-1, 2, 3),
                     colors=_bytes(item.color),
                     thickness=item.width,
                     thickness_units="screen",
@@ -105,8 +138,19 @@ class Painter:
 
 def _look(item: Item) -> tuple[object, ...]:
     """Return all of an item but where it stands."""
+    if isinstance(item, Triads):
+        return Triads, item.length, len(item.positions)
     names = [name for name in type(item).__dataclass_fields__ if name not in ("position", "orientation")]
     return (type(item), *(getattr(item, name) for name in names))
+
+
+def _arrays(triads: Triads) -> tuple[Array, Array]:
+    """Return positions and orientations as viser takes them."""
+    return np.array(triads.positions, dtype=np.float32), np.array(triads.orientations, dtype=np.float32)
+
+
+def _segments(item: Path | Lines) -> Sequence[tuple[Vector, Vector]]:
+    return item.segments if isinstance(item, Lines) else tuple(pairwise(item.points))
 
 
 def _distance(arrow: Arrow) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,8 +12,12 @@ from dh2sim.kinematics.comparison import pose_errors
 from dh2sim.kinematics.frames import frame_pose
 from dh2sim.kinematics.jacobian import geometric_jacobian
 from dh2sim.kinematics.transforms import quaternion_from_rotation, rpy_from_rotation
+from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.view.state import ViewState
+
+_KEPT = 8
+"""Several parts of a page tell of the same state."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,9 +43,14 @@ class Readings:
 
 def readings_of(state: ViewState) -> Readings:
     """Return what is told of a state."""
-    chain = state.model.chain
-    T = np.asarray(frame_pose(chain, state.frame, state.q))
-    values = singular_values(geometric_jacobian(chain, state.q))
+    return _readings(state.model, state.frame, state.q)
+
+
+@lru_cache(maxsize=_KEPT)
+def _readings(model: RobotModel, frame: str, q: tuple[float, ...]) -> Readings:
+    chain = model.chain
+    T = np.asarray(frame_pose(chain, frame, q))
+    values = singular_values(geometric_jacobian(chain, q))
     return Readings(
         T_base_frame=T,
         xyz=tuple(T[:3, 3].tolist()),

@@ -12,9 +12,11 @@ from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.words import shown as shown_word
 from dh2sim.view import events
-from dh2sim.view.state import Goal, Mode, Pull, ViewState, configurations, travel, within
+from dh2sim.view.state import IDENTITY, Goal, Matrix, Mode, Part, Pull, ViewState, configurations, travel, within
 from dh2sim.view.table_edits import reading_of, replaced, table_changed
 from dh2sim.view.trace import traced
+from dh2sim.view.undo import remembered, undone
+from dh2sim.view.uploads import opened
 
 TURN_STEP = math.radians(3.0)
 """rad: of a nudge."""
@@ -29,7 +31,9 @@ def reduce(state: ViewState, event: events.Event) -> ViewState:
         state: What the page shows.
         event: What happens. Numbers may be anything, rows and joints may not exist.
     """
-    return traced(state, _reduced(state, event))
+    after = remembered(state, event, _reduced(state, event))
+    leaps = isinstance(event, events.Follow) and event.leaps
+    return traced(after, replace(after, trace=())) if leaps else traced(state, after)
 
 
 def _reduced(state: ViewState, event: events.Event) -> ViewState:
@@ -38,8 +42,13 @@ def _reduced(state: ViewState, event: events.Event) -> ViewState:
             return table_changed(state, event)
         case events.ReplaceText(text=text):
             return replaced(state, text)
+        case events.Undo():
+            return undone(state)
+        case events.OpenText():
+            return opened(state, event)
         case events.Show(part=part, on=on):
-            return replace(state, shown=state.shown | {part} if on else state.shown - {part})
+            goal = None if part is Part.HANDLE else state.goal  # a handle appears at tool0
+            return replace(state, shown=state.shown | {part} if on else state.shown - {part}, goal=goal)
         case events.ShowAngles(unit=unit):
             return replace(state, angle=unit)
         case events.SelectRow(row=row):
@@ -56,7 +65,8 @@ def _reduced(state: ViewState, event: events.Event) -> ViewState:
             # a simulation may have left the limits by a hair
             q = within(state.model, state.q)
             target = q if mode is Mode.PHYSICS else None
-            return replace(state, mode=mode, q=q, target=target, goal=None, paused=False, steps=0, pull=None)
+            begun = replace(state, mode=mode, q=q, target=target, goal=None, paused=False, steps=0, pull=None)
+            return replace(begun, T_world_base_link=IDENTITY)
         case events.Pause(on=on):
             return state if state.mode is Mode.STILL else replace(state, paused=on)
         case events.Step():
@@ -77,7 +87,6 @@ _Motion = (
     | events.RandomConfiguration
     | events.Follow
     | events.MoveTool
-    | events.DropGoal
 )
 
 
@@ -98,16 +107,14 @@ def _moved(state: ViewState, event: _Motion) -> ViewState:
         case events.RandomConfiguration(seed=seed):
             (drawn,) = random_configurations(*sampling_limits(model), 1, abs(seed)).tolist()
             return _at(state, tuple(drawn))
-        case events.Follow(q=seen):
+        case events.Follow(q=seen, T_world_base_link=base):
             usable = state.mode is not Mode.STILL and _fits(model, seen)
-            return replace(state, q=tuple(seen)) if usable else state
+            return replace(state, q=tuple(seen), T_world_base_link=_base(state, base)) if usable else state
         case events.MoveTool(T_base_link_tool0=T, q=found, reached=reached):
             if state.mode is not Mode.STILL:
                 return state
             moved = state if found is None else _at(state, found, keep_goal=True)
             return replace(moved, goal=Goal(T_base_link_tool0=T, reached=reached))
-        case events.DropGoal():
-            return replace(state, goal=None)
         case _:
             assert_never(event)
 
@@ -130,6 +137,13 @@ def _can_be_pulled(state: ViewState, pull: Pull) -> bool:
 
 def _fits(model: RobotModel, q: tuple[float, ...]) -> bool:
     return len(q) == model.chain.n and all(math.isfinite(value) for value in q)
+
+
+def _base(state: ViewState, T: Matrix | None) -> Matrix:
+    """Return where base_link is, given where a recording has it; nobody else can move it."""
+    if T is None or state.mode is not Mode.REPLAY:
+        return IDENTITY
+    return T if all(math.isfinite(value) for row in T for value in row) else state.T_world_base_link
 
 
 def _exchanged(q: tuple[float, ...], joint: int, value: float) -> tuple[float, ...]:

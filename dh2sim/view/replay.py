@@ -31,10 +31,8 @@ class _Recorded:
     motion: Motion
     q: Array
     """In the order of the table, shape (N, n)."""
-    base: Array
-    """Poses of base_link in the world, shape (N, 4, 4)."""
-    tool: Array
-    """Of tool0 in the world, m, shape (N, 3)."""
+    base: Array | None
+    """Poses of base_link in the world, shape (N, 4, 4); None where it stands still."""
     stopped: str
 
 
@@ -77,14 +75,10 @@ class Replay:
         recorded = self._recorded(rollout)
         return np.asarray(recorded.q[recorded.motion.nearest(t)])
 
-    def base_at(self, rollout: int, t: float) -> Array:
-        """Return base_link's pose in the world nearest to ``t``, s, shape (4, 4): the identity unless it floats."""
+    def base_at(self, rollout: int, t: float) -> Array | None:
+        """Return base_link's pose in the world nearest to ``t``, s, shape (4, 4); None where it does not float."""
         recorded = self._recorded(rollout)
-        return np.asarray(recorded.base[recorded.motion.nearest(t)])
-
-    def tool_path(self, rollout: int) -> Array:
-        """Return where tool0 went, in the world, m, shape (N, 3): a point for each of ``times``."""
-        return self._recorded(rollout).tool
+        return None if recorded.base is None else np.asarray(recorded.base[recorded.motion.nearest(t)])
 
     def stopped(self, rollout: int) -> str:
         """Return why a rollout stopped early, a sentence; empty if it did not."""
@@ -99,10 +93,8 @@ class Replay:
         motion = motion_of_run(data)
         names = data.names("joint")
         q = data.values("qpos")[:, [names.index(name) for name in self.joints]]
-        base, tool = _poses(motion)
-        return _Recorded(
-            motion=motion, q=read_only(q), base=read_only(base), tool=read_only(tool), stopped=_why(data)
-        )
+        base = _base_poses(motion) if motion.floats else None
+        return _Recorded(motion=motion, q=read_only(q), base=base, stopped=_why(data))
 
 
 def open_replay(path: Path, model: RobotModel | None) -> Replay:
@@ -138,20 +130,18 @@ def open_replay(path: Path, model: RobotModel | None) -> Replay:
     return Replay(path, joints=joints, rollouts=rollouts, note=note)
 
 
-def _poses(motion: Motion) -> tuple[Array, Array]:
-    """Return base_link's poses, shape (N, 4, 4), and tool0's positions, shape (N, 3), by the run's own model."""
+def _base_poses(motion: Motion) -> Array:
+    """Return base_link's poses in the world by the run's own model, shape (N, 4, 4)."""
     import mujoco
 
     data = mujoco.MjData(motion.model)
-    base = np.tile(identity(), (len(motion.qpos), 1, 1))
-    tool = np.empty((len(motion.qpos), 3))
-    link, site = motion.model.body("base_link").id, motion.model.site("tool0").id
-    for k in range(len(tool)):
-        data.qpos[:] = motion.qpos[k]
+    poses = np.tile(identity(), (len(motion.qpos), 1, 1))
+    link = motion.model.body("base_link").id
+    for pose, qpos in zip(poses, motion.qpos, strict=True):
+        data.qpos[:] = qpos
         mujoco.mj_kinematics(motion.model, data)
-        base[k, :3, :3], base[k, :3, 3] = data.xmat[link].reshape(3, 3), data.xpos[link]
-        tool[k] = data.site_xpos[site]
-    return base, tool
+        pose[:3, :3], pose[:3, 3] = data.xmat[link].reshape(3, 3), data.xpos[link]
+    return read_only(poses)
 
 
 def _why(rollout: RolloutData) -> str:

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
-from dh2sim.kinematics.forward import forward_kinematics, frame_poses
 from dh2sim.typing import Array
 from dh2sim.view.annotations import row_annotations
 from dh2sim.view.extent import size_of, triad_length
 from dh2sim.view.ghost import ghost_configuration, ghost_scene
-from dh2sim.view.items import Color, Item, Label, Path, Scene, Solid, Triad, Vector
+from dh2sim.view.items import Color, Item, Label, Lines, Path, Placed, Scene, Solid, Triad, Vector
 from dh2sim.view.pull import pull_arrow
 from dh2sim.view.solids import orientation_of, position_of, robot_solids
+from dh2sim.view.stance import stance_of
 from dh2sim.view.state import Part, ViewState
+from dh2sim.view.unreached import line_to_unreached
 
 ROBOT: Final = "/robot"
 FRAMES: Final = "/frames"
 NAMES: Final = "/names"
+GHOST: Final = "/ghost"
 PULL: Final = "/pull"
+UNREACHED: Final = "/unreached"
+IN_BASE_LINK: Final = (ROBOT, FRAMES, NAMES, "/row", GHOST)
+"""All that stands in base_link is below these; the rest, such as the trace and the grid, stands in the world."""
 _TRACE_COLOR: Final[Color] = (0.10, 0.45, 0.85)
 _GRID_COLOR: Final[Color] = (0.82, 0.84, 0.87)
 _AXIS_COLOR: Final[Color] = (0.62, 0.65, 0.70)
@@ -38,7 +44,8 @@ _ABOVE: Final = 0.45
 def scene_of(state: ViewState) -> Scene:
     """Return everything that is drawn, by name.
 
-    The pose of ``/robot/link_i`` is that of link i in base_link, of ``/frames/dh_i`` that of DH frame i.
+    The pose of ``/robot/link_i`` is that of link i in base_link, of ``/frames/dh_i`` that of DH frame i. What stands
+    in base_link is below ``IN_BASE_LINK``, which have the pose of base_link in the world.
     """
     return dict(_items(state))
 
@@ -46,8 +53,10 @@ def scene_of(state: ViewState) -> Scene:
 def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
     shapes = Part.SHAPES in state.shown
     explained = Part.ANNOTATIONS in state.shown
+    base = _base_link(state)
+    yield from ((root, base) for root in IN_BASE_LINK)
     solids = robot_solids(state.model, state.q, ROBOT, opacity=_SEEN_THROUGH if explained else None)
-    yield from ((name, item) for name, item in solids.items() if shapes or not isinstance(item, Solid))
+    yield from _without(ROBOT, {name: item for name, item in solids.items() if shapes or not isinstance(item, Solid)})
     if Part.FRAMES in state.shown:
         yield from _frames(state)
     if explained:
@@ -56,13 +65,27 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
         yield from row.items()
     if Part.GHOST in state.shown and state.ghost is not None:
         stands = ghost_configuration(state.ghost.model, state.model, state.q)
-        yield from ghost_scene(state.ghost.model, stands.q).items()
+        yield from _without(GHOST, ghost_scene(state.ghost.model, stands.q))
     if state.pull is not None:
         yield PULL, pull_arrow(state.model, state.q, state.pull)
+    if (line := line_to_unreached(state)) is not None:
+        yield UNREACHED, line
     if Part.TRACE in state.shown and len(state.trace) > 1:
         yield "/trace", Path(points=state.trace, color=_TRACE_COLOR, width=3.0)
     if Part.GRID in state.shown:
-        yield from _grid(size_of(state.model))
+        yield from _grid(size_of(state.model)).items()
+
+
+def _base_link(state: ViewState) -> Placed:
+    """Return where base_link is in the world."""
+    if not state.floats:
+        return Placed()
+    T = np.array(state.T_world_base_link)
+    return Placed(position=position_of(T), orientation=orientation_of(T))
+
+
+def _without(root: str, scene: Scene) -> Iterator[tuple[str, Item]]:
+    return ((name, item) for name, item in scene.items() if name != root)
 
 
 def _frames(state: ViewState) -> Iterator[tuple[str, Item]]:
@@ -91,24 +114,31 @@ def _names(places: Mapping[str, Vector], length: float) -> Iterator[tuple[str, I
 
 def frames_of(state: ViewState) -> dict[str, Array]:
     """Return the poses of DH frames dh_0 … dh_n and of tool0 in base_link, shape (4, 4) each."""
-    chain = state.model.chain
-    poses = {f"dh_{i}": np.asarray(T) for i, T in enumerate(frame_poses(chain, state.q))}
-    return {**poses, "tool0": forward_kinematics(chain, state.q)}
+    stance = stance_of(state.model, state.q)
+    return {**{f"dh_{i}": T for i, T in enumerate(stance.frames)}, "tool0": stance.tool0}
 
 
 def _braced(name: str) -> str:
     return f"{{{name.removeprefix('dh_')}}}" if name.startswith("dh_") else name
 
 
-def _grid(size: float) -> Iterator[tuple[str, Item]]:
-    """Yield lines on the ground, a round number of metres apart."""
+@lru_cache(maxsize=8)  # the same lines for every picture
+def _grid(size: float) -> Mapping[str, Item]:
+    """Return lines on the ground, a round number of metres apart."""
     cell = _round_length(2.6 * size / _CELLS)
     half = 0.5 * _CELLS * cell
-    for k in range(_CELLS + 1):
-        at = -half + k * cell
-        color = _AXIS_COLOR if 2 * k == _CELLS else _GRID_COLOR
-        yield f"/grid/x_{k}", Path(points=((at, -half, 0.0), (at, half, 0.0)), color=color, width=1.0)
-        yield f"/grid/y_{k}", Path(points=((-half, at, 0.0), (half, at, 0.0)), color=color, width=1.0)
+    places = [-half + k * cell for k in range(_CELLS + 1)]
+    middle = places.pop(_CELLS // 2)
+    return {
+        "/grid/cells": Lines(segments=tuple(_crosses(places, half)), color=_GRID_COLOR, width=1.0),
+        "/grid/axes": Lines(segments=tuple(_crosses([middle], half)), color=_AXIS_COLOR, width=1.0),
+    }
+
+
+def _crosses(places: Iterable[float], half: float) -> Iterator[tuple[Vector, Vector]]:
+    for at in places:
+        yield (at, -half, 0.0), (at, half, 0.0)
+        yield (-half, at, 0.0), (half, at, 0.0)
 
 
 def _round_length(length: float) -> float:

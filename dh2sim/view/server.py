@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import importlib
-import io
+import ipaddress
 import socket
 import threading
 import time
-import warnings
 from collections.abc import Mapping
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlsplit
 
 from dh2sim.errors import Dh2simError
-from dh2sim.view.extent import FIELD, eye_of, size_of
+from dh2sim.view.camera import aim
 from dh2sim.view.page import Page
+from dh2sim.view.quiet_server import quiet_server, stop_quietly
 from dh2sim.view.state import ViewState
 
 if TYPE_CHECKING:
@@ -27,10 +26,10 @@ if TYPE_CHECKING:
     from dh2sim.view.replay import Replay
 
 LOOPBACK: Final = ("127.0.0.1", "localhost", "::1")
+EVERY_ADDRESS: Final = ("0.0.0.0", "::")
+"""Of this machine; a browser on it is told another."""
 PORTS_TRIED: Final = 100
-
-
-PATIENCE = 2.0
+PATIENCE: Final = 5.0
 """s that a page is given to end what it does."""
 
 
@@ -56,6 +55,8 @@ class Viewer:
         self._run = run
         self._replay()
         self._pages: dict[int, Page] = {}
+        self._leaving: list[Page] = []
+        """Pages whose browser is gone, and which may still do something."""
         self._lock = threading.Lock()
         self._server = quiet_server(host, port)
         self.port: int = self._server.get_port()
@@ -69,7 +70,7 @@ class Viewer:
     @property
     def url(self) -> str:
         """Where a browser on this machine finds it."""
-        name = "127.0.0.1" if self._host in ("0.0.0.0", "::") else self._host
+        name = "127.0.0.1" if self._host in EVERY_ADDRESS else self._host
         return f"http://{f'[{name}]' if ':' in name else name}:{self.port}"
 
     @property
@@ -88,7 +89,7 @@ class Viewer:
         pages = self.pages
         for page in pages:
             page.close()
-        for page in pages:
+        for page in (*pages, *self._leaving):  # what is sent to a server that has ended makes it complain
             page.join(PATIENCE)
         stop_quietly(self._server)
         self._warm_up.join()  # Python must not end while a library is loaded: that is a crash
@@ -127,6 +128,7 @@ class Viewer:
             page = self._pages.pop(client.client_id, None)
         if page is not None:
             page.close()
+            self._leaving = [*(left for left in self._leaving if left.works), page]
 
 
 def free_port(host: str, port: int) -> int:
@@ -150,31 +152,15 @@ def free_port(host: str, port: int) -> int:
     raise Dh2simError(f"cannot listen at {host}: ports {port} to {candidate} are all taken")
 
 
+def is_private(host: str) -> bool:
+    """Whether only this machine can reach a server at an address; ``host`` is one that can be listened at."""
+    addresses = [str(info[4][0]) for info in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)]
+    return all(ipaddress.ip_address(address).is_loopback for address in addresses)
+
+
 def _warm_up() -> None:
     """Import what the first page will need, while its browser still starts."""
     importlib.import_module("dh2sim.engines.mujoco_engine")
-
-
-def quiet_server(host: str, port: int) -> viser.ViserServer:
-    """Start a server; viser's own words about it are dropped."""
-    import viser
-
-    # pages notice by themselves that their browser is gone
-    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection", category=UserWarning)
-    with contextlib.redirect_stdout(io.StringIO()):
-        server = viser.ViserServer(host=host, port=port, verbose=False)
-    server.request_share_url = _refuse_to_share  # type: ignore[method-assign]
-    return server
-
-
-def stop_quietly(server: viser.ViserServer) -> None:
-    """Stop a server; viser's last words are dropped."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        server.stop()
-
-
-def _refuse_to_share(*_arguments: object, **_options: object) -> None:
-    """A page of this machine stays on it: viser's tunnel to the open net is never dug."""
 
 
 def _dress(server: viser.ViserServer, state: ViewState) -> None:
@@ -188,9 +174,6 @@ def _dress(server: viser.ViserServer, state: ViewState) -> None:
     )
     server.gui.main_panel.dock_right()
     server.scene.set_up_direction("+z")
-    eye = eye_of(state.model)
-    server.initial_camera.position = eye.position
-    server.initial_camera.look_at = eye.look_at
-    server.initial_camera.fov = FIELD
-    server.initial_camera.near = 1e-3 * size_of(state.model)
-    server.initial_camera.far = 1e3 * size_of(state.model)
+    # shadows of links on links tell nothing, and cost a browser without a graphics card two thirds of its time
+    server.scene.configure_default_lights(cast_shadow=False)
+    aim(server.initial_camera, state.model)

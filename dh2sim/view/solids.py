@@ -8,6 +8,7 @@ an edited robot too.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import lru_cache
 from itertools import pairwise
 from typing import TypeAlias
@@ -15,21 +16,23 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.kinematics.forward import joint_poses
-from dh2sim.kinematics.transforms import compose, identity, quaternion_from_rotation
+from dh2sim.kinematics.transforms import compose, quaternion_from_rotation
 from dh2sim.model.meshes import STL_FACE, STL_HEADER, MeshAsset
 from dh2sim.model.robot_model import LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.typing import Array
 from dh2sim.view.items import Color, Item, Placed, Quaternion, Solid, Vector
+from dh2sim.view.stance import stance_of
 
 SIDES = 32
 """Of a round shape's cross-section; its corners lie on the true surface, and so it is up to 1.5 % too small."""
 RINGS = 8
 """Between the equator and the pole of a capsule's end."""
-_SHAPES_KEPT = 512
-"""Of about a quarter of a megabyte each; a robot has three for every joint."""
+_SHAPES_KEPT = 128
+"""Of up to a seventh of a megabyte each; every edit of a table makes a few new ones."""
 _MESHES_KEPT = 32
+_ROBOTS_KEPT = 6
+"""The robot, seen through or not, and its ghost; of a few pages."""
 
 Triangles: TypeAlias = tuple[tuple[Vector, ...], tuple[tuple[int, int, int], ...]]
 """Vertices, m, and the three corners of every face, anticlockwise from outside."""
@@ -84,14 +87,20 @@ def robot_solids(
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
     items: dict[str, Item] = {root: Placed()}
-    poses = [identity(), *joint_poses(model.chain, q)]
+    for link, T in zip(model.all_links, stance_of(model, q).links, strict=True):
+        items[f"{root}/{link.name}"] = Placed(position=position_of(T), orientation=orientation_of(T))
+    return {**items, **_fixed_solids(model, root, color, opacity)}
+
+
+@lru_cache(maxsize=_ROBOTS_KEPT)
+def _fixed_solids(model: RobotModel, root: str, color: Color | None, opacity: float | None) -> Mapping[str, Solid]:
+    """Return what hangs below the links' frames, which is the same at every configuration."""
     dh_frames = [model.chain.T_base_link_dh0, *(joint.T_joint_dh for joint in model.chain.joints)]
-    for link, T, T_link_dh in zip(model.all_links, poses, dh_frames, strict=True):
-        name = f"{root}/{link.name}"
-        items[name] = Placed(position=position_of(T), orientation=orientation_of(T))
-        solids = link_solids(link, T_link_dh, color=color, opacity=opacity)
-        items.update({f"{name}/{own}": solid for own, solid in solids.items()})
-    return items
+    return {
+        f"{root}/{link.name}/{name}": solid
+        for link, T_link_dh in zip(model.all_links, dh_frames, strict=True)
+        for name, solid in link_solids(link, T_link_dh, color=color, opacity=opacity).items()
+    }
 
 
 def shape_triangles(shape: Shape) -> Triangles:

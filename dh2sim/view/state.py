@@ -17,6 +17,7 @@ from dh2sim.view.items import Vector
 
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 """A pose of shape (4, 4), as tuples, so that states compare by value."""
+IDENTITY: Final[Matrix] = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))
 
 COLUMNS: Final = ("a", "alpha", "d", "theta", "beta")
 """Columns of numbers of the table."""
@@ -128,10 +129,14 @@ class ViewState:
     file: str
     """Name of that file, for messages."""
     folder: Path | None
-    """Where paths in it start."""
+    """Where paths in it start; None of a file that was uploaded."""
     draft: Draft
     q: tuple[float, ...]
     """Joint coordinates, rad and m."""
+    earlier: tuple[str, ...] = field(default=(), repr=False)
+    """Robot files of before the last edits, the newest at the end."""
+    typed: tuple[int, str] | None = None
+    """Row and column of the cell that the last edit was typed into."""
     target: tuple[float, ...] | None = None
     """Where a simulation's actuators hold the joints; None where there is no simulation."""
     shown: frozenset[Part] = frozenset({Part.SHAPES, Part.FRAMES, Part.FRAME_NAMES, Part.GRID, Part.GHOST})
@@ -148,6 +153,8 @@ class ViewState:
     mode: Mode = Mode.STILL
     paused: bool = False
     """Whether the simulation or the recording stands."""
+    T_world_base_link: Matrix = IDENTITY
+    """Where base_link is: elsewhere than at the world's origin only in a recording in which it floats."""
     steps: int = 0
     """Single steps that were asked for since it began."""
     pull: Pull | None = None
@@ -158,6 +165,11 @@ class ViewState:
     def wanted(self) -> tuple[float, ...]:
         """Where the user wants the joints: what sliders show."""
         return self.q if self.target is None else self.target
+
+    @property
+    def floats(self) -> bool:
+        """Whether base_link is elsewhere than at the world's origin."""
+        return self.T_world_base_link != IDENTITY
 
     @property
     def spec(self) -> RobotSpec:

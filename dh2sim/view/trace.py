@@ -6,7 +6,10 @@ import math
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from dh2sim.kinematics.forward import forward_kinematics
+from dh2sim.kinematics.transforms import compose
 from dh2sim.view.items import Vector
 from dh2sim.view.solids import position_of
 from dh2sim.view.state import Part, ViewState
@@ -18,13 +21,15 @@ _NEAR: Final = 1e-3
 
 
 def traced(before: ViewState, after: ViewState) -> ViewState:
-    """Return the state ``after`` with the way of tool0 since ``before``; none where it is not shown, or jumped.
+    """Return the state ``after`` with the way of tool0, in the world, since ``before``; none where it is not shown.
 
-    Another robot begins another trace.
+    Another robot begins another trace, and so does a base that goes where it was before a recording.
     """
-    if Part.TRACE not in after.shown or after.model is not before.model:
+    moved = after.T_world_base_link != before.T_world_base_link
+    brought_back = moved and after.mode is not before.mode
+    if Part.TRACE not in after.shown or after.model is not before.model or brought_back:
         return replace(after, trace=()) if after.trace else after
-    if after.q == before.q and after.trace:
+    if after.q == before.q and not moved and after.trace:
         return after
     points = after.trace or (_tool(before),)
     place = _tool(after)
@@ -34,4 +39,7 @@ def traced(before: ViewState, after: ViewState) -> ViewState:
 
 
 def _tool(state: ViewState) -> Vector:
-    return position_of(forward_kinematics(state.model.chain, state.q))
+    T_base_tool = forward_kinematics(state.model.chain, state.q)
+    if not state.floats:
+        return position_of(T_base_tool)
+    return position_of(compose(np.array(state.T_world_base_link), T_base_tool))

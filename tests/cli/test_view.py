@@ -24,6 +24,7 @@ from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.load import load_robot
 from dh2sim.view.opening import folder_of, open_state
 from dh2sim.view.scene import scene_of
+from dh2sim.view.server import is_private
 from tests.program import dh2sim, dh2sim_process, environment
 
 ADDRESS = "127.0.0.1"
@@ -155,6 +156,24 @@ def test_it_can_only_be_reached_from_this_machine_unless_it_is_told_otherwise() 
         assert first_line(process) == f"stanford: http://{ADDRESS}:{port}  (Ctrl-C ends it)\n"
         with socket.socket() as other:
             assert other.connect_ex(("127.0.0.2", port)) == 0
+        process.send_signal(signal.SIGINT)
+        told = "dh2sim: anyone who can reach this machine at any of its addresses can open the page\n"
+        assert process.communicate(timeout=TIMEOUT)[1] == f"{told}dh2sim: interrupted\n"
+
+
+@pytest.mark.parametrize(
+    ("host", "private"),
+    [("127.0.0.1", True), ("127.8.0.1", True), ("localhost", True), ("0.0.0.0", False), ("192.0.2.1", False)],
+)
+def test_it_is_known_whether_others_can_reach_an_address(host: str, private: bool) -> None:
+    assert is_private(host) is private
+
+
+def test_of_an_address_of_this_machine_alone_nothing_is_told() -> None:
+    with serving("stanford", "--port", str(unused_port()), "--host", "localhost", "--share", "never") as process:
+        first_line(process)
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=TIMEOUT)[1] == "dh2sim: interrupted\n"
 
 
 def test_of_a_taken_port_it_takes_the_next_that_is_free_and_says_so() -> None:
@@ -217,11 +236,15 @@ def test_a_page_is_exported_as_one_file_and_nothing_else(tmp_path: Path) -> None
     assert not re.findall(r'(?:src|href)="https?:', text), "it needs no network"
 
 
-def test_an_exported_page_replaces_the_one_that_stands_there(tmp_path: Path) -> None:
+def test_an_exported_page_replaces_another_only_where_it_is_asked_to(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     assert dh2sim("view", "scara", "--export", page).status == 0
     scara = page.read_bytes()
-    assert dh2sim("view", "stanford", "--export", page).status == 0
+    done = dh2sim("view", "stanford", "--export", page)
+    told = f"dh2sim: '{page}' exists already; choose another name, or write over it with --force\n"
+    assert (done.status, done.out, done.err) == (2, "", told)
+    assert page.read_bytes() == scara
+    assert dh2sim("view", "stanford", "--export", page, "--force").status == 0
     assert page.read_bytes() != scara
     assert b"stanford" in page.read_bytes()
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
@@ -232,6 +255,21 @@ def test_a_page_that_cannot_be_written_is_told_of(tmp_path: Path) -> None:
     assert (done.status, done.out) == (2, "")
     assert done.err == "dh2sim: cannot write 'nowhere/page.html': there is no folder 'nowhere'\n"
     assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_written_over_where_nothing_is_exported() -> None:
+    done = dh2sim("view", "stanford", "--no-browser", "--force")
+    assert (done.status, done.out) == (2, "")
+    assert done.err.endswith("Invalid value for --force: only with --export: nothing else is written\n")
+
+
+@pytest.mark.parametrize("word", ["public", "always", "", "Never"])
+def test_pages_are_never_shared_over_the_open_net(word: str) -> None:
+    done = dh2sim("view", "stanford", "--no-browser", "--share", word)
+    assert (done.status, done.out) == (2, "")
+    assert done.err.endswith(
+        "Invalid value for --share: pages are never shared over the open net; 'never' is all there is\n"
+    )
 
 
 def test_a_run_that_there_is_not_is_refused_before_anything_is_served(tmp_path: Path) -> None:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from dh2sim.robot.load import load_robot
 from dh2sim.view.opening import open_state
+from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.server import Viewer
+from dh2sim.view.state import ViewState
+from scripts.bench_view_probes import NO_DRAWING
+from tests.view.on_page import Serve
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
@@ -44,10 +50,18 @@ def viewer() -> Iterator[Viewer]:
 
 
 @pytest.fixture(scope="module")
-def window(browser: Browser) -> Iterator[BrowserContext]:
+def drawn() -> bool:
+    """Whether pages draw; where nothing is looked at, leaving that out saves most of the time."""
+    return True
+
+
+@pytest.fixture(scope="module")
+def window(browser: Browser, drawn: bool) -> Iterator[BrowserContext]:
     """A browser window, small because it is drawn in software; its pages share what is loaded."""
     context = browser.new_context(viewport={"width": 900, "height": 640}, accept_downloads=True)
     context.set_default_timeout(TIMEOUT)
+    if not drawn:
+        context.add_init_script(NO_DRAWING)
     yield context
     context.close()
 
@@ -66,3 +80,21 @@ def open_page(window: BrowserContext, viewer: Viewer) -> Iterator[Callable[[], P
     yield opened
     for page in pages:
         page.close()
+
+
+@pytest.fixture
+def serve(window: BrowserContext) -> Iterator[Serve]:
+    """Serves any state, and opens a page of it; until the test ends."""
+    with contextlib.ExitStack() as stack:
+
+        def served(state: ViewState, run: Path | None = None) -> tuple[Page, ServedPage]:
+            server = Viewer(state, run=run)
+            stack.callback(server.stop)
+            page = window.new_page()
+            stack.callback(page.close)
+            page.goto(server.url)
+            page.get_by_role("tab", name="Joints").wait_for()
+            (serving,) = server.pages
+            return page, serving
+
+        yield served

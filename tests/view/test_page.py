@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,60 +14,28 @@ import pytest
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
 from dh2sim.robot.load import load_robot, parse_robot
-from dh2sim.robot.spec import Convention, RobotSpec
+from dh2sim.robot.spec import Convention
 from dh2sim.view.ghost import told_reading
 from dh2sim.view.server import Viewer
+from tests.view.on_page import (
+    DEADLINE,
+    OpenPage,
+    choose,
+    field,
+    open_tab,
+    pixel,
+    shown,
+    wait_for_position,
+    wait_until,
+    xyz,
+)
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Locator, Page
+    from playwright.sync_api import Page
 
     from dh2sim.view.page import Page as ServedPage
 
 HOME = load_robot("stanford").configurations["home"].tolist()
-DEADLINE = 60.0
-"""s."""
-
-OpenPage = Callable[[], "Page"]
-
-
-def shown(page: Page, name: str) -> str:
-    """The text of a part of the panel."""
-    return page.locator(f'[data-dh2sim="{name}"]').first.inner_text()
-
-
-def xyz(page: Page) -> list[float]:
-    """The position that the page shows, m."""
-    found = re.search(r"xyz \[m\]\s+(\S+) (\S+) (\S+)", shown(page, "readout"))
-    assert found is not None
-    return [float(number) for number in found.groups()]
-
-
-def wait_until(holds: Callable[[], bool], what: str) -> None:
-    end = time.monotonic() + DEADLINE
-    while not holds():
-        assert time.monotonic() < end, what
-        time.sleep(0.05)
-
-
-def wait_for_position(page: Page, spec: RobotSpec, q: list[float]) -> None:
-    """Wait until the page shows where the table has tool0."""
-    expected = table_tool_pose(spec, q)[:3, 3]
-    wait_until(lambda: bool(np.allclose(xyz(page), expected, rtol=0, atol=1.1e-6)), f"{xyz(page)} is not {expected}")
-
-
-def field(page: Page, label: str) -> Locator:
-    """The field that can be typed into beside a label."""
-    name = page.locator("label", has_text=re.compile(f"^{re.escape(label)}$"))
-    return name.locator("xpath=ancestor::*[.//input[not(@type='hidden')]][1]//input[not(@type='hidden')]").first
-
-
-def choose(page: Page, label: str, option: str) -> None:
-    field(page, label).click()
-    page.get_by_role("option", name=option, exact=True).click()
-
-
-def open_tab(page: Page, name: str) -> None:
-    page.get_by_role("tab", name=name).click()
 
 
 def test_joints_are_moved_by_number_slider_key_and_name(open_page: OpenPage, tmp_path: Path) -> None:
@@ -113,7 +80,7 @@ def test_pages_have_states_of_their_own_and_a_reload_begins_anew(open_page: Open
     wait_until(lambda: len(viewer.pages) == 2, "the page of before the reload is closed")
 
 
-def test_the_table_is_edited_marked_and_read_another_way(open_page: OpenPage, tmp_path: Path) -> None:
+def test_the_table_is_edited_marked_read_another_way_and_taken_back(open_page: OpenPage, tmp_path: Path) -> None:
     page, spec = open_page(), load_robot("stanford")
     open_tab(page, "Table")
     choose(page, "Edit row", "2: joint_2")
@@ -140,6 +107,13 @@ def test_the_table_is_edited_marked_and_read_another_way(open_page: OpenPage, tm
     other = parse_robot(text)
     assert other.rows[1].convention is Convention.MODIFIED
     wait_for_position(page, other, HOME)
+    open_tab(page, "Table")
+    undo = page.get_by_role("button", name="Undo", exact=True)
+    for _ in range(3):  # the convention, the angle, the length
+        undo.click()
+    wait_until(undo.is_disabled, "all edits are taken back")
+    open_tab(page, "Joints")
+    wait_for_position(page, spec, HOME)
 
 
 def test_the_pose_is_shown_in_every_form_beside_that_of_mujoco(open_page: OpenPage, tmp_path: Path) -> None:
@@ -211,20 +185,6 @@ def target(served: ServedPage) -> Sequence[float]:
     pull = served.state.pull
     assert pull is not None
     return pull.target
-
-
-def pixel(page: Page, served: ServedPage, point: Sequence[float]) -> tuple[float, float]:
-    """Where a point of base_link, m, is on the page: the camera is a pinhole that looks along its z."""
-    camera, box = served.client.camera, page.locator("canvas").first.bounding_box()
-    assert box is not None
-    w, *v = camera.wxyz.tolist()
-    offset = np.subtract(point, camera.position)
-    right, down, ahead = offset + 2.0 * np.cross(v, np.cross(v, offset) - w * offset)  # turned back
-    focal = 0.5 * box["height"] / math.tan(0.5 * camera.fov)
-    return (
-        box["x"] + 0.5 * box["width"] + focal * float(right / ahead),
-        box["y"] + 0.5 * box["height"] + focal * float(down / ahead),
-    )
 
 
 def test_another_robot_or_the_table_misread_stands_beside_as_a_ghost(open_page: OpenPage, tmp_path: Path) -> None:

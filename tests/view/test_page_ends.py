@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 
+from dh2sim.robot.load import load_robot
+from dh2sim.view.opening import open_state
 from dh2sim.view.page import says_that_nobody_is_there
+from dh2sim.view.server import Viewer
+from tests.view.on_page import wait_until
+from tests.view.without_browser import speaking
 
 
 @pytest.mark.parametrize(
@@ -22,3 +29,35 @@ def test_a_browser_that_was_closed_is_no_defect(error: Exception) -> None:
 @pytest.mark.parametrize("error", [RuntimeError("dictionary changed size"), UserWarning("something else")])
 def test_everything_else_is(error: Exception) -> None:
     assert not says_that_nobody_is_there(error)
+
+
+def test_a_server_ends_after_all_that_its_pages_still_do_for_browsers_that_are_gone() -> None:
+    viewer = Viewer(open_state(load_robot("stanford")))
+    for _ in range(4):
+        with speaking(viewer.url):
+            wait_until(lambda: len(viewer.pages) == 1, "the page")
+        wait_until(lambda: not viewer.pages, "it is closed")
+    viewer.stop()
+    assert [thread.name for thread in threading.enumerate() if thread.name.startswith("page-")] == []
+
+
+def test_a_page_that_is_closed_leaves_what_is_queued() -> None:
+    viewer = Viewer(open_state(load_robot("stanford")))
+    try:
+        with speaking(viewer.url):
+            wait_until(lambda: len(viewer.pages) == 1, "the page")
+            (page,) = viewer.pages
+            busy, done = threading.Event(), threading.Event()
+
+            def be_busy() -> None:
+                busy.wait(20.0)
+
+            page.send(be_busy)
+            page.send(done.set)
+            page.close()
+            busy.set()
+            page.join(20.0)
+            assert not page.works
+            assert not done.is_set()
+    finally:
+        viewer.stop()

@@ -75,6 +75,25 @@ def test_a_simulation_stands_while_it_is_paused_and_makes_the_steps_that_were_as
     assert simulation.physics.time > 4 * step
 
 
+def test_gravity_and_actuators_are_switched_while_the_robot_moves() -> None:
+    simulation = Simulation(STANFORD.model, STANFORD.q, gravity=True, drive="free")
+    simulation.tick(0.0, STANFORD)
+    for k in range(1, 11):
+        simulation.tick(0.02 * k, STANFORD)
+    moving = simulation.physics.qvel
+    assert np.abs(moving).max() > 0.1
+    simulation.act(gravity=False, drive="free")
+    assert simulation.physics.qvel.tolist() == moving.tolist(), "it goes on as fast as it is"
+    before = sum(simulation.physics.energy)
+    simulation.tick(0.25, STANFORD)
+    assert simulation.physics.time == pytest.approx(0.25, abs=0.01)
+    assert sum(simulation.physics.energy) == pytest.approx(before, rel=1e-2), "nothing drives it any more"
+    simulation.act(gravity=False, drive="position")
+    for k in range(1, 101):
+        simulation.tick(0.25 + 0.03 * k, STANFORD)
+    assert np.allclose(simulation.physics.q, STANFORD.q, rtol=0, atol=0.02), "it is brought back"
+
+
 def test_a_link_that_is_pulled_at_comes_to_the_mouse_until_it_is_let_go() -> None:
     simulation = Simulation(STANFORD.model, STANFORD.q, gravity=False, drive="free")
     pull = Pull(link="link_3", point_in_link=(0.0, 0.0, 0.1), target=(0.5, 0.5, 0.5))

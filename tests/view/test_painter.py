@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dh2sim.view.items import Arrow, Item, Label, Path, Placed, Solid, Triad
+from dh2sim.view.items import Arrow, Item, Label, Lines, Path, Placed, Solid, Triad
 from dh2sim.view.painter import Painter
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ CORNERS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[viser.ViserServer]:
-    from dh2sim.view.server import quiet_server, stop_quietly
+    from dh2sim.view.quiet_server import quiet_server, stop_quietly
 
     made = quiet_server("127.0.0.1", 0)
     yield made
@@ -41,6 +41,8 @@ def test_every_kind_of_item_is_drawn(scene: viser.SceneApi) -> None:
         "/a": Placed(position=(1.0, 2.0, 3.0)),
         "/a/solid": triangle(),
         "/a/triad": Triad(length=0.2),
+        "/a/triad/label": Label(text="of the triad"),
+        "/a/lines": Lines(segments=(CORNERS[:2], CORNERS[1:]), color=(0.0, 1.0, 0.0)),
         "/a/path": Path(points=CORNERS, color=(0.0, 1.0, 0.0)),
         "/a/arrow": Arrow(start=CORNERS[0], end=CORNERS[1], color=(0.0, 0.0, 1.0), thickness=0.1),
         "/a/label": Label(text="x"),
@@ -51,6 +53,8 @@ def test_every_kind_of_item_is_drawn(scene: viser.SceneApi) -> None:
         "/a": "FrameHandle",
         "/a/solid": "MeshHandle",
         "/a/triad": "FrameHandle",
+        "/a/triad/label": "LabelHandle",
+        "/a/lines": "LineSegmentsHandle",
         "/a/path": "LineSegmentsHandle",
         "/a/arrow": "ArrowsHandle",
         "/a/label": "LabelHandle",
@@ -96,3 +100,20 @@ def test_what_is_gone_is_removed_with_all_below_it(scene: viser.SceneApi) -> Non
     assert painter.draw({"/d": Label(text="d")}) == 3
     assert [scene.get_handle_by_name(name) for name in ("/a", "/a/b", "/a/b/c")] == [None] * 3
     assert scene.get_handle_by_name("/d") is not None
+
+
+def test_frames_side_by_side_are_one_item_that_is_moved_as_a_whole(scene: viser.SceneApi) -> None:
+    painter = Painter(scene)
+    half = float(np.sqrt(0.5))
+    turned = Triad(length=0.1, position=(0.0, 0.0, 2.0), orientation=(half, 0.0, half, 0.0))
+    painter.draw({"/frames": Placed(), "/frames/a": Triad(length=0.1), "/frames/b": Triad(length=0.1)})
+    axes = scene.get_handle_by_name("/frames/axes_0")
+    assert painter.draw({"/frames": Placed(), "/frames/a": Triad(length=0.1), "/frames/b": turned}) == 1
+    assert scene.get_handle_by_name("/frames/axes_0") is axes
+    assert axes is not None
+    assert axes.batched_positions.tolist() == [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]  # type: ignore[attr-defined]
+    assert np.allclose(axes.batched_wxyzs, [(1.0, 0.0, 0.0, 0.0), turned.orientation])  # type: ignore[attr-defined]
+    assert painter.draw({"/frames": Placed(), "/frames/b": turned}) == 1
+    axes = scene.get_handle_by_name("/frames/axes_0")
+    assert axes is not None
+    assert axes.batched_positions.tolist() == [[0.0, 0.0, 2.0]]  # type: ignore[attr-defined]

@@ -12,7 +12,7 @@ from dh2sim.robot.load import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from dh2sim.view.events import CompareReading, Event, MoveJoint, SelectRow, SetJoints, Show
-from dh2sim.view.items import Label, Path, Scene, Solid, Triad
+from dh2sim.view.items import Label, Lines, Path, Scene, Solid, Triad
 from dh2sim.view.opening import open_state
 from dh2sim.view.reduce import reduce
 from dh2sim.view.scene import scene_of
@@ -70,7 +70,7 @@ def test_a_move_changes_poses_and_no_solid() -> None:
         (Part.SHAPES, Solid, "/robot"),
         (Part.FRAMES, Triad, "/frames"),
         (Part.FRAME_NAMES, Label, "/names"),
-        (Part.GRID, Path, "/grid"),
+        (Part.GRID, Lines, "/grid"),
     ],
 )
 def test_what_is_hidden_is_not_in_the_scene(part: Part, kind: type, root: str) -> None:
@@ -119,10 +119,17 @@ def test_the_trace_is_a_line_through_where_the_tool_was() -> None:
 def test_the_grid_has_round_cells_whatever_the_robots_size() -> None:
     for name in ("stanford", "puma560", "ssrms", "planar_2r"):
         scene = scene_of(open_state(load_robot(name)))
-        lines = [scene[f"/grid/x_{k}"] for k in (0, 1)]
-        xs = [line.points[0][0] for line in lines if isinstance(line, Path)]
-        digits = f"{xs[1] - xs[0]:.3e}"
-        assert digits[:5] in ("1.000", "2.000", "5.000")
+        cells, axes = scene["/grid/cells"], scene["/grid/axes"]
+        assert isinstance(cells, Lines)
+        assert isinstance(axes, Lines)
+        segments = [*cells.segments, *axes.segments]
+        xs = sorted(start[0] for start, end in segments if start[0] == end[0])
+        ys = sorted(start[1] for start, end in segments if start[1] == end[1])
+        assert len(xs) == 21
+        assert xs == ys
+        assert np.allclose(np.diff(xs), xs[1] - xs[0])
+        assert f"{xs[1] - xs[0]:.3e}"[:5] in ("1.000", "2.000", "5.000")
+        assert [start[0] for start, end in axes.segments if start[0] == end[0]] == [0.0]
 
 
 def test_the_row_that_is_edited_is_the_one_that_is_explained_from_the_beginning() -> None:

@@ -22,6 +22,7 @@ from dh2sim.view.state import COLUMNS, Complaint, Mode, Part, Pull, ViewState, t
 from tests.strategies import robot_specs
 
 STANFORD = open_state(load_robot("stanford"))
+ONE_JOINT = "name: one\nconvention: standard\njoints: [{type: continuous, a: 1}]\n"
 
 typed = st.sampled_from(
     [
@@ -72,12 +73,13 @@ anything: st.SearchStrategy[events.Event] = st.one_of(
     st.builds(events.ConvertTable, convention=st.sampled_from(Convention)),
     st.builds(events.SetUnits, angle=st.sampled_from(AngleUnit), length=st.sampled_from(LengthUnit)),
     st.builds(events.ReplaceText, text=st.sampled_from([STANFORD.text, "", "name: x"])),
+    st.builds(events.OpenText, text=st.sampled_from([ONE_JOINT, ONE_JOINT.encode(), "", b"\xff"]), file=st.just("x")),
     st.builds(events.SelectRow, row=rows),
     st.builds(events.Show, part=st.sampled_from(Part), on=st.booleans()),
     st.builds(events.ShowAngles, unit=st.sampled_from(AngleUnit)),
     st.builds(events.ChooseFrame, name=st.sampled_from(["tool0", "dh_3", "link_1", "dh_99", ""])),
     st.builds(events.MoveTool, T_base_link_tool0=matrices, q=st.none() | st.just((0.1,) * 6), reached=st.booleans()),
-    st.builds(events.DropGoal),
+    st.builds(events.Undo),
     st.builds(events.Compare, ghost=st.none()),
     st.builds(events.CompareReading),
     st.builds(events.Tell, notice=st.text(max_size=5)),

@@ -11,7 +11,7 @@ from dh2sim.view.events import Event, MoveJoint, RandomConfiguration, SetConfigu
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
 from dh2sim.view.panel.keys import KEYS
-from dh2sim.view.panel.pose import pose_lines
+from dh2sim.view.panel.pose import pose_lines, whose_pose
 from dh2sim.view.readings import readings_of
 from dh2sim.view.state import ViewState, configurations, travel
 
@@ -53,7 +53,7 @@ class JointsTab:
             self._build(state)
         for slider, joint, value in zip(self._sliders, state.model.moving_joints, state.wanted, strict=True):
             slider.show(_shown(joint, value, state.angle))
-        caption = markup.note(f"<b>{markup.text(state.frame)}</b> in base_link")
+        caption = markup.note(whose_pose(state))
         self._readout.content = caption + markup.lines(pose_lines(readings_of(state), state.angle), name="readout")
 
     def _build(self, state: ViewState) -> None:

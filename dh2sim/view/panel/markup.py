@@ -14,6 +14,11 @@ def text(content: object) -> str:
     return escape(str(content))
 
 
+def lines_of_text(content: str) -> str:
+    """Return any text as HTML, its lines below each other."""
+    return "<br>".join(text(line) for line in content.split("\n"))
+
+
 def table(rows: Iterable[Sequence[str]], *, head: Sequence[str] = (), name: str = "") -> str:
     """Return a table of numbers; cells are HTML.
 

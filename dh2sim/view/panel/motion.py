@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from dh2sim.view.events import Pause, Step
 from dh2sim.view.panel import markup
@@ -12,41 +12,11 @@ from dh2sim.view.state import Mode, ViewState
 if TYPE_CHECKING:
     import viser
 
+    from dh2sim.view.mover import Mover
     from dh2sim.view.physics import Drive
     from dh2sim.view.replay import Replay
 
 _WORDS = {Mode.STILL: "me", Mode.PHYSICS: "physics", Mode.REPLAY: "the recording"}
-
-
-class Mover(Protocol):
-    """What the tab asks of its page; each call in its turn, on the page's own thread."""
-
-    @property
-    def replay(self) -> Replay | None:
-        """The run that is open, if any."""
-
-    @property
-    def motion_told(self) -> str:
-        """What there is to tell of what moves the joints."""
-
-    def be_still(self) -> None:
-        """Give the joints back to the user."""
-
-    def simulate(self, *, gravity: bool, drive: Drive) -> None:
-        """Begin a simulation where the joints are."""
-
-    def play(self, rollout: int) -> None:
-        """Play a rollout from its beginning."""
-
-    @property
-    def motion_share(self) -> float:
-        """Which share of the recording is behind, from 0 to 1."""
-
-    def pace(self, speed: float) -> None:
-        """Say how fast the recording is played."""
-
-    def seek(self, share: float) -> None:
-        """Show the instant at a share of the recording, from 0 to 1."""
 
 
 class MotionTab:
@@ -56,8 +26,7 @@ class MotionTab:
         """Add the widgets to viser's current container."""
         gui = client.gui
         self._send, self._mover = send, mover
-        modes = [mode for mode in Mode if mode is not Mode.REPLAY or mover.replay is not None]
-        self._mode = self._chosen(gui.add_dropdown("Moved by", [_WORDS[mode] for mode in modes]))
+        self._mode = self._chosen(gui.add_dropdown("Moved by", self._modes()))
         self._told = gui.add_html("")
         self._paused = False
         self._pause = gui.add_button("Pause", disabled=True)
@@ -65,24 +34,33 @@ class MotionTab:
         on_click(self._pause, send, lambda: Pause(on=not self._paused))
         on_click(self._step, send, Step)
         with gui.add_folder("Physics"):
-            self._gravity = self._chosen(gui.add_checkbox("Gravity", True))
-            self._drive = self._chosen(gui.add_dropdown("Actuators", ("position", "free")))
+            self._gravity = bind(gui.add_checkbox("Gravity", True), send, lambda _on: self._act)
+            self._drive = bind(gui.add_dropdown("Actuators", ("position", "free")), send, lambda _drive: self._act)
             on_click(gui.add_button("Begin anew"), send, lambda: self._begin)
             gui.add_html(markup.note("Drag a link in the scene to pull at it."))
         self._rollout: Any = None
         self._instant: Bound[float] | None = None
+        self._recording: Any = None
         if mover.replay is not None:
-            with gui.add_folder("Recording"):
+            self._recording = gui.add_folder("Recording")
+            with self._recording:
                 self._add_recording(gui, mover.replay)
 
     def show(self, state: ViewState) -> None:
         """Show a state."""
         self._mode.show(_WORDS[state.mode])
+        if tuple(self._mode.handle.options) != self._modes():
+            self._mode.handle.options = self._modes()
+            self._recording.visible = self._mover.playable
         self._show_pause(state)
         if self._instant is not None:
-            self._instant.show(round(100.0 * self._mover.motion_share, 1))
-        told = self._mover.motion_told if state.mode is not Mode.STILL else ""
+            self._instant.show(round(100.0 * self._mover.share, 1))
+        told = self._mover.told if state.mode is not Mode.STILL else ""
         self._told.content = markup.note(markup.text(told), name="motion")
+
+    def _modes(self) -> tuple[str, ...]:
+        """Return who can be asked to move the joints; not a recording of another robot."""
+        return tuple(_WORDS[mode] for mode in Mode if mode is not Mode.REPLAY or self._mover.playable)
 
     def _show_pause(self, state: ViewState) -> None:
         still = state.mode is Mode.STILL
@@ -110,13 +88,24 @@ class MotionTab:
         """Let whoever is chosen move the joints, from the beginning."""
         chosen = self._mode.handle.value
         if chosen == _WORDS[Mode.PHYSICS]:
-            drive = cast("Drive", self._drive.handle.value)
-            self._mover.simulate(gravity=bool(self._gravity.handle.value), drive=drive)
+            self._mover.simulate(gravity=self._has_gravity, drive=self._driven_by)
         elif chosen == _WORDS[Mode.REPLAY]:
             self._mover.play(int(self._rollout.value))
             self._pace()
         else:
             self._mover.be_still()
+
+    def _act(self) -> None:
+        """Let what is chosen act in the simulation that runs, if one does."""
+        self._mover.act(gravity=self._has_gravity, drive=self._driven_by)
+
+    @property
+    def _has_gravity(self) -> bool:
+        return bool(self._gravity.handle.value)
+
+    @property
+    def _driven_by(self) -> Drive:
+        return cast("Drive", self._drive.handle.value)
 
     def _pace(self) -> None:
         self._mover.pace(float(self._speed.value))

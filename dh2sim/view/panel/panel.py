@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Send
-from dh2sim.view.panel.files import FileActions, add_files
+from dh2sim.view.panel.files import add_files
 from dh2sim.view.panel.joints import JointsTab
 from dh2sim.view.panel.keys import add_keys
-from dh2sim.view.panel.motion import MotionTab, Mover
+from dh2sim.view.panel.motion import MotionTab
 from dh2sim.view.panel.pose import PoseTab
 from dh2sim.view.panel.show import ShowTab
 from dh2sim.view.panel.table import TableTab
+from dh2sim.view.panel.uploads import UploadButtons
 from dh2sim.view.state import ViewState
+from dh2sim.view.unreached import told_unreached
 
 if TYPE_CHECKING:
     import viser
+
+    from dh2sim.view.mover import Mover
+    from dh2sim.view.robot_files import RobotFiles
 
 
 class Panel:
@@ -28,9 +32,8 @@ class Panel:
         client: viser.ClientHandle,
         send: Send,
         state: ViewState,
-        files: FileActions,
+        files: RobotFiles,
         mover: Mover,
-        compare: Callable[[str], None],
     ) -> None:
         """Add the widgets.
 
@@ -40,9 +43,10 @@ class Panel:
             state: To begin with.
             files: What the buttons for files do.
             mover: What lets somebody else move the joints.
-            compare: Draws a robot that comes with dh2sim, given its name, beside the one that is shown.
         """
-        client.gui.set_panel_label(f"dh2sim · {state.spec.name}")
+        self._gui = client.gui
+        self._name = ""
+        self._uploads = uploads = UploadButtons(client, send)
         self._notice = client.gui.add_html("")
         tabs = client.gui.add_tab_group()
         with tabs.add_tab("Joints") as joints:
@@ -54,15 +58,19 @@ class Panel:
         with tabs.add_tab("Motion"):
             self._motion = MotionTab(client, send, mover)
         with tabs.add_tab("Show"):
-            self._parts = ShowTab(client, send, state, compare)
+            self._parts = ShowTab(client, send, state, uploads, files)
         with tabs.add_tab("Files"):
-            add_files(client, send, files)
+            add_files(client, send, uploads, files)
         add_keys(client, send)
 
     def show(self, state: ViewState) -> None:
         """Show a state."""
+        if state.spec.name != self._name:
+            self._name = state.spec.name
+            self._gui.set_panel_label(f"dh2sim · {self._name}")
+        notice = " ".join(told for told in (state.notice, told_unreached(state)) if told)
         self._notice.content = markup.note(
-            markup.text(state.notice), wrong=bool(state.draft.complaints), name="notice"
+            markup.lines_of_text(notice), wrong=bool(state.draft.complaints), name="notice"
         )
         self._joints.show(state)
         self._table.show(state)

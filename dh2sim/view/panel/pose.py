@@ -38,7 +38,7 @@ class PoseTab:
         if tuple(self._frame.handle.options) != names:
             self._frame.handle.options = names
         self._frame.show(state.frame)
-        seen = (state.model, state.q, state.frame, state.angle)
+        seen = (state.model, state.q, state.frame, state.angle, state.floats)
         if seen != self._shown:
             self._shown = seen
             self._pose.content = _content(state)
@@ -64,12 +64,18 @@ def _content(state: ViewState) -> str:
     matrix = [[f"{value:+.6f}" for value in row] for row in readings.T_base_frame.tolist()]
     return "".join(
         [
-            markup.note(f"Pose of <b>{markup.text(state.frame)}</b> in base_link, lengths in m"),
+            markup.note(f"Pose of {whose_pose(state)}, lengths in m"),
             markup.table(matrix, name="matrix"),
             markup.lines(pose_lines(readings, state.angle), name="pose"),
             markup.lines(_of_jacobian(readings), name="jacobian"),
         ]
     )
+
+
+def whose_pose(state: ViewState) -> str:
+    """Return which frame's pose is told, and in which: that is not the scene's where base_link floats; HTML."""
+    floating = " (which floats in the scene)" if state.floats else ""
+    return f"<b>{markup.text(state.frame)}</b> in base_link{floating}"
 
 
 def pose_lines(readings: Readings, angle: AngleUnit) -> list[tuple[str, str]]:

@@ -12,10 +12,13 @@ from dh2sim.view.ghost import told_ghost, told_reading
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Send, bind
 from dh2sim.view.panel.keys import KEYS
+from dh2sim.view.panel.uploads import UploadButtons
 from dh2sim.view.state import Part, ViewState
 
 if TYPE_CHECKING:
     import viser
+
+    from dh2sim.view.robot_files import RobotFiles
 
 _WORDS = {
     Part.SHAPES: "Robot",
@@ -36,17 +39,22 @@ class ShowTab:
     """A box to tick for each part of the scene."""
 
     def __init__(
-        self, client: viser.ClientHandle, send: Send, state: ViewState, compare: Callable[[str], None]
+        self,
+        client: viser.ClientHandle,
+        send: Send,
+        state: ViewState,
+        uploads: UploadButtons,
+        files: RobotFiles,
     ) -> None:
-        """Add the widgets to viser's current container; ``compare`` draws a robot of a name as the ghost."""
+        """Add the widgets to viser's current container."""
         self._boxes = {
             part: bind(client.gui.add_checkbox(words, part in state.shown), send, partial(_event, part))
             for part, words in _WORDS.items()
         }
-        comparison = client.gui.add_dropdown(
-            "Ghost is", (_NOBODY, _MISREAD, *builtin_robots()), initial_value=_chosen(state)
-        )
-        self._ghost = bind(comparison, send, partial(_ghost, compare))
+        self._always = (_NOBODY, _MISREAD, *builtin_robots())
+        chooser = client.gui.add_dropdown("Ghost is", self._ghosts(state), initial_value=_chosen(state))
+        self._ghost = bind(chooser, send, partial(_ghost, files.compare))
+        uploads.add("Compare with a robot file", files.compare_uploaded)
         self._gap = client.gui.add_html("")
         pairs = [(f"joint {i}", f"{pair.down} less, {pair.up} more") for i, pair in enumerate(KEYS, start=1)]
         with client.gui.add_folder("Keys", expand_by_default=False):
@@ -56,9 +64,15 @@ class ShowTab:
         """Show a state."""
         for part, box in self._boxes.items():
             box.show(part in state.shown)
+        if tuple(self._ghost.handle.options) != self._ghosts(state):
+            self._ghost.handle.options = self._ghosts(state)
         self._ghost.show(_chosen(state))
         compared = state.ghost is not None and Part.GHOST in state.shown
         self._gap.content = markup.note(markup.text(_told(state)) if compared else "", name="ghost")
+
+    def _ghosts(self, state: ViewState) -> tuple[str, ...]:
+        """Return what there is to compare with: besides what always is, the robot that was uploaded for that."""
+        return self._always if _chosen(state) in self._always else (*self._always, _chosen(state))
 
 
 def _chosen(state: ViewState) -> str:

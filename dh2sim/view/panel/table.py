@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from dh2sim.robot.spec import Convention
 from dh2sim.robot.units import AngleUnit, LengthUnit
-from dh2sim.view.events import ConvertTable, EditCell, SelectRow, SetConvention, SetUnits, Show
+from dh2sim.view.events import ConvertTable, EditCell, SelectRow, SetConvention, SetUnits, Show, Undo
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
 from dh2sim.view.panel.table_text import overview
@@ -36,6 +36,8 @@ class TableTab:
         self._cells = {column: self._cell(column) for column in COLUMNS}
         self._convention = self._convention_of_row()
         self._complaint = self._gui.add_html("")
+        self._undo = self._gui.add_button("Undo", disabled=True, hint="Takes the last edit of the table back")
+        on_click(self._undo, send, Undo)
         self._explain = bind(
             self._gui.add_checkbox("Explain in scene", Part.ANNOTATIONS in state.shown),
             send,
@@ -46,7 +48,7 @@ class TableTab:
 
     def show(self, state: ViewState) -> None:
         """Show a state; that is nothing new where only the joints have moved."""
-        seen = (state.draft, state.model, state.selected_row, state.shown)
+        seen = (state.draft, state.model, state.selected_row, state.shown, bool(state.earlier))
         if seen == self._shown:
             return
         self._shown = seen
@@ -62,6 +64,8 @@ class TableTab:
             cell.handle.visible = marked or _is_used(column, row.convention)
         self._convention.show(row.convention.value)
         self._complaint.content = markup.note(_complaints(state, self._row), wrong=True, name="complaint")
+        if self._undo.disabled == bool(state.earlier):
+            self._undo.disabled = not state.earlier
         self._explain.show(Part.ANNOTATIONS in state.shown)
         self._angle.show(state.draft.units.angle.value)
         self._length.show(state.draft.units.length.value)

@@ -1,0 +1,77 @@
+"""Keys that move joints, in a real browser."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from dh2sim.robot.load import load_robot
+from dh2sim.view.opening import open_state
+from dh2sim.view.page import Page as ServedPage
+from tests.view.on_page import Serve, choose, field, open_tab, shown, wait_for_position, wait_until
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+SSRMS, STANFORD = load_robot("ssrms"), load_robot("stanford")
+PAIRS = [("1", "3"), ("4", "6"), ("7", "9"), ("r", "y"), ("f", "h"), ("v", "n"), ("g", "Shift+G")]
+"""What is pressed for less and for more of joints 1 to 7."""
+STEP = math.radians(3.0)
+
+
+@pytest.fixture(scope="module")
+def drawn() -> bool:
+    return False
+
+
+def press(page: Page, key: str, served: ServedPage, expected: list[float]) -> None:
+    """Press a key, and wait until the joints are where that should bring them, and nowhere else."""
+    page.keyboard.press(key)
+    wait_until(
+        lambda: np.allclose(served.state.q, expected, rtol=0, atol=1e-12), f"{key}: {served.state.q}, not {expected}"
+    )
+
+
+def test_each_of_seven_joints_has_a_key_for_less_and_one_for_more(serve: Serve) -> None:
+    page, served = serve(open_state(SSRMS))
+    expected = SSRMS.configurations["home"].tolist()
+    page.locator("canvas").first.focus()
+    for joint, (down, up) in enumerate(PAIRS):
+        expected[joint] -= STEP
+        press(page, down, served, expected)
+        for _ in range(2):
+            expected[joint] += STEP
+            press(page, up, served, expected)
+    wait_for_position(page, SSRMS, expected)
+
+
+def test_keys_typed_into_a_field_move_nothing(serve: Serve) -> None:
+    page, served = serve(open_state(SSRMS))
+    home = SSRMS.configurations["home"].tolist()
+    field(page, "joint_1 [°]").click()
+    page.keyboard.press("Control+A")
+    page.keyboard.type("149.7")
+    wait_until(lambda: served.state.q[0] == pytest.approx(math.radians(149.7)), "joint_1 is where it was typed")
+    wait_for_position(page, SSRMS, [math.radians(149.7), *home[1:]])
+    open_tab(page, "Table")
+    choose(page, "Edit row", "2: joint_2")
+    field(page, "α").click()
+    page.keyboard.type("147rfvgGyhn")
+    wait_until(lambda: "147rfvgGyhn" in shown(page, "table"), "the cell")
+    assert served.state.q[1:] == pytest.approx(home[1:], abs=1e-12)
+    assert served.state.draft.complaints, "it is no number, and the robot is the one of before"
+
+
+def test_a_key_moves_a_sliding_joint_by_a_hundredth_of_its_travel(serve: Serve) -> None:
+    page, served = serve(open_state(STANFORD))
+    expected = STANFORD.configurations["home"].tolist()
+    page.locator("canvas").first.focus()
+    expected[2] += 0.0127
+    press(page, "9", served, expected)
+    for _ in range(2):
+        expected[2] -= 0.0127
+        press(page, "7", served, expected)
+    wait_for_position(page, STANFORD, expected)

@@ -1,0 +1,102 @@
+"""The tool is dragged with the mouse, by its handle in the scene of a real browser."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.robot.load import load_robot
+from dh2sim.typing import Array
+from dh2sim.view.extent import triad_length
+from dh2sim.view.page import Page as ServedPage
+from dh2sim.view.server import Viewer
+from dh2sim.view.state import Goal, Part
+from tests.view.on_page import OpenPage, open_tab, pixel, shown, wait_for_position, wait_until
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+STANFORD = load_robot("stanford")
+ARROW = 1.6 * 0.9
+"""Where the middle of an arrow's head is, as a share of the length of frames' axes."""
+
+
+def goal_of(served: ServedPage) -> Goal:
+    goal = served.state.goal
+    assert goal is not None
+    return goal
+
+
+def drag(page: Page, served: ServedPage, axis: int, metres: float) -> None:
+    """Pull the arrow of an axis of tool0 with the mouse, and let go; again where the handle was not there yet."""
+    before, T = served.state.goal, table_tool_pose(STANFORD, served.state.q)
+
+    def pulled() -> bool:
+        head = ARROW * triad_length(served.state.model)
+        start, end = (pixel(page, served, T[:3, 3] + far * T[:3, axis]) for far in (head, head + metres))
+        page.mouse.move(*start)
+        page.mouse.down()
+        page.mouse.move(*end, steps=8)
+        page.mouse.up()
+        with contextlib.suppress(AssertionError):
+            wait_until(lambda: served.state.goal is not before, "the handle is grabbed", seconds=5.0)
+        return served.state.goal is not before
+
+    wait_until(pulled, "the handle is grabbed")
+    wait_until(lambda: abs(far_along(served, T, axis) / metres - 1.0) < 0.03, "the handle is where the mouse is")
+
+
+def far_along(served: ServedPage, T: Array, axis: int) -> float:
+    """How far the goal is from a pose along one of its axes, m; it is nowhere else."""
+    moved = np.linalg.inv(T) @ np.array(goal_of(served).T_base_link_tool0)
+    assert np.allclose(np.delete(moved[:3, 3], axis), 0.0, rtol=0, atol=1e-5)
+    assert np.allclose(moved[:3, :3], np.eye(3), rtol=0, atol=1e-5)
+    return float(moved[axis, 3])
+
+
+def assert_joints_are_inside_their_limits(served: ServedPage) -> None:
+    for row, value in zip(STANFORD.moving_rows, served.state.q, strict=True):
+        assert row.limits.position is not None
+        lower, upper = row.limits.position
+        assert lower <= value <= upper, row.name
+
+
+def test_tool0_follows_its_handle_and_the_page_says_where_it_cannot(
+    open_page: OpenPage, viewer: Viewer, tmp_path: Path
+) -> None:
+    page = open_page()
+    open_tab(page, "Show")
+    (served,) = viewer.pages
+    page.get_by_text("Handle to drag tool0").click()
+    wait_until(lambda: Part.HANDLE in served.state.shown, "the handle")
+    before = table_tool_pose(STANFORD, served.state.q)
+
+    drag(page, served, 1, 0.12)
+    wait_until(lambda: goal_of(served).reached, "tool0 is there")
+    tool = table_tool_pose(STANFORD, served.state.q)
+    assert np.allclose(tool, goal_of(served).T_base_link_tool0, rtol=0, atol=2e-6)
+    assert tool[:3, 3] @ before[:3, 1] - before[:3, 3] @ before[:3, 1] > 0.1
+    assert_joints_are_inside_their_limits(served)
+    assert shown(page, "notice") == ""
+    open_tab(page, "Joints")
+    wait_for_position(page, STANFORD, served.state.q)
+
+    drag(page, served, 0, 2.0)
+    wait_until(lambda: not goal_of(served).reached, "that is out of reach")
+    page.screenshot(path=tmp_path / "out_of_reach.png")
+    told = r"The handle is out of reach, or too far for one step: tool0 is (\S+) m away and turned by (\S+)°\."
+    wait_until(lambda: re.fullmatch(told, shown(page, "notice")) is not None, shown(page, "notice"))
+    found = re.fullmatch(told, shown(page, "notice"))
+    assert found is not None
+    tool, goal = table_tool_pose(STANFORD, served.state.q), np.array(goal_of(served).T_base_link_tool0)
+    assert np.isclose(float(found.group(1)), np.linalg.norm(tool[:3, 3] - goal[:3, 3]), rtol=1e-2)
+    assert_joints_are_inside_their_limits(served)
+    wait_for_position(page, STANFORD, served.state.q)
+
+    page.get_by_role("button", name="home").click()
+    wait_until(lambda: shown(page, "notice") == "", "another move is another goal")

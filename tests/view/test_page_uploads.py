@@ -1,0 +1,225 @@
+"""Robot files that are uploaded to a page, by a user in a browser and by somebody who means harm."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.robot.catalog import builtin_path
+from dh2sim.robot.document import MAX_BYTES
+from dh2sim.robot.load import load_robot, parse_robot
+from dh2sim.view.opening import open_state
+from dh2sim.view.page import Page as ServedPage
+from dh2sim.view.server import Viewer
+from tests.program import dh2sim
+from tests.view.on_page import OpenPage, choose, field, open_tab, shown, wait_for_position, wait_until, xyz
+from tests.view.without_browser import speaking
+
+if TYPE_CHECKING:
+    from playwright.sync_api import BrowserContext, Page
+
+MINE = (
+    "name: mine\nconvention: standard\nconfigurations: {home: [0.5, 0.2]}\njoints:\n"
+    "  - {name: turn, type: revolute, a: 0.5, limits: {position: [-1, 1]}}\n"
+    "  - {name: slide, type: prismatic, alpha: 0.3, limits: {position: [0, 0.4]}}\n"
+)
+OPEN, COMPARE = "Open a robot file", "Compare with a robot file"
+PART = 512 * 1024
+"""Bytes that viser's page sends at a time."""
+
+
+def upload(page: Page, button: str, name: str, text: str) -> None:
+    """Choose a file with an upload button: its input is not seen."""
+    chooser = page.get_by_role("button", name=button).locator("xpath=preceding-sibling::input[@type='file']")
+    chooser.set_input_files({"name": name, "mimeType": "application/yaml", "buffer": text.encode()})
+
+
+def test_a_robot_file_is_opened_a_wrong_one_is_told_of_and_the_first_comes_back(
+    open_page: OpenPage, viewer: Viewer, tmp_path: Path
+) -> None:
+    page, spec, stanford = open_page(), parse_robot(MINE), load_robot("stanford")
+    (served,) = viewer.pages
+    open_tab(page, "Files")
+    upload(page, OPEN, "<b>my arm<b>.yaml", MINE)
+    wait_until(lambda: shown(page, "notice") == "Opened <b>my arm<b>.yaml: mine, 2 joints.", "it is opened")
+    page.get_by_text("dh2sim · mine").wait_for()
+    open_tab(page, "Joints")
+    wait_for_position(page, spec, (0.5, 0.2))
+    assert field(page, "slide [m]").input_value() == "0.2"
+    open_tab(page, "Table")
+    assert "turn" in shown(page, "table")
+    assert "joint_6" not in shown(page, "table")
+    page.screenshot(path=tmp_path / "opened.png")
+    field(page, "a").fill("0.75")
+    wait_until(lambda: "0.75" in shown(page, "table"), "it is edited")
+
+    open_tab(page, "Files")
+    upload(page, OPEN, "wrong.yaml", MINE.replace("a: 0.5", "a: 0.5 +").replace("prismatic", "prismatik"))
+    wait_until(lambda: "wrong.yaml" in shown(page, "notice"), "what is wrong is told")
+    told = shown(page, "notice").split("\n")
+    assert told[0] == "The robot is the one of before."
+    assert told[1] == "wrong.yaml:5:37: joints[0].a: in '0.5 +': it ends too early"
+    assert told[2].startswith("wrong.yaml:6:25: joints[1].type: found 'prismatik'. Did you mean 'prismatic'?")
+    page.screenshot(path=tmp_path / "wrong.png")
+    assert served.state.text == MINE.replace("a: 0.5", "a: 0.75")
+
+    page.get_by_role("button", name="Back to the opened file").click()
+    wait_until(lambda: "Opened " in shown(page, "notice"), "it is back")
+    page.get_by_text("dh2sim · stanford").wait_for()
+    open_tab(page, "Joints")
+    wait_for_position(page, stanford, stanford.configurations["home"].tolist())
+    assert (served.state.file, served.state.folder) == (viewer._state.file, viewer._state.folder)
+
+
+def test_a_robot_file_is_compared_with(open_page: OpenPage) -> None:
+    page = open_page()
+    open_tab(page, "Show")
+    scara = builtin_path("scara")
+    assert scara is not None
+    upload(page, COMPARE, "any.yaml", scara.read_text(encoding="utf-8"))
+    wait_until(lambda: shown(page, "ghost").startswith("scara puts tool0 "), "the ghost")
+    wait_until(lambda: field(page, "Ghost is").input_value() == "scara (uploaded)", "its name")
+    upload(page, COMPARE, "any.yaml", "name: x\n")
+    wait_until(lambda: "missing key 'joints'" in shown(page, "notice"), "what is wrong is told")
+    assert shown(page, "ghost").startswith("scara puts tool0 ")
+    choose(page, "Ghost is", "nobody")
+    wait_until(lambda: not shown(page, "ghost"), "no ghost")
+
+
+def test_a_file_that_is_too_large_is_refused_and_the_next_one_is_taken(open_page: OpenPage) -> None:
+    page = open_page()
+    open_tab(page, "Files")
+    upload(page, OPEN, "big.yaml", MINE + "#" * 3 * MAX_BYTES)
+    size = len(MINE) + 3 * MAX_BYTES
+    wait_until(
+        lambda: shown(page, "notice") == f"big.yaml has {size} bytes; at most 1000000 are allowed.", "it is refused"
+    )
+    wait_until(page.get_by_role("button", name=OPEN).is_enabled, "the button is free again")
+    wait_until(lambda: page.get_by_text("Uploading big.yaml").count() == 0, "nothing says that it was taken")
+    upload(page, OPEN, "next.yaml", MINE + "\n".join(["# comment"] * 70_000))
+    wait_until(lambda: shown(page, "notice") == "Opened next.yaml: mine, 2 joints.", "a file of two parts")
+
+
+def test_a_recording_is_played_with_the_robot_alone_that_it_is_of(
+    window: BrowserContext, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = tmp_path_factory.mktemp("run") / "run.zarr"
+    done = dh2sim("rollout", "stanford", "--rollouts", "1", "--duration", "1", "--out", path, "--quiet")
+    assert done.status == 0, done.err
+    viewer = Viewer(open_state(load_robot("stanford")), run=path)
+    try:
+        with contextlib.closing(window.new_page()) as page:
+            page.goto(viewer.url)
+            open_tab(page, "Motion")
+            choose(page, "Moved by", "the recording")
+            wait_until(lambda: shown(page, "motion").startswith("Rollout 0: "), "it is played")
+            open_tab(page, "Files")
+            upload(page, OPEN, "mine.yaml", MINE)
+            wait_until(lambda: shown(page, "notice") == "Opened mine.yaml: mine, 2 joints.", "another robot")
+            open_tab(page, "Motion")
+            wait_until(lambda: field(page, "Moved by").input_value() == "me", "it has ended")
+            field(page, "Moved by").click()
+            page.get_by_role("option", name="physics", exact=True).wait_for()
+            assert page.get_by_role("option", name="the recording", exact=True).count() == 0
+            page.keyboard.press("Escape")
+            assert not page.get_by_text("Rollout", exact=True).is_visible()
+            (served,) = viewer.pages
+            served.send(lambda: served.mover.play(0))
+            told = "The recording is one of the robot that was opened at first: go back to that."
+            wait_until(lambda: shown(page, "notice") == told, "it is not to be played")
+            open_tab(page, "Joints")
+            assert np.allclose(xyz(page), table_tool_pose(parse_robot(MINE), (0.5, 0.2))[:3, 3], rtol=0, atol=1.1e-6)
+            open_tab(page, "Files")
+            page.get_by_role("button", name="Back to the opened file").click()
+            open_tab(page, "Motion")
+            choose(page, "Moved by", "the recording")
+            wait_until(lambda: shown(page, "motion").startswith("Rollout 0: "), "it is played again")
+    finally:
+        viewer.stop()
+
+
+@pytest.fixture
+def speaker(viewer: Viewer) -> Iterator[tuple[ServedPage, Callable[..., None]]]:
+    """A page without a browser, and what sends the server a message from it."""
+    wait_until(lambda: not viewer.pages, "other pages are closed")
+    with speaking(viewer.url) as say:
+        wait_until(lambda: len(viewer.pages) == 1, "the page")
+        (served,) = viewer.pages
+        wait_until(lambda: bool(buttons(served)), "its buttons")
+        yield served, say
+
+
+def buttons(served: ServedPage) -> dict[str, str]:
+    """Which upload button has which label."""
+    import viser
+
+    handles = list(served.client.gui._gui_input_handle_from_uuid.items())
+    return {uuid: handle.label for uuid, handle in handles if isinstance(handle, viser.GuiUploadButtonHandle)}
+
+
+def test_whoever_means_harm_makes_the_server_keep_next_to_nothing(
+    viewer: Viewer, speaker: tuple[ServedPage, Callable[..., None]]
+) -> None:
+    served, say = speaker
+    button = next(uuid for uuid, label in buttons(served).items() if label == OPEN)
+    others = [uuid for uuid in served.client.gui._gui_input_handle_from_uuid if uuid not in buttons(served)]
+    numbers = itertools.count()
+
+    def announce(size: Any, count: Any, source: Any = button, name: Any = "x.yaml") -> str:
+        transfer = f"transfer {next(numbers)}"
+        say(
+            "FileTransferStartUpload",
+            source_component_uuid=source,
+            transfer_uuid=transfer,
+            filename=name,
+            mime_type="",
+            part_count=count,
+            size_bytes=size,
+        )
+        return transfer
+
+    def send(transfer: Any, index: Any, content: Any) -> None:
+        say(
+            "FileTransferPart",
+            source_component_uuid=button,
+            transfer_uuid=transfer,
+            part_index=index,
+            content=content,
+        )
+
+    before = served.state
+    for size, count in ((10**12, 10**6), (10, 10**9), (MAX_BYTES + 1, 2), (-5, 1), (5, 0), (10, 500)):
+        transfer = announce(size, count)
+        for index in range(4):
+            send(transfer, index, b"x" * PART)
+    for _ in range(50):  # begun and never ended
+        send(announce(MAX_BYTES, 2), 0, b"x" * PART)
+    for source in (*others, "", None, ["x"], 7):  # not upload buttons at all
+        send(announce(3, 1, source), 0, b"abc")
+    for content in ("text", ["x"] * 3, {"a": 1}, None, 5, b"x" * 5 * PART):
+        send(announce(3, 1), 0, content)
+    send(["x"], 0, b"x")
+    last = announce(len(MINE), 1, name="<script>\x00" + "y" * 300)
+    send(last, 0, MINE.encode())
+    wait_until(lambda: served.state.spec.name == "mine", "a right one is still taken")
+    assert served.state.notice == f"Opened <script>_{'y' * 45}…yyyyy: mine, 2 joints."
+    assert served.state.model is not before.model
+    assert served.state.file.startswith("<script>_y")
+    panel = served._panel._uploads
+    assert panel._intake.held == 0
+    assert not panel._waiting
+    for gui in (served.client.gui, viewer._server.gui):
+        assert gui._current_file_upload_states == {}
+    assert all(handle.value.content == b"" for handle in upload_handles(served))
+
+
+def upload_handles(served: ServedPage) -> list[Any]:
+    handles = served.client.gui._gui_input_handle_from_uuid
+    return [handles[uuid] for uuid in buttons(served)]

@@ -1,0 +1,101 @@
+"""Edits of the table are taken back, one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from dh2sim.robot.load import load_robot
+from dh2sim.robot.spec import Convention
+from dh2sim.robot.units import AngleUnit, LengthUnit
+from dh2sim.view.events import ConvertTable, EditCell, Event, OpenText, SelectRow, SetConvention, SetUnits, Undo
+from dh2sim.view.opening import open_state
+from dh2sim.view.reduce import reduce
+from dh2sim.view.state import Mode, ViewState
+from dh2sim.view.undo import MOST, MOST_LETTERS
+
+STANFORD = open_state(load_robot("stanford"))
+
+
+def after(state: ViewState, *happened: Event) -> ViewState:
+    for event in happened:
+        state = reduce(state, event)
+    return state
+
+
+def cell(text: str, row: int = 0, column: str = "a") -> EditCell:
+    return EditCell(row=row, column=column, text=text)
+
+
+def test_edits_are_taken_back_in_turn_to_the_letter() -> None:
+    edits = (
+        cell("0.1"),
+        cell("0.2", row=1),
+        SetConvention(row=None, convention=Convention.MODIFIED),
+        SetUnits(angle=AngleUnit.RAD, length=LengthUnit.MM),
+        ConvertTable(convention=Convention.STANDARD),
+    )
+    states = [STANFORD]
+    for edit in edits:
+        states.append(after(states[-1], edit))
+    assert len({state.text for state in states}) == len(edits) + 1
+    state = states[-1]
+    for earlier in reversed(states[:-1]):
+        state = after(state, Undo())
+        assert state.text == earlier.text
+        assert state.draft == earlier.draft
+    assert state.earlier == ()
+
+
+def test_what_is_typed_into_a_cell_letter_by_letter_is_one_edit() -> None:
+    typed = after(STANFORD, *(cell(text) for text in ("0", "0.", "0.1", "0.12", "0.12 +", "0.12 + 1")))
+    assert typed.spec.rows[0].a == 1.12
+    assert typed.earlier == (STANFORD.text,)
+    assert after(typed, Undo()).text == STANFORD.text
+    other = after(typed, cell("0.3", row=2), cell("0.5"))
+    assert len(other.earlier) == 3, "into another cell and back are further edits"
+
+
+def test_what_is_wrong_is_no_edit_and_its_mark_goes_with_the_edit_before() -> None:
+    wrong = after(STANFORD, cell("0.1"), cell("pi /", row=1, column="alpha"))
+    assert wrong.draft.complaints
+    assert wrong.earlier == (STANFORD.text,)
+    back = after(wrong, Undo())
+    assert (back.text, back.draft.complaints) == (STANFORD.text, ())
+
+
+def test_joints_and_the_chosen_row_stay_where_they_are() -> None:
+    state = after(STANFORD, cell("0.1", row=3), SelectRow(row=3))
+    moved = replace(state, q=(0.1, *state.q[1:]))
+    back = after(moved, Undo())
+    assert (back.q, back.selected_row) == (moved.q, 3)
+
+
+def test_where_nothing_was_edited_nothing_is_taken_back_and_it_is_told() -> None:
+    assert after(STANFORD, Undo()) == replace(STANFORD, notice="There is no edit to take back.")
+
+
+@pytest.mark.parametrize("mode", [Mode.PHYSICS, Mode.REPLAY])
+def test_nothing_is_taken_back_while_something_moves_the_joints(mode: Mode) -> None:
+    edited = after(STANFORD, cell("0.1"))
+    state = after(replace(edited, mode=mode), Undo())
+    assert (state.text, state.earlier) == (edited.text, edited.earlier)
+    assert state.notice == "The table can be edited once physics and replay are off."
+
+
+def test_another_file_begins_anew() -> None:
+    edited = after(STANFORD, cell("0.1"))
+    opened = after(edited, OpenText(text=b"name: x\nconvention: standard\njoints:\n  - {type: revolute}\n", file="x"))
+    assert opened.spec.name == "x", opened.notice
+    assert opened.earlier == ()
+
+
+def test_what_is_kept_is_bounded() -> None:
+    state = STANFORD
+    for k in range(MOST + 5):
+        state = after(state, cell(f"0.{k + 1}", row=k % 2))
+    assert len(state.earlier) == MOST
+    letters = "#" * (MOST_LETTERS // 2)
+    long = after(replace(STANFORD, earlier=(letters, letters)), cell("0.1"))
+    assert long.earlier == (letters, STANFORD.text)

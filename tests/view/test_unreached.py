@@ -1,0 +1,67 @@
+"""A goal of the tool that is not reached is told and shown; one that is, is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.robot.load import load_robot
+from dh2sim.view.events import Event, MoveJoint, MoveTool, SetMode, Show
+from dh2sim.view.items import Path
+from dh2sim.view.opening import open_state
+from dh2sim.view.reduce import reduce
+from dh2sim.view.scene import scene_of
+from dh2sim.view.state import Matrix, Mode, Part, ViewState
+from dh2sim.view.unreached import told_unreached
+
+STANFORD = open_state(load_robot("stanford"))
+HANDLE = Show(part=Part.HANDLE, on=True)
+TOOL = table_tool_pose(STANFORD.spec, STANFORD.q)
+
+
+def after(*happened: Event) -> ViewState:
+    state = STANFORD
+    for event in happened:
+        state = reduce(state, event)
+    return state
+
+
+def wanted(*, reached: bool, turned: bool = False) -> MoveTool:
+    """tool0 wanted half a metre above where it is; and turned by a right angle about its z."""
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) if turned else np.eye(3)
+    goal = TOOL.copy()
+    goal[:3, :3] = TOOL[:3, :3] @ turn
+    goal[2, 3] += 0.5
+    rows: Matrix = tuple(tuple(row) for row in goal.tolist())
+    return MoveTool(T_base_link_tool0=rows, q=STANFORD.q, reached=reached)
+
+
+@pytest.mark.parametrize(("turned", "how_far"), [(False, "0.5 m away"), (True, "0.5 m away and turned by 90°")])
+def test_it_is_told_how_far_the_tool_is_from_its_handle_and_a_line_leads_there(turned: bool, how_far: str) -> None:
+    state = after(HANDLE, wanted(reached=False, turned=turned))
+    assert told_unreached(state) == f"The handle is out of reach, or too far for one step: tool0 is {how_far}."
+    line = scene_of(state)["/unreached"]
+    assert isinstance(line, Path)
+    x, y, z = TOOL[:3, 3]
+    assert np.allclose(line.points, [(x, y, z), (x, y, z + 0.5)], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "happened",
+    [
+        (HANDLE, wanted(reached=True)),
+        (HANDLE, wanted(reached=False), MoveJoint(joint=0, value=0.1)),
+        (HANDLE, wanted(reached=False), SetMode(mode=Mode.PHYSICS)),
+        (HANDLE, wanted(reached=False), Show(part=Part.HANDLE, on=False)),
+    ],
+    ids=["reached", "moved otherwise", "simulated", "no handle"],
+)
+def test_nothing_is_told_where_the_tool_is_not_wanted_elsewhere(happened: tuple[Event, ...]) -> None:
+    state = after(*happened)
+    assert told_unreached(state) == ""
+    assert "/unreached" not in scene_of(state)
+
+
+def test_a_handle_that_was_put_away_comes_back_at_the_tool() -> None:
+    assert after(HANDLE, wanted(reached=False), Show(part=Part.HANDLE, on=False), HANDLE).goal is None
