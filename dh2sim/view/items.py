@@ -38,6 +38,8 @@ class Solid(Placed):
     faces: tuple[tuple[int, int, int], ...] = field(repr=False)
     color: Color
     opacity: float = 1.0
+    plain: bool = False
+    """Whether it is shaded in a few steps, which is faster where there is no graphics card."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

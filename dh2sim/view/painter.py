@@ -90,6 +90,7 @@ class Painter:
                     faces=np.array(item.faces, dtype=np.uint32),
                     color=_bytes(item.color),
                     opacity=None if item.opacity >= 1.0 else item.opacity,
+                    material="toon5" if item.plain else "standard",
                     **pose,
                 )
             case Triad():

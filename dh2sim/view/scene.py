@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from typing import Final
 
@@ -47,7 +48,8 @@ def scene_of(state: ViewState) -> Scene:
     The pose of ``/robot/link_i`` is that of link i in base_link, of ``/frames/dh_i`` that of DH frame i. What stands
     in base_link is below ``IN_BASE_LINK``, which have the pose of base_link in the world.
     """
-    return dict(_items(state))
+    items = dict(_items(state))
+    return items if Part.SHADING in state.shown else {name: _plain(item) for name, item in items.items()}
 
 
 def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
@@ -74,6 +76,10 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
         yield "/trace", Path(points=state.trace, color=_TRACE_COLOR, width=3.0)
     if Part.GRID in state.shown:
         yield from _grid(size_of(state.model)).items()
+
+
+def _plain(item: Item) -> Item:
+    return replace(item, plain=True) if isinstance(item, Solid) else item
 
 
 def _base_link(state: ViewState) -> Placed:

@@ -44,8 +44,14 @@ class Part(StrEnum):
     TRACE = "trace"
     GHOST = "ghost"
     GRID = "grid"
+    SHADING = "shading"
+    """Surfaces with soft lights, rather than in a few steps, which a browser without a graphics card draws faster."""
     HANDLE = "handle"
     """To drag tool0 by."""
+
+
+INITIALLY: Final = frozenset({Part.SHAPES, Part.FRAMES, Part.FRAME_NAMES, Part.GRID, Part.GHOST, Part.SHADING})
+"""What a page shows at first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,7 +145,7 @@ class ViewState:
     """Row and column of the cell that the last edit was typed into."""
     target: tuple[float, ...] | None = None
     """Where a simulation's actuators hold the joints; None where there is no simulation."""
-    shown: frozenset[Part] = frozenset({Part.SHAPES, Part.FRAMES, Part.FRAME_NAMES, Part.GRID, Part.GHOST})
+    shown: frozenset[Part] = INITIALLY
     selected_row: int = 0
     """Row of the table that is explained, from 0."""
     angle: AngleUnit = AngleUnit.DEG

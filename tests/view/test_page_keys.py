@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from dh2sim.robot.load import load_robot
+from dh2sim.view.extent import eye_of
 from dh2sim.view.opening import open_state
 from dh2sim.view.page import Page as ServedPage
 from tests.view.on_page import Serve, choose, field, open_tab, shown, wait_for_position, wait_until
@@ -75,3 +76,25 @@ def test_a_key_moves_a_sliding_joint_by_a_hundredth_of_its_travel(serve: Serve) 
         expected[2] -= 0.0127
         press(page, "7", served, expected)
     wait_for_position(page, STANFORD, expected)
+
+
+def test_an_arrow_held_at_a_slider_moves_the_joint_and_not_the_eye(serve: Serve) -> None:
+    page, served = serve(open_state(STANFORD))
+    camera = served.client.camera
+    wait_until(lambda: camera.aspect < 1.0, "the panel is beside the scene")
+    wait_until(
+        lambda: np.allclose(camera.position, eye_of(served.state.model, camera.aspect).position, atol=1e-6),
+        "the eye is where it begins",
+    )
+    eye = camera.position.copy()
+    page.get_by_role("slider").first.focus()
+    page.keyboard.down("ArrowRight")
+    page.wait_for_timeout(1000)  # viser would turn the eye by 50 degrees
+    page.keyboard.up("ArrowRight")
+    wait_until(lambda: served.state.q[0] > STANFORD.configurations["home"][0], "the joint moves")
+    page.wait_for_timeout(500)
+    assert np.allclose(camera.position, eye, rtol=0, atol=1e-6)
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.down("ArrowRight")
+    wait_until(lambda: not np.allclose(camera.position, eye, rtol=0, atol=0.1), "it turns elsewhere")
+    page.keyboard.up("ArrowRight")

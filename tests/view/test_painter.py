@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -92,6 +93,17 @@ def test_what_looks_different_is_exchanged_under_its_name(scene: viser.SceneApi)
     handle = scene.get_handle_by_name("/a/b")
     assert handle is not None
     assert tuple(handle.color) == (0, 255, 0)  # type: ignore[attr-defined]
+
+
+def test_plain_solids_are_shaded_in_steps(scene: viser.SceneApi) -> None:
+    painter = Painter(scene)
+    materials = []
+    for plain in (False, True):
+        painter.draw({"/a": replace(triangle(), plain=plain)})
+        handle = scene.get_handle_by_name("/a")
+        assert handle is not None
+        materials.append(handle.material)  # type: ignore[attr-defined]
+    assert materials == ["standard", "toon5"]
 
 
 def test_what_is_gone_is_removed_with_all_below_it(scene: viser.SceneApi) -> None:

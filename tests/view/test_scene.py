@@ -96,6 +96,16 @@ def test_the_row_that_is_chosen_is_explained_inside_a_robot_that_can_be_seen_thr
     assert all(item.opacity < 0.5 for item in explained.values() if isinstance(item, Solid))
 
 
+def test_without_soft_shading_surfaces_are_plain_and_nothing_else_changes() -> None:
+    compared = after(STANFORD, CompareReading())
+    soft, plain = scene_of(compared), scene_of(after(compared, Show(part=Part.SHADING, on=False)))
+    solids = {name for name, item in soft.items() if isinstance(item, Solid)}
+    assert {name.split("/")[1] for name in solids} == {"robot", "ghost"}
+    assert {name for name in soft if soft[name] != plain[name]} == solids
+    assert all(item.plain for item in plain.values() if isinstance(item, Solid))
+    assert not any(item.plain for item in soft.values() if isinstance(item, Solid))
+
+
 def test_the_ghost_stands_where_the_other_reading_puts_it() -> None:
     state = after(STANFORD, CompareReading(), MoveJoint(joint=1, value=0.3))
     assert state.ghost is not None

@@ -28,8 +28,19 @@ KEYS: Final = tuple(
 """Of joints 1 to 7: the rows of a keyboard's number block, then of its letters."""
 
 
+ARROWS_ARE_THE_SLIDERS: Final = """<img hidden src="data:," onerror="
+if (!document.body.dataset.dh2sim) {
+    document.body.dataset.dh2sim = 'arrows';
+    document.body.addEventListener('keydown', (event) => {
+        if (event.key.startsWith('Arrow') && event.target.closest('[role=slider]')) event.stopPropagation();
+    });
+}">"""
+"""viser turns the eye at arrow keys, also at those that move a slider; by here the slider has seen them."""
+
+
 def add_keys(client: viser.ClientHandle, send: Send) -> None:
     """Make a page listen to the keys; they do nothing while the user types into a field."""
+    client.gui.add_html(ARROWS_ARE_THE_SLIDERS)
     for joint, pair in enumerate(KEYS):
         _add(client, send, pair.down, joint, -1)
         _add(client, send, pair.up, joint, 1)

@@ -29,9 +29,9 @@ _WORDS = {
     Part.GHOST: "Ghost",
     Part.HANDLE: "Handle to drag tool0",
     Part.GRID: "Grid",
+    Part.SHADING: "Soft shading",
 }
-
-
+_HINTS = {Part.SHADING: "Without it, a browser that has no graphics card draws twice as fast"}
 _NOBODY, _MISREAD = "nobody", "the table misread"
 
 
@@ -48,7 +48,11 @@ class ShowTab:
     ) -> None:
         """Add the widgets to viser's current container."""
         self._boxes = {
-            part: bind(client.gui.add_checkbox(words, part in state.shown), send, partial(_event, part))
+            part: bind(
+                client.gui.add_checkbox(words, part in state.shown, hint=_HINTS.get(part)),
+                send,
+                partial(_event, part),
+            )
             for part, words in _WORDS.items()
         }
         self._always = (_NOBODY, _MISREAD, *builtin_robots())
