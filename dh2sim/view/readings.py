@@ -38,7 +38,10 @@ class Readings:
     T. Yoshikawa, Manipulability of robotic mechanisms, Int. J. Robotics Research 4(2), 1985.
     """
     smallest_singular_value: float
-    """Of J, in m and rad; zero where tool0 cannot move in as many directions as elsewhere."""
+    """Of J, in m and rad: how far J is from a matrix of lower rank, in the spectral norm; zero at a singularity.
+
+    G. H. Golub and C. F. Van Loan, Matrix Computations, 4th edition, section 2.4.
+    """
 
 
 def readings_of(state: ViewState) -> Readings:

@@ -20,12 +20,10 @@ def remembered(before: ViewState, event: Event, after: ViewState) -> ViewState:
 
     What is typed into one cell, letter by letter, is one edit. Another file begins anew.
     """
-    if isinstance(event, Undo | OpenText):
+    if isinstance(event, Undo | OpenText) or after.text == before.text:
         return after
     cell = (event.row, event.column) if isinstance(event, EditCell) else None
-    if after.text == before.text:
-        return replace(after, typed=cell) if cell is not None and cell != before.typed else after
-    if cell is not None and cell == before.typed and before.earlier:
+    if cell is not None and cell == before.typed:
         return after
     return replace(after, earlier=_bounded((*before.earlier, before.text)), typed=cell)
 

@@ -66,6 +66,11 @@ def window(browser: Browser, drawn: bool) -> Iterator[BrowserContext]:
     context.close()
 
 
+def wait_for_panel(page: Page) -> None:
+    """Wait until a page has all that its panel is made of, keys included: a pose is shown after these."""
+    page.locator('[data-dh2sim="readout"] td').first.wait_for()
+
+
 @pytest.fixture
 def open_page(window: BrowserContext, viewer: Viewer) -> Iterator[Callable[[], Page]]:
     """Opens pages of the viewer, which are closed when the test ends."""
@@ -74,7 +79,7 @@ def open_page(window: BrowserContext, viewer: Viewer) -> Iterator[Callable[[], P
     def opened() -> Page:
         pages.append(window.new_page())
         pages[-1].goto(viewer.url)
-        pages[-1].get_by_role("tab", name="Joints").wait_for()
+        wait_for_panel(pages[-1])
         return pages[-1]
 
     yield opened
@@ -93,7 +98,7 @@ def serve(window: BrowserContext) -> Iterator[Serve]:
             page = window.new_page()
             stack.callback(page.close)
             page.goto(server.url)
-            page.get_by_role("tab", name="Joints").wait_for()
+            wait_for_panel(page)
             (serving,) = server.pages
             return page, serving
 

@@ -65,6 +65,13 @@ def test_what_is_wrong_is_no_edit_and_its_mark_goes_with_the_edit_before() -> No
     assert (back.text, back.draft.complaints) == (STANFORD.text, ())
 
 
+def test_what_is_typed_into_a_cell_after_something_wrong_is_an_edit_of_its_own() -> None:
+    first = after(STANFORD, cell("0.1"))
+    second = after(first, cell("90 +", row=1, column="alpha"), cell("45", row=1, column="alpha"))
+    assert second.earlier == (STANFORD.text, first.text)
+    assert after(second, Undo()).text == first.text
+
+
 def test_joints_and_the_chosen_row_stay_where_they_are() -> None:
     state = after(STANFORD, cell("0.1", row=3), SelectRow(row=3))
     moved = replace(state, q=(0.1, *state.q[1:]))

@@ -92,7 +92,7 @@ def pose_lines(readings: Readings, angle: AngleUnit) -> list[tuple[str, str]]:
 def _of_jacobian(readings: Readings) -> list[tuple[str, str]]:
     return [
         ("manipulability of tool0", f"{readings.manipulability:.6g}"),
-        ("smallest singular value", f"{readings.smallest_singular_value:.6g}"),
+        ("distance to singularity", f"{readings.smallest_singular_value:.6g}"),
     ]
 
 

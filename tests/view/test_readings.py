@@ -1,0 +1,80 @@
+"""What is told of a pose and a Jacobian, against the table and its differences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.load import load_robot
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.typing import Array
+from dh2sim.view.events import ChooseFrame, RandomConfiguration, SetJoints
+from dh2sim.view.opening import open_state
+from dh2sim.view.readings import readings_of
+from dh2sim.view.reduce import reduce
+
+
+def jacobian_by_differences(spec: RobotSpec, q: tuple[float, ...], step: float = 1e-5) -> Array:
+    """The geometric Jacobian of tool0 in base_link, shape (6, n), out of the table alone."""
+    columns = []
+    here = table_tool_pose(spec, q)
+    for k in range(len(q)):
+        ahead, behind = (
+            table_tool_pose(spec, [value + sign * step * (i == k) for i, value in enumerate(q)]) for sign in (1, -1)
+        )
+        velocity = (ahead[:3, 3] - behind[:3, 3]) / (2.0 * step)
+        spin = (ahead[:3, :3] - behind[:3, :3]) @ here[:3, :3].T / (2.0 * step)
+        columns.append([*velocity, spin[2, 1], spin[0, 2], spin[1, 0]])
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize("robot", builtin_robots())
+def test_manipulability_and_distance_to_singularity_are_those_of_the_table(robot: str) -> None:
+    spec = load_robot(robot)
+    state = reduce(open_state(spec), RandomConfiguration(seed=3))
+    told, J = readings_of(state), jacobian_by_differences(spec, state.q)
+    gram = J @ J.T if J.shape[1] >= 6 else J.T @ J
+    size = max(1.0, state.model.reach) ** 3
+    assert told.manipulability == pytest.approx(math.sqrt(max(np.linalg.det(gram), 0.0)), abs=1e-6 * size)
+    least = math.sqrt(max(float(np.linalg.eigvalsh(gram)[0]), 0.0))
+    assert told.smallest_singular_value == pytest.approx(least, abs=1e-5 * size)
+
+
+def test_where_the_wrist_is_stretched_there_is_no_distance_to_singularity() -> None:
+    spec = load_robot("stanford")
+    bent = readings_of(reduce(open_state(spec), SetJoints(q=(0.3, 0.5, 0.4, 0.2, 0.9, 0.1))))
+    stretched = readings_of(reduce(open_state(spec), SetJoints(q=(0.3, 0.5, 0.4, 0.2, 0.0, 0.1))))
+    assert bent.smallest_singular_value > 0.01
+    assert bent.manipulability > 0.01
+    assert stretched.smallest_singular_value < 1e-12
+    assert stretched.manipulability < 1e-12
+
+
+@pytest.mark.parametrize("frame", ["dh_0", "dh_3", "tool0"])
+def test_a_pose_is_told_in_three_ways_that_agree_with_the_table(frame: str) -> None:
+    spec = load_robot("stanford")
+    state = reduce(reduce(open_state(spec), RandomConfiguration(seed=5)), ChooseFrame(name=frame))
+    frames = table_frame_poses(spec, state.q)
+    expected = table_tool_pose(spec, state.q) if frame == "tool0" else frames[int(frame.removeprefix("dh_"))]
+    told = readings_of(state)
+    assert np.allclose(told.T_base_frame, expected, rtol=0, atol=1e-12)
+    assert np.allclose(told.xyz, expected[:3, 3], rtol=0, atol=1e-12)
+    # rpy: about the fixed axes x, y and z in turn, as URDF has it; quaternion: the scalar first
+    turns = [turn_about(axis, angle) for axis, angle in enumerate(told.rpy)]
+    assert np.allclose(turns[2] @ turns[1] @ turns[0], expected[:3, :3], rtol=0, atol=1e-12)
+    w, *vector = told.quaternion
+    v, cross = np.array(vector), np.cross(np.eye(3), vector)
+    assert np.allclose((w * w - v @ v) * np.eye(3) + 2.0 * np.outer(v, v) + 2.0 * w * cross, expected[:3, :3])
+
+
+def turn_about(axis: int, angle: float) -> Array:
+    """The rotation about x, y or z."""
+    T, i, j = np.eye(3), (axis + 1) % 3, (axis + 2) % 3
+    T[i, i] = T[j, j] = math.cos(angle)
+    T[j, i] = math.sin(angle)
+    T[i, j] = -T[j, i]
+    return T
