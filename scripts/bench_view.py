@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from scripts.bench_view_pages import OPTIONS, click, opened, program
+from scripts.bench_view_pages import OPTIONS, choose_plain_shading, click, opened, program
 from scripts.bench_view_probes import FIRST_PICTURE, FRAMES, NO_DRAWING, NUMBERS, POSES
 
 if TYPE_CHECKING:
@@ -95,8 +95,14 @@ def _first_pictures(browser: Browser) -> Iterator[Row]:
 def _delays(browser: Browser) -> Iterator[Row]:
     """From the key that moves a slider to the robot's pose, as the page's own clock has it."""
     with program() as (_process, url):
-        for scripts, words in (((POSES,), ", drawn in software"), ((POSES, NO_DRAWING), ", drawing left out")):
+        for words, scripts, soft in (
+            (", drawn in software", (POSES,), True),
+            (", drawn in software without soft shading", (POSES,), False),
+            (", drawing left out", (POSES, NO_DRAWING), True),
+        ):
             page = opened(browser, url, *scripts)
+            if not soft:
+                choose_plain_shading(page)
             posed, painted, told = _slider_delays(page)
             page.context.close()
             yield _row(f"view: slider to the robot's pose{words}", posed, 50.0)

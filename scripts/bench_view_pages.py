@@ -42,6 +42,13 @@ def opened(browser: Browser, url: str, *scripts: str) -> Page:
     return page
 
 
+def choose_plain_shading(page: Page) -> None:
+    """Let surfaces be drawn in the way that is faster without a graphics card."""
+    _tab(page, "Show")
+    page.get_by_text("Soft shading", exact=True).click()
+    _tab(page, "Joints")
+
+
 def click(page: Page, rng: random.Random, seconds: float) -> int:
     """Do anything, for so long; return how often. Every page is left for a new one now and then."""
     end, count = time.monotonic() + seconds, 0
