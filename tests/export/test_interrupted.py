@@ -52,6 +52,21 @@ def _start(*command: str | Path, cwd: Path | None = None) -> subprocess.Popen[st
     )
 
 
+def _pressed_until_ended(process: subprocess.Popen[str], kind: signal.Signals) -> tuple[str, bool]:
+    """Send a signal until a process has ended; return what it told, and whether once was enough.
+
+    Python drops what a signal raises while a library's compiled code calls back: then users press Ctrl-C again.
+    """
+    for attempt in range(6):
+        process.send_signal(kind)
+        try:
+            return process.communicate(timeout=10)[1], attempt == 0
+        except subprocess.TimeoutExpired:
+            continue
+    process.kill()
+    pytest.fail(f"it does not end: {process.communicate()[1]}")
+
+
 def _versions(folder: Path) -> list[tuple[Path, dict[str, bytes]]]:
     """Two versions of a robot file, and what an undisturbed export makes of each."""
     made = []
@@ -75,8 +90,7 @@ def test_an_export_cut_off_at_any_moment_leaves_whole_files(tmp_path: Path, kind
         assert process.stdout is not None
         process.stdout.readline()  # the first set stands
         time.sleep(rng.uniform(0.0, 0.02))
-        process.send_signal(kind)
-        told = process.communicate(timeout=30)[1]
+        told, heeded = _pressed_until_ended(process, kind)
         stands = {name: data for name, data in contents(out).items() if not name.startswith(".")}
         if kind is signal.SIGKILL:  # which nothing can put off: each file by itself is whole
             assert set(stands) == set(versions[0][1])
@@ -85,7 +99,7 @@ def test_an_export_cut_off_at_any_moment_leaves_whole_files(tmp_path: Path, kind
             assert stands in [made for _, made in versions]
         if kind is signal.SIGINT:
             assert process.returncode == INTERRUPTED
-            assert told == ""
+            assert told == "" or not heeded
             assert [path.name for path in out.iterdir()] == ["small"], "the temporary folder is removed"
 
 
