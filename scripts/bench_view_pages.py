@@ -69,7 +69,9 @@ def click(page: Page, rng: random.Random, seconds: float) -> int:
             case "cell":
                 _tab(page, "Table")
                 _choose(page, "Edit row", rng.randrange(6))
-                _field(page, rng.choice("aαdθ")).fill(rng.choice(("0", "0.1", "90", "pi/2", "d2", "-45", "90 +")))
+                _field(page, rng.choice("aαdθ") + "[₀-₉]+").fill(
+                    rng.choice(("0", "0.1", "90", "pi/2", "d2", "-45", "90 +"))
+                )
             case "convention":
                 _tab(page, "Table")
                 _choose(page, "convention", rng.randrange(3))
@@ -91,6 +93,6 @@ def _choose(page: Page, label: str, number: int) -> None:
 
 
 def _field(page: Page, label: str) -> Locator:
-    """What can be typed into beside a label."""
-    name = page.locator("label", has_text=re.compile(f"^{re.escape(label)}$")).locator("visible=true")
+    """What can be typed into beside a label, a regular expression."""
+    name = page.locator("label", has_text=re.compile(f"^{label}$")).locator("visible=true")
     return name.locator("xpath=ancestor::*[.//input[not(@type='hidden')]][1]//input[not(@type='hidden')]").first

@@ -15,8 +15,9 @@ from dh2sim.robot.spec import Convention, RobotSpec
 from dh2sim.robot.units import AngleUnit
 from dh2sim.typing import Array
 from dh2sim.view.annotations_marks import label_place, step_marks, vector
-from dh2sim.view.annotations_steps import Quantity, Step, row_steps, subscript
+from dh2sim.view.annotations_steps import Step, row_steps
 from dh2sim.view.items import Color, Item, Label, Path, Scene
+from dh2sim.view.notation import Quantity, subscript
 
 COLORS: Final[Mapping[Quantity, Color]] = MappingProxyType(
     {

@@ -4,40 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 from numpy.typing import ArrayLike
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import frame_poses
 from dh2sim.kinematics.transforms import compose, joint_part, link_part, second_twist
-from dh2sim.robot.spec import Convention, RobotSpec, Row
+from dh2sim.robot.spec import Convention, RobotSpec
 from dh2sim.robot.units import AngleUnit
 from dh2sim.typing import Array, read_only
+from dh2sim.view.notation import Quantity, symbol
 
 NOTHING = 1e-9
 """m or rad: what is smaller is rounding, as 0.3 * cos(pi / 2) is; it is told as 0 and not drawn."""
-_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-
-
-class Quantity(StrEnum):
-    """A column of the table."""
-
-    A = "a"
-    ALPHA = "alpha"
-    D = "d"
-    THETA = "theta"
-    BETA = "beta"
-
-    @property
-    def turns(self) -> bool:
-        """Whether it is an angle."""
-        return self not in (Quantity.A, Quantity.D)
-
-    @property
-    def axis(self) -> int:
-        """Of the frame at hand, about or along which it goes: 0 for x, 1 for y, 2 for z."""
-        return {Quantity.A: 0, Quantity.ALPHA: 0, Quantity.BETA: 1}.get(self, 2)
 
 
 ORDER = {
@@ -46,7 +25,6 @@ ORDER = {
     Convention.HAYATI: (Quantity.THETA, Quantity.D, Quantity.A, Quantity.ALPHA, Quantity.BETA),
 }
 """In which order a row of each convention goes from frame i - 1 to frame i."""
-_LETTERS = {Quantity.ALPHA: "α", Quantity.THETA: "θ", Quantity.BETA: "β"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,8 +32,8 @@ class Step:
     """A step of a row; it leads from one frame to the next."""
 
     quantity: Quantity
-    index: int
-    """That the quantity carries: of the row, from 1, or one less for a and alpha of a modified row."""
+    symbol: str
+    """Letter and index, such as ``a₂``."""
     value: float
     """m or rad, with the joint coordinate."""
     moves: bool
@@ -72,8 +50,7 @@ class Step:
 
     def text(self, unit: AngleUnit) -> str:
         """Return name, index and value, such as ``a₂ = 0.4318 m``; a star marks what moves."""
-        letter = _LETTERS.get(self.quantity, self.quantity.value)
-        return f"{letter}{subscript(self.index)}{'*' if self.moves else ''} = {self._told(unit)}"
+        return f"{self.symbol}{'*' if self.moves else ''} = {self._told(unit)}"
 
     def _told(self, unit: AngleUnit) -> str:
         if not self.moves and not self.is_drawn:
@@ -108,20 +85,10 @@ def row_steps(spec: RobotSpec, chain: KinematicChain, row: int, q: ArrayLike) ->
         moves = entry.type.moves and quantity is (Quantity.THETA if entry.type.turns else Quantity.D)
         value = getattr(entry, quantity.value) + (coordinate if moves else 0.0)
         T_after = compose(T, _transform(quantity, value))
-        index = _index(entry, quantity, row)
-        steps.append(Step(quantity=quantity, index=index, value=value, moves=moves, T_before=T, T_after=T_after))
+        name = symbol(quantity, entry.convention, row)
+        steps.append(Step(quantity=quantity, symbol=name, value=value, moves=moves, T_before=T, T_after=T_after))
         T = T_after
     return tuple(steps)
-
-
-def subscript(number: int) -> str:
-    """Return a number in small figures below the line."""
-    return str(number).translate(_SUBSCRIPTS)
-
-
-def _index(row: Row, quantity: Quantity, number: int) -> int:
-    before = row.convention is Convention.MODIFIED and quantity in (Quantity.A, Quantity.ALPHA)
-    return number if before else number + 1
 
 
 def _coordinate(spec: RobotSpec, row: int, q: ArrayLike) -> float:

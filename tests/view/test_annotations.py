@@ -15,8 +15,8 @@ from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 from dh2sim.robot.units import AngleUnit
 from dh2sim.typing import Array
 from dh2sim.view.annotations import COLORS, LABEL_HEIGHT, LABEL_WIDTH, row_annotations
-from dh2sim.view.annotations_steps import Quantity
 from dh2sim.view.items import Arrow, Item, Label, Path, Scene
+from dh2sim.view.notation import Quantity
 from tests.kinematics.robots import HAYATI, MODIFIED, ODD_ARM, STANDARD, row
 from tests.robots.samples import robot
 from tests.strategies import robots_with_joint_vectors

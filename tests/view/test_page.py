@@ -67,7 +67,7 @@ def test_the_pose_is_shown_in_every_form_beside_that_of_mujoco(open_page: OpenPa
 def test_files_are_handed_out_as_edited_and_the_model_matches_the_table(open_page: OpenPage, tmp_path: Path) -> None:
     page = open_page()
     open_tab(page, "Table")
-    field(page, "a").fill("0.123")
+    field(page, "a₁").fill("0.123")
     wait_until(lambda: "0.123" in shown(page, "table"), "the cell")
     open_tab(page, "Files")
     with page.expect_download() as saved:

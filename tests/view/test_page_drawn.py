@@ -60,22 +60,23 @@ def test_the_table_is_edited_marked_read_another_way_and_taken_back(open_page: O
     page, spec = open_page(), load_robot("stanford")
     open_tab(page, "Table")
     choose(page, "Edit row", "2: joint_2")
-    field(page, "d").fill("d2 + 0.1")
+    field(page, "d₂").fill("d2 + 0.1")
     wait_until(lambda: "d2 + 0.1" in shown(page, "table"), "the cell")
     open_tab(page, "Joints")
     edited = parse_robot(spec.source_file.text.replace("d: d2", "d: 0.25"))  # type: ignore[union-attr]
     wait_for_position(page, edited, HOME)
     open_tab(page, "Table")
-    field(page, "α").fill("90 +")
+    field(page, "α₂").fill("90 +")
     wait_until(lambda: "it ends too early" in shown(page, "complaint"), "the complaint")
     assert shown(page, "notice") == "The robot is the one of before: joints[1].alpha: in '90 +': it ends too early"
     page.screenshot(path=tmp_path / "table.png")
     open_tab(page, "Joints")
     wait_for_position(page, edited, HOME)
     open_tab(page, "Table")
-    field(page, "α").fill("pi / pi * 45")
+    field(page, "α₂").fill("pi / pi * 45")
     choose(page, "convention", "modified")
     wait_until(lambda: "modified" in shown(page, "table"), "the convention")
+    assert field(page, "α₁").input_value() == "pi / pi * 45", "its index in this convention"
     open_tab(page, "Joints")
     text = edited.source_file.text.replace(  # type: ignore[union-attr]
         "alpha: 90, d: 0.25", "alpha: 45, d: 0.25, convention: modified"

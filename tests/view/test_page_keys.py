@@ -59,7 +59,7 @@ def test_keys_typed_into_a_field_move_nothing(serve: Serve) -> None:
     wait_for_position(page, SSRMS, [math.radians(149.7), *home[1:]])
     open_tab(page, "Table")
     choose(page, "Edit row", "2: joint_2")
-    field(page, "α").click()
+    field(page, "α₂").click()
     page.keyboard.type("147rfvgGyhn")
     wait_until(lambda: "147rfvgGyhn" in shown(page, "table"), "the cell")
     assert served.state.q[1:] == pytest.approx(home[1:], abs=1e-12)

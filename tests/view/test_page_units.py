@@ -29,12 +29,12 @@ def test_the_table_is_written_in_radians_and_millimetres_and_the_robot_stays(ser
     open_tab(page, "Table")
     page.get_by_text("Whole table").click()
     choose(page, "Edit row", "2: joint_2")
-    wait_until(lambda: field(page, "α").input_value() == "90", "degrees")
+    wait_until(lambda: field(page, "α₂").input_value() == "90", "degrees")
     choose(page, "Angles in", "rad")
-    wait_until(lambda: field(page, "α").input_value() == "1.5707963267948966", "radians")
+    wait_until(lambda: field(page, "α₂").input_value() == "1.5707963267948966", "radians")
     choose(page, "Lengths in", "mm")
     millimetres = f"{1000.0 * STANFORD.rows[1].d:g}"
-    wait_until(lambda: field(page, "d").input_value() == millimetres, "millimetres")
+    wait_until(lambda: field(page, "d₂").input_value() == millimetres, "millimetres")
     assert shown(page, "complaint") == ""
     written = parse_robot(served.state.text)
     assert (served.state.draft.units.angle, served.state.draft.units.length) == (AngleUnit.RAD, LengthUnit.MM)

@@ -57,7 +57,7 @@ def test_a_robot_file_is_opened_a_wrong_one_is_told_of_and_the_first_comes_back(
     assert "turn" in shown(page, "table")
     assert "joint_6" not in shown(page, "table")
     page.screenshot(path=tmp_path / "opened.png")
-    field(page, "a").fill("0.75")
+    field(page, "a₁").fill("0.75")
     wait_until(lambda: "0.75" in shown(page, "table"), "it is edited")
 
     open_tab(page, "Files")

@@ -1,7 +1,8 @@
 """Widgets bound to the state: what a user does becomes an event, and the state is shown without talking back.
 
 A widget that is told what its user has just typed would undo what was typed since. So each knows the value that the
-widget has as far as events were worked through, and is told only what differs from that.
+widget has as far as events were worked through, and is told only what differs from that. Where it was told something
+after the user's event had come, and before that was worked through, it shows what it was told.
 """
 
 from __future__ import annotations
@@ -30,16 +31,20 @@ class Bound(Generic[Value]):
     handle: Any
     known: Value
     """What the widget shows, as far as events were worked through."""
+    told: int = 0
+    """How often the widget was told a value."""
 
     def show(self, value: Value) -> None:
         """Make the widget show a value."""
         if value != self.known:
             self.known = value
             self.handle.value = value
+            self.told += 1
 
-    def see(self, value: Value) -> None:
-        """Note what the user has set."""
-        self.known = value
+    def see(self, value: Value, told: int) -> None:
+        """Note what the user had set when the widget had been told a value so often."""
+        if told == self.told:
+            self.known = value
 
 
 def bind(handle: Any, send: Send, event: Callable[[Any], Event | Callable[[], None]]) -> Bound[Any]:
@@ -55,8 +60,8 @@ def bind(handle: Any, send: Send, event: Callable[[Any], Event | Callable[[], No
     async def changed(change: Any) -> None:  # async: runs on viser's own loop, so that order is kept
         if change.client is None:  # set from here, not by a user
             return
-        value = handle.value
-        send(event(value), seen=lambda: bound.see(value))
+        value, told = handle.value, bound.told
+        send(event(value), seen=lambda: bound.see(value, told))
 
     handle.on_update(changed)
     return bound

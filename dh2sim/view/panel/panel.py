@@ -51,8 +51,8 @@ class Panel:
         tabs = client.gui.add_tab_group()
         with tabs.add_tab("Joints") as joints:
             self._joints = JointsTab(client, joints, send, state)
-        with tabs.add_tab("Table"):
-            self._table = TableTab(client, send, state)
+        with tabs.add_tab("Table") as table:
+            self._table = TableTab(client, table, send, state)
         with tabs.add_tab("Pose"):
             self._pose = PoseTab(client, send, state)
         with tabs.add_tab("Motion"):

@@ -7,35 +7,31 @@ from typing import TYPE_CHECKING, Any
 
 from dh2sim.robot.spec import Convention
 from dh2sim.robot.units import AngleUnit, LengthUnit
-from dh2sim.view.events import ConvertTable, EditCell, SelectRow, SetConvention, SetUnits, Show, Undo
-from dh2sim.view.panel import markup
+from dh2sim.view.events import ConvertTable, SelectRow, SetConvention, SetUnits, Show, Undo
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
+from dh2sim.view.panel.row_editor import RowEditor
 from dh2sim.view.panel.table_text import overview
-from dh2sim.view.state import COLUMNS, CONVENTION, Complaint, Part, ViewState
+from dh2sim.view.state import Part, ViewState
 
 if TYPE_CHECKING:
     import viser
-
-LETTERS = {"a": "a", "alpha": "α", "d": "d", "theta": "θ", "beta": "β", CONVENTION: "convention"}
 
 
 class TableTab:
     """An overview, and an editor of the row that is chosen."""
 
-    def __init__(self, client: viser.ClientHandle, send: Send, state: ViewState) -> None:
-        """Add the widgets to viser's current container."""
+    def __init__(self, client: viser.ClientHandle, tab: viser.GuiTabHandle, send: Send, state: ViewState) -> None:
+        """Add the widgets to a tab, viser's current container."""
         self._gui = client.gui
+        self._tab = tab
         self._send = send
         self._shown: object = None
-        self._row = 0
-        """Of the editor; of which its widgets' events are."""
         self._overview = self._gui.add_html("")
         self._rows = _names(state)
         chooser = self._gui.add_dropdown("Edit row", self._rows)
-        self._chooser = bind(chooser, send, lambda label: SelectRow(row=self._rows.index(label)))
-        self._cells = {column: self._cell(column) for column in COLUMNS}
-        self._convention = self._convention_of_row()
-        self._complaint = self._gui.add_html("")
+        self._chooser = bind(chooser, send, self._selected)
+        self._edited = _identity(state)
+        self._editor = self._editor_of_row(state)
         self._undo = self._gui.add_button("Undo", disabled=True, hint="Takes the last edit of the table back")
         on_click(self._undo, send, Undo)
         self._explain = bind(
@@ -56,29 +52,24 @@ class TableTab:
         if _names(state) != self._rows:
             self._rows = self._chooser.handle.options = _names(state)
         self._chooser.show(self._rows[state.selected_row])
-        self._row = state.selected_row
-        row = state.draft.rows[self._row]
-        for (column, cell), text in zip(self._cells.items(), row.cells, strict=True):
-            cell.show(text)
-            marked = state.draft.complaint(self._row, column) is not None
-            cell.handle.visible = marked or _is_used(column, row.convention)
-        self._convention.show(row.convention.value)
-        self._complaint.content = markup.note(_complaints(state, self._row), wrong=True, name="complaint")
+        if _identity(state) != self._edited:
+            self._edited = _identity(state)
+            self._editor.remove()
+            with self._tab:
+                self._editor = self._editor_of_row(state)
+        self._editor.show(state)
         if self._undo.disabled == bool(state.earlier):
             self._undo.disabled = not state.earlier
         self._explain.show(Part.ANNOTATIONS in state.shown)
         self._angle.show(state.draft.units.angle.value)
         self._length.show(state.draft.units.length.value)
 
-    def _cell(self, column: str) -> Bound[str]:
-        widget = self._gui.add_text(LETTERS[column], "", hint="A number, or an expression such as pi/2 or d1 + 0.1")
-        return bind(widget, self._send, lambda text: EditCell(row=self._row, column=column, text=text))
+    def _editor_of_row(self, state: ViewState) -> RowEditor:
+        return RowEditor(self._gui, self._send, state, state.selected_row, self._chooser.handle.order)
 
-    def _convention_of_row(self) -> Bound[str]:
-        names = [convention.value for convention in Convention]
-        hint = "Reads the same numbers another way: the robot becomes another one"
-        widget = self._gui.add_dropdown("convention", names, hint=hint)
-        return bind(widget, self._send, lambda name: SetConvention(row=self._row, convention=Convention(name)))
+    def _selected(self, label: str) -> SelectRow:
+        """Return what a choice stands for; one of a robot that is gone meanwhile, for a row that there is not."""
+        return SelectRow(row=self._rows.index(label) if label in self._rows else -1)
 
     def _add_whole(self, state: ViewState) -> None:
         """Add what concerns all rows."""
@@ -113,14 +104,6 @@ def _names(state: ViewState) -> tuple[str, ...]:
     return tuple(f"{i}: {row.name}" for i, row in enumerate(state.draft.rows, start=1))
 
 
-def _is_used(column: str, convention: Convention) -> bool:
-    return column != "beta" or convention is Convention.HAYATI
-
-
-def _complaints(state: ViewState, row: int) -> str:
-    ours = [found for found in state.draft.complaints if found.row == row]
-    return "<br>".join(_complaint(found) for found in ours)
-
-
-def _complaint(found: Complaint) -> str:
-    return f"<b>{LETTERS[found.column]}</b>: {markup.text(found.message)}"
+def _identity(state: ViewState) -> object:
+    """Return what makes fields those of a row: the robot, its rows, and which is chosen."""
+    return state.spec.name, _names(state), state.selected_row
