@@ -23,7 +23,7 @@ def main() -> None:
 
     _handle(signal.SIGINT, interrupt)
     _handle(signal.SIGTERM, _terminate)
-    sys.unraisablehook = _unraisable
+    sys.unraisablehook = interrupt_again
     try:
         _prepare_streams()
         _prepare_imports()
@@ -53,7 +53,7 @@ def _terminate(number: int, _frame: FrameType | None) -> None:
     raise SystemExit(128 + number)
 
 
-def _unraisable(error: sys.UnraisableHookArgs) -> None:
+def interrupt_again(error: sys.UnraisableHookArgs) -> None:
     """Interrupt once more where an interruption came to nothing, as in a callback of the garbage collector."""
     if isinstance(error.exc_value, KeyboardInterrupt):
         threading.Timer(0.01, _thread.interrupt_main).start()
