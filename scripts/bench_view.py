@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from scripts.bench_view_pages import OPTIONS, choose_plain_shading, click, opened, program
+from scripts.bench_view_pages import OPTIONS, choose_plain_shading, click, go, opened, program, window
 from scripts.bench_view_probes import FIRST_PICTURE, FRAMES, NO_DRAWING, NUMBERS, POSES
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 Row = tuple[str, str, str, bool | None]
 
 MOVES = 50
+FROM_REST = 1.0
+"""s between moves: viser draws on for a quarter of a second after anything has changed."""
 SECONDS = 8.0
 """For how long frames are counted."""
 WARM_UP = 60.0
@@ -76,12 +78,14 @@ def view(minutes: float = 2.0, parts: Sequence[str] = PARTS) -> Iterator[Row]:
 
 
 def _first_pictures(browser: Browser) -> Iterator[Row]:
-    """From the command to the robot on the screen; each time with a browser that runs, but has nothing in store."""
+    """From the command to the robot on the screen; each time in an empty window, with nothing in store."""
     paints, robots = [], []
-    for _ in range(5):
+    for _ in range(7):
+        page = window(browser, FIRST_PICTURE)
+        time.sleep(2.0)  # the browser is done with the window before
         start = time.time()
         with program() as (_process, url):
-            page = opened(browser, url, FIRST_PICTURE)
+            go(page, url)
             page.wait_for_function("() => window.robotShown !== undefined")
             robots.append(1e-3 * page.evaluate("() => window.robotShown") - start)
             paints.append(1e-3 * page.evaluate(FIRST_PAINT) - start)
@@ -93,24 +97,28 @@ def _first_pictures(browser: Browser) -> Iterator[Row]:
 
 
 def _delays(browser: Browser) -> Iterator[Row]:
-    """From the key that moves a slider to the robot's pose, as the page's own clock has it."""
+    """From the key that moves a slider to the robot's pose, as the page's own clock has it.
+
+    Of a move from rest, and of one on the heels of another, which waits until the pictures of that are drawn.
+    """
     with program() as (_process, url):
         for words, scripts, soft in (
             (", drawn in software", (POSES,), True),
             (", drawn in software without soft shading", (POSES,), False),
             (", drawing left out", (POSES, NO_DRAWING), True),
         ):
-            page = opened(browser, url, *scripts)
-            if not soft:
-                choose_plain_shading(page)
-            posed, painted, told = _slider_delays(page)
-            page.context.close()
-            yield _row(f"view: slider to the robot's pose{words}", posed, 50.0)
-            yield _row(f"view: slider to the frame after it{words}", painted, None)
-            yield _row(f"view: slider to the pose in numbers{words}", told, None)
+            for when, pause in (("from rest", FROM_REST), ("5 moves a second", 0.2)):
+                page = opened(browser, url, *scripts)
+                if not soft:
+                    choose_plain_shading(page)
+                posed, painted, told = _slider_delays(page, pause)
+                page.context.close()
+                yield _row(f"view: slider to the robot's pose, {when}{words}", posed, 50.0)
+                yield _row(f"view: slider to the frame after it, {when}{words}", painted, None)
+                yield _row(f"view: slider to the pose in numbers, {when}{words}", told, None)
 
 
-def _slider_delays(page: Page) -> tuple[list[float], list[float], list[float]]:
+def _slider_delays(page: Page, pause: float) -> tuple[list[float], list[float], list[float]]:
     time.sleep(3.0)  # the fading in of the first picture
     page.get_by_role("slider").first.focus()
     told = []
@@ -118,7 +126,7 @@ def _slider_delays(page: Page) -> tuple[list[float], list[float], list[float]]:
         page.evaluate(NUMBERS)
         page.keyboard.press("ArrowRight")  # on and on: to poses where it was not before
         told.append(page.evaluate("() => window.moved"))
-        time.sleep(0.2)
+        time.sleep(pause)
     posed, painted = page.evaluate("() => [window.posed, window.painted]")
     return posed[5:], painted[5:], told[5:]  # without the first, which are slower
 

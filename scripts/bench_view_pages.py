@@ -34,12 +34,23 @@ def program() -> Iterator[tuple[subprocess.Popen[str], str]]:
 
 def opened(browser: Browser, url: str, *scripts: str) -> Page:
     """A page in a window of its own, once its panel is there; ``scripts`` run before those of the page."""
+    page = window(browser, *scripts)
+    go(page, url)
+    return page
+
+
+def window(browser: Browser, *scripts: str) -> Page:
+    """An empty window; ``scripts`` run before those of any page in it."""
     page = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
     for script in scripts:
         page.add_init_script(script)
+    return page
+
+
+def go(page: Page, url: str) -> None:
+    """Go to the viewer, until its panel is there."""
     page.goto(url, wait_until="commit")
     page.get_by_role("tab", name="Joints").wait_for()
-    return page
 
 
 def choose_plain_shading(page: Page) -> None:
