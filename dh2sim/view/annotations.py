@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.kinematics.chain import KinematicChain
@@ -35,18 +33,6 @@ _AXIS = 3.0
 """How far axes go on beyond frames and offsets; like all that follows a share of the size that is asked for."""
 _NORMAL = 0.6
 """How far the common normal goes on beyond the axes."""
-LABEL_HEIGHT: Final = 0.45
-LABEL_WIDTH: Final = 1.6
-"""Room that a label has for itself, along base_link's z and across it."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Wish:
-    """A label and where it would best stand."""
-
-    text: str
-    color: Color
-    place: Array
 
 
 def row_annotations(
@@ -83,15 +69,14 @@ def row_annotations(
     steps = row_steps(spec, chain, row, q)
     axes, ends = _axes(steps, spec.rows[row].convention, size)
     items: dict[str, Item] = {**axes, "normal": _normal(steps, size)}
-    wishes = {}
     for step in steps:
         color = COLORS[step.quantity]
         if step.is_drawn:
             items.update(step_marks(step, color, size))
-        wishes[step.quantity.value] = _Wish(text=step.text(angle), color=color, place=label_place(step, size))
+        place = vector(label_place(step, size))
+        items[f"{step.quantity.value}_label"] = Label(position=place, text=step.text(angle), color=color)
     for name, number in (("axis_before", row), ("axis_behind", row + 1)):
-        wishes[name] = _Wish(text=f"z{subscript(number)}", color=AXIS_COLOR, place=ends[name])
-    items.update({f"{name}_label": label for name, label in _labels(wishes, size).items()})
+        items[f"{name}_label"] = Label(position=vector(ends[name]), text=f"z{subscript(number)}", color=AXIS_COLOR)
     return {f"/row/{name}": item for name, item in items.items()}
 
 
@@ -124,29 +109,3 @@ def _extended(length: float, margin: float) -> tuple[float, float]:
 def _line(T: Array, axis: int, low: float, high: float) -> Path:
     origin, way = T[:3, 3], T[:3, axis]
     return Path(points=(vector(origin + low * way), vector(origin + high * way)), color=AXIS_COLOR, width=1.0)
-
-
-def _labels(wishes: Mapping[str, _Wish], size: float) -> dict[str, Label]:
-    """Place labels one after the other; one that would cover another goes up or down base_link's z."""
-    taken: list[Array] = []
-    labels = {}
-    for name, wish in wishes.items():
-        place = next(
-            candidate for candidate in _candidates(wish.place, len(taken), size) if _is_free(candidate, taken, size)
-        )
-        taken.append(place)
-        labels[name] = Label(position=vector(place), text=wish.text, color=wish.color)
-    return labels
-
-
-def _candidates(place: Array, others: int, size: float) -> list[Array]:
-    """Return places to try, nearest first; every other label makes at most three of them useless."""
-    heights = sorted(range(-3 * others, 3 * others + 1), key=abs)
-    return [place + np.array([0.0, 0.0, k * LABEL_HEIGHT * size]) for k in heights]
-
-
-def _is_free(place: Array, taken: list[Array], size: float) -> bool:
-    return all(
-        abs(place[2] - other[2]) >= LABEL_HEIGHT * size or np.hypot(*(place - other)[:2]) >= LABEL_WIDTH * size
-        for other in taken
-    )

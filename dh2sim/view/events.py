@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 
 from dh2sim.robot.spec import Convention
 from dh2sim.robot.units import AngleUnit, LengthUnit
+from dh2sim.view.sight import Sight
 from dh2sim.view.state import Ghost, Matrix, Mode, Part, Pull
 
 
@@ -208,6 +209,13 @@ class CompareReading:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """See the scene from elsewhere."""
+
+    sight: Sight
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Tell:
     """Tell the user something; with an empty text, nothing any more."""
 
@@ -240,5 +248,6 @@ Event: TypeAlias = (
     | MoveTool
     | Compare
     | CompareReading
+    | Look
     | Tell
 )

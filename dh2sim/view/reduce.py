@@ -59,6 +59,8 @@ def _reduced(state: ViewState, event: events.Event) -> ViewState:
             return replace(state, ghost=ghost)
         case events.CompareReading():
             return replace(state, ghost=reading_of(state.model))
+        case events.Look(sight=sight):
+            return replace(state, sight=sight) if sight.is_usable else state
         case events.Tell(notice=notice):
             return replace(state, notice=notice)
         case events.SetMode(mode=mode):

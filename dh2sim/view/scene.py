@@ -15,6 +15,7 @@ from dh2sim.view.annotations import row_annotations
 from dh2sim.view.extent import size_of, triad_length
 from dh2sim.view.ghost import ghost_configuration, ghost_scene
 from dh2sim.view.items import Color, Item, Label, Lines, Path, Placed, Scene, Solid, Triad, Vector
+from dh2sim.view.labels import spread
 from dh2sim.view.pull import pull_arrow
 from dh2sim.view.solids import orientation_of, position_of, robot_solids
 from dh2sim.view.stance import stance_of
@@ -24,10 +25,11 @@ from dh2sim.view.unreached import line_to_unreached
 ROBOT: Final = "/robot"
 FRAMES: Final = "/frames"
 NAMES: Final = "/names"
+ROW: Final = "/row"
 GHOST: Final = "/ghost"
 PULL: Final = "/pull"
 UNREACHED: Final = "/unreached"
-IN_BASE_LINK: Final = (ROBOT, FRAMES, NAMES, "/row", GHOST)
+IN_BASE_LINK: Final = (ROBOT, FRAMES, NAMES, ROW, GHOST)
 """All that stands in base_link is below these; the rest, such as the trace and the grid, stands in the world."""
 _TRACE_COLOR: Final[Color] = (0.10, 0.45, 0.85)
 _GRID_COLOR: Final[Color] = (0.82, 0.84, 0.87)
@@ -49,6 +51,7 @@ def scene_of(state: ViewState) -> Scene:
     in base_link is below ``IN_BASE_LINK``, which have the pose of base_link in the world.
     """
     items = dict(_items(state))
+    items.update(_spread_labels(state, items))
     return items if Part.SHADING in state.shown else {name: _plain(item) for name, item in items.items()}
 
 
@@ -76,6 +79,15 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
         yield "/trace", Path(points=state.trace, color=_TRACE_COLOR, width=3.0)
     if Part.GRID in state.shown:
         yield from _grid(size_of(state.model)).items()
+
+
+def _spread_labels(state: ViewState, items: Scene) -> Scene:
+    """Return the labels where the eye sees all of them; those of the explained row choose their places first."""
+    if state.sight is None:
+        return {}
+    sight = state.sight.seen_from(state.T_world_base_link) if state.floats else state.sight
+    labels = {name: item for name, item in items.items() if isinstance(item, Label)}
+    return spread(labels, sight, first=[name for name in labels if name.startswith(f"{ROW}/")])
 
 
 def _plain(item: Item) -> Item:

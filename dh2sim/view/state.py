@@ -14,6 +14,7 @@ from dh2sim.model.robot_model import JointModel, RobotModel
 from dh2sim.robot.spec import Convention, JointType, RobotSpec
 from dh2sim.robot.units import AngleUnit, Units
 from dh2sim.view.items import Vector
+from dh2sim.view.sight import Sight
 
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 """A pose of shape (4, 4), as tuples, so that states compare by value."""
@@ -161,6 +162,8 @@ class ViewState:
     """Whether the simulation or the recording stands."""
     T_world_base_link: Matrix = IDENTITY
     """Where base_link is: elsewhere than at the world's origin only in a recording in which it floats."""
+    sight: Sight | None = None
+    """How the page's eye sees the scene; None where the browser has not told yet."""
     steps: int = 0
     """Single steps that were asked for since it began."""
     pull: Pull | None = None

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-from itertools import combinations
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from dh2sim.kinematics.table import table_frame_poses
 from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 from dh2sim.robot.units import AngleUnit
 from dh2sim.typing import Array
-from dh2sim.view.annotations import COLORS, LABEL_HEIGHT, LABEL_WIDTH, row_annotations
+from dh2sim.view.annotations import COLORS, row_annotations
 from dh2sim.view.items import Arrow, Item, Label, Path, Scene
 from dh2sim.view.notation import Quantity
 from tests.kinematics.robots import HAYATI, MODIFIED, ODD_ARM, STANDARD, row
@@ -162,7 +161,7 @@ def test_a_coordinate_that_is_nearly_nothing_has_no_minus_sign_and_rounding_is_t
 
 
 @given(robots_with_joint_vectors(max_rows=5), st.data())
-def test_labels_stand_clear_of_each_other_and_near_what_they_name(
+def test_every_quantity_and_both_axes_have_a_label_beside_them(
     drawn: tuple[RobotSpec, Array], data: st.DataObject
 ) -> None:
     spec, vectors = drawn
@@ -170,14 +169,18 @@ def test_labels_stand_clear_of_each_other_and_near_what_they_name(
     scene = explained(spec, number, vectors[0])
     labels = {name: np.array(item.position) for name, item in scene.items() if isinstance(item, Label)}
     assert len(labels) == len(PRODUCTS[spec.rows[number].convention]) + 2
-    for here, there in combinations(labels.values(), 2):
-        apart = np.abs(here - there)
-        assert apart[2] >= LABEL_HEIGHT * SIZE or np.hypot(apart[0], apart[1]) >= LABEL_WIDTH * SIZE
-    for name in ("a", "d"):
-        arrow = scene.get(f"/row/{name}")
-        if isinstance(arrow, Arrow):
-            middle = 0.5 * np.add(arrow.start, arrow.end)
-            assert np.linalg.norm(labels[f"/row/{name}_label"] - middle) < 4 * SIZE
+    for name in PRODUCTS[spec.rows[number].convention]:
+        item = scene.get(f"/row/{name}")
+        if isinstance(item, Arrow):
+            middle = 0.5 * np.add(item.start, item.end)
+            assert np.linalg.norm(labels[f"/row/{name}_label"] - middle) < 0.5 * SIZE
+        elif isinstance(item, Path):
+            points = np.array(item.points)
+            assert np.linalg.norm(points - labels[f"/row/{name}_label"], axis=1).min() < 0.5 * SIZE
+    for name in ("axis_before", "axis_behind"):
+        line = scene[f"/row/{name}"]
+        assert isinstance(line, Path)
+        assert np.linalg.norm(labels[f"/row/{name}_label"] - np.array(line.points[1])) < 0.5 * SIZE
 
 
 def test_the_axes_are_those_of_the_two_frames_and_pass_through_both_ends_of_the_offset() -> None:

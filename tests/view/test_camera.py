@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,10 +19,12 @@ from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.load import load_robot, parse_robot
 from dh2sim.typing import Array
 from dh2sim.view.extent import FIELD, Eye, eye_of
+from dh2sim.view.items import Label
+from dh2sim.view.labels import HEIGHT, width
 from dh2sim.view.opening import open_state
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import ViewState
-from tests.view.on_page import pixel, wait_until
+from tests.view.on_page import choose, open_tab, pixel, wait_until
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -105,13 +108,23 @@ def test_an_eye_that_the_user_has_moved_stays(open_page: Callable[[], Page], vie
     page = open_page()
     (served,) = viewer.pages
     wait_until(lambda: is_seen(page, served), "it is seen")
+    moved = move_the_eye(page, served, 120.0)
+    page.set_viewport_size({"width": 700, "height": 640})
+    wait_until(lambda: served.client.camera.aspect < 0.6, "the window is narrow")
+    page.wait_for_timeout(500)
+    assert math.dist(served.client.camera.position, moved) < 1e-3
+    page.set_viewport_size({"width": 900, "height": 640})
+
+
+def move_the_eye(page: Page, served: ServedPage, pixels: float) -> Array:
+    """Drag the scene to the right, and return where the eye comes to rest."""
     box = page.locator("canvas").first.bounding_box()
     assert box is not None
     before = served.client.camera.position.copy()
     x, y = box["x"] + 0.5 * box["width"], box["y"] + box["height"] - 40.0
     page.mouse.move(x, y)
     page.mouse.down()
-    page.mouse.move(x + 120.0, y, steps=5)
+    page.mouse.move(x + pixels, y, steps=5)
     page.mouse.up()
     wait_until(lambda: math.dist(served.client.camera.position, before) > 0.1, "the user moves the eye")
     last: list[Array] = []
@@ -122,8 +135,31 @@ def test_an_eye_that_the_user_has_moved_stays(open_page: Callable[[], Page], vie
         return len(last) > 1 and math.dist(last[-1], last[-2]) < 1e-6
 
     wait_until(rests, "the eye comes to rest")
-    page.set_viewport_size({"width": 700, "height": 640})
-    wait_until(lambda: served.client.camera.aspect < 0.6, "the window is narrow")
-    page.wait_for_timeout(500)
-    assert math.dist(served.client.camera.position, last[-1]) < 1e-3
-    page.set_viewport_size({"width": 900, "height": 640})
+    return last[-1]
+
+
+def test_the_labels_of_a_row_can_be_read_wherever_the_user_moves_the_eye(
+    open_page: Callable[[], Page], viewer: Viewer
+) -> None:
+    page = open_page()
+    (served,) = viewer.pages
+    open_tab(page, "Table")
+    choose(page, "Edit row", "2: joint_2")
+    page.get_by_text("Explain in scene").click()
+    wait_until(lambda: "/row/a_label" in served._painter._drawn, "the row is explained")
+    before = served.state.sight
+    for pixels in (90.0, -170.0):
+        move_the_eye(page, served, pixels)
+        assert served.state.sight not in (None, before)
+        wait_until(lambda: not covered(page, served), f"{covered(page, served)} cover each other")
+
+
+def covered(page: Page, served: ServedPage) -> list[tuple[str, str]]:
+    """Which labels cover each other by more than the eye may move without them: a few pixels."""
+    labels = {item.text: item for item in tuple(served._painter._drawn.values()) if isinstance(item, Label)}
+    found = []
+    for (here, a), (there, b) in combinations(labels.items(), 2):
+        (xa, ya), (xb, yb) = pixel(page, served, a.position), pixel(page, served, b.position)
+        if abs(xa - xb) < 0.5 * (width(here) + width(there)) - 6.0 and abs(ya - yb) < HEIGHT - 6.0:
+            found.append((here, there))
+    return found
