@@ -11,6 +11,8 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from dh2sim.view.notation import subscript
+
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
 
@@ -79,13 +81,14 @@ def click(page: Page, rng: random.Random, seconds: float) -> int:
                 page.get_by_role("button", name=rng.choice(("home", "zero", "printed", "random")), exact=True).click()
             case "cell":
                 _tab(page, "Table")
-                _choose(page, "Edit row", rng.randrange(6))
-                _field(page, rng.choice("aαdθ") + "[₀-₉]+").fill(
-                    rng.choice(("0", "0.1", "90", "pi/2", "d2", "-45", "90 +"))
-                )
+                row = rng.randrange(6)
+                _choose(page, "Edit row", row)
+                _field(page, f"d{subscript(row + 1)}").wait_for()
+                text = rng.choice(("0", "0.1", "90", "pi/2", "d2", "-45", "90 +"))
+                _field(page, rng.choice("aαdθ") + "[₀-₉]").fill(text)
             case "convention":
                 _tab(page, "Table")
-                _choose(page, "convention", rng.randrange(3))
+                _choose(page, "convention[₀-₉]", rng.randrange(3))
             case _:
                 _tab(page, "Motion")
                 _choose(page, "Moved by", 1)

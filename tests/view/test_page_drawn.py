@@ -74,7 +74,7 @@ def test_the_table_is_edited_marked_read_another_way_and_taken_back(open_page: O
     wait_for_position(page, edited, HOME)
     open_tab(page, "Table")
     field(page, "α₂").fill("pi / pi * 45")
-    choose(page, "convention", "modified")
+    choose(page, "convention₂", "modified")
     wait_until(lambda: "modified" in shown(page, "table"), "the convention")
     assert field(page, "α₁").input_value() == "pi / pi * 45", "its index in this convention"
     open_tab(page, "Joints")

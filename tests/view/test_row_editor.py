@@ -83,11 +83,11 @@ def test_another_row_has_fields_of_its_own(speaker: Speaker) -> None:
 def test_fields_are_named_as_the_row_s_convention_has_it(speaker: Speaker) -> None:
     served, _say = speaker
     assert fields(served) == ["a₀", "α₀", "d₁", "θ₁"]
-    set_value(speaker, "convention", "hayati")
+    set_value(speaker, "convention₁", "hayati")
     wait_until(lambda: fields(served) == ["a₁", "α₁", "d₁", "θ₁", "β₁"], "the new convention")
     set_value(speaker, "Edit row", "2: joint_2")
     wait_until(lambda: fields(served) == ["a₂", "α₂", "d₂", "θ₂", "β₂"], "a Hayati row")
-    set_value(speaker, "convention", "standard")
+    set_value(speaker, "convention₂", "standard")
     wait_until(lambda: "β₂" in fields(served) and served.state.draft.complaints != (), "beta means nothing there")
 
 

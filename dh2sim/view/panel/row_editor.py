@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from dh2sim.robot.spec import Convention
 from dh2sim.view.events import EditCell, SetConvention
-from dh2sim.view.notation import Quantity, symbol
+from dh2sim.view.notation import Quantity, subscript, symbol
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind
 from dh2sim.view.state import CONVENTION, Complaint, ViewState
@@ -51,7 +51,7 @@ class RowEditor:
         end = place + len(Quantity) * _STEP
         self._convention = bind(
             gui.add_dropdown(
-                "convention",
+                f"convention{subscript(row + 1)}",
                 [convention.value for convention in Convention],
                 initial_value=shown.convention.value,
                 hint="Reads the same numbers another way: the robot becomes another one",
