@@ -52,7 +52,12 @@ def window(browser: Browser, *scripts: str) -> Page:
 def go(page: Page, url: str) -> None:
     """Go to the viewer, until its panel is there."""
     page.goto(url, wait_until="commit")
-    page.get_by_role("tab", name="Joints").wait_for()
+    _wait_for_panel(page)
+
+
+def _wait_for_panel(page: Page) -> None:
+    """Wait for what comes last: a pose in numbers."""
+    page.locator('[data-dh2sim="readout"] td').first.wait_for()
 
 
 def choose_plain_shading(page: Page) -> None:
@@ -69,7 +74,7 @@ def click(page: Page, rng: random.Random, seconds: float) -> int:
         count += 1
         if count % 100 == 0:
             page.reload()
-            page.get_by_role("tab", name="Joints").wait_for()
+            _wait_for_panel(page)
         match rng.choices(("joint", "configuration", "cell", "convention", "physics"), (6, 3, 3, 2, 1))[0]:
             case "joint":
                 _tab(page, "Joints")
@@ -102,8 +107,10 @@ def _tab(page: Page, name: str) -> None:
 
 
 def _choose(page: Page, label: str, number: int) -> None:
+    options = page.get_by_role("option")
+    options.first.wait_for(state="hidden")  # those of another field fade for a while
     _field(page, label).click()
-    page.get_by_role("option").nth(number).click()
+    options.nth(number).click()
 
 
 def _field(page: Page, label: str) -> Locator:

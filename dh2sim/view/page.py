@@ -95,7 +95,9 @@ class Page:
         """Draw; then wait for events, and draw what came of them."""
         self._draw()
         self._do(self.mover.open_run, None)
-        self._panel = Panel(self.client, self.send, self.state, self._files, self.mover)
+        with self.client.atomic():  # a panel that is built before the user's eyes moves under the mouse
+            self._panel = Panel(self.client, self.send, self.state, self._files, self.mover)
+            self._panel.show(self.state)
         self._show()
         while self._take():
             self._show()
@@ -135,9 +137,10 @@ class Page:
 
     def _show(self) -> None:
         self._draw()
-        self._handle.show(self.state)
-        self._grabs.show(self.state)
-        self._panel.show(self.state)
+        with self.client.atomic():
+            self._handle.show(self.state)
+            self._grabs.show(self.state)
+            self._panel.show(self.state)
         self.client.flush()
         if self._queue.empty() and not self._closed.is_set():
             self._panel.settle(self.state)

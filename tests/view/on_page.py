@@ -59,6 +59,7 @@ def field(page: Page, label: str) -> Locator:
 
 
 def choose(page: Page, label: str, option: str) -> None:
+    page.get_by_role("option").first.wait_for(state="hidden")  # those of another field fade for a while
     field(page, label).click()
     page.get_by_role("option", name=option, exact=True).click()
 
