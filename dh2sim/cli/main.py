@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Callable
 from types import FrameType
 
@@ -19,6 +20,7 @@ def main() -> None:
 
     def interrupt(number: int, _frame: FrameType | None) -> None:
         interruptions.append(number)
+        _cut_off()
         raise KeyboardInterrupt
 
     _handle(signal.SIGINT, interrupt)
@@ -50,7 +52,13 @@ def _handle(kind: signal.Signals, handler: Callable[[int, FrameType | None], Non
 
 def _terminate(number: int, _frame: FrameType | None) -> None:
     """End in good order: temporary folders are removed. The status is the one that a shell gives to such an end."""
+    _cut_off()
     raise SystemExit(128 + number)
+
+
+def _cut_off() -> None:
+    """Be quiet about what an end at any moment cuts off: libraries' coroutines that nobody waits for any more."""
+    warnings.filterwarnings("ignore", message="coroutine .* was never awaited", category=RuntimeWarning)
 
 
 def interrupt_again(error: sys.UnraisableHookArgs) -> None:

@@ -34,8 +34,7 @@ def spread(labels: Mapping[str, Label], sight: Sight, first: Iterable[str] = ())
     Returns:
         The same labels, by the same names.
     """
-    names = [name for name in first if name in labels]
-    names += [name for name in labels if name not in set(names)]
+    names = list(dict.fromkeys([*(name for name in first if name in labels), *labels]))
     if not names:
         return {}
     seen = sight.in_picture([labels[name].position for name in names])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 from importlib.metadata import version
@@ -199,3 +200,30 @@ def test_a_library_to_draw_with_that_there_is_not_is_named(command: tuple[str, .
         "MUJOCO_GL: nonsense. Unset that variable\n"
     )
     assert not list(tmp_path.iterdir())
+
+
+CUT_OFF = """
+import os, sys, time
+import dh2sim.cli.app
+
+async def never_awaited():
+    pass
+
+def run():
+    kept = never_awaited()  # as libraries have them when they are interrupted
+    os.kill(os.getpid(), int(sys.argv[1]))
+    time.sleep(20)
+
+dh2sim.cli.app.app = run
+from dh2sim.cli.main import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("kill", "status", "told"), [(signal.SIGINT, 130, "dh2sim: interrupted\n"), (signal.SIGTERM, 143, "")]
+)
+def test_what_an_end_cuts_off_is_not_told_of(kill: signal.Signals, status: int, told: str) -> None:
+    command = [sys.executable, "-c", CUT_OFF, str(int(kill))]
+    done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (status, "", told)
