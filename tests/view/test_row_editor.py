@@ -97,3 +97,4 @@ def test_a_row_that_there_is_not_is_never_chosen(speaker: Speaker) -> None:
     set_value(speaker, "a₁", "0.125")
     wait_until(lambda: served.state.spec.rows[0].a == 0.125, "what came after it")
     assert served.state.selected_row == 0
+    wait_until(lambda: widgets(served)["Edit row"].value == "1: joint_1", "the choice is put back", seconds=10.0)
