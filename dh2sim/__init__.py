@@ -10,21 +10,20 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dh2sim.errors import Dh2simError, RobotFileError
-    from dh2sim.formats.mjcf import to_mjcf
-    from dh2sim.formats.scene import to_scene
-    from dh2sim.formats.urdf import to_urdf
-    from dh2sim.imports.converted import convert_robot
-    from dh2sim.imports.files import ImportOptions, import_robot
-    from dh2sim.kinematics.assignment.recover import recover_table
+    from dh2sim.formats.mjcf.scene import to_scene
+    from dh2sim.formats.mjcf.write import to_mjcf
+    from dh2sim.formats.urdf.write import to_urdf
+    from dh2sim.importing.convert import convert_robot
+    from dh2sim.importing.importing import ImportOptions, import_robot
     from dh2sim.kinematics.chain import KinematicChain, build_chain
-    from dh2sim.kinematics.forward import forward_kinematics, frame_poses
-    from dh2sim.kinematics.jacobian import geometric_jacobian
-    from dh2sim.kinematics.serial import SerialChain, SerialJoint
+    from dh2sim.kinematics.forward import forward_kinematics, frame_poses, geometric_jacobian
+    from dh2sim.kinematics.frame_assignment.recover import recover_table
+    from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
     from dh2sim.model.build import build_model
     from dh2sim.model.robot_model import RobotModel
-    from dh2sim.robot.load import load_robot, parse_robot
+    from dh2sim.robot.read import load_robot, parse_robot
     from dh2sim.robot.spec import RobotSpec
-    from dh2sim.robot.writing.robot_file import robot_file_text
+    from dh2sim.robot.write import robot_file_text
 
 __all__ = [
     "Dh2simError",
@@ -53,27 +52,27 @@ __all__ = [
 
 _HOMES = {
     "Dh2simError": "errors",
-    "ImportOptions": "imports.files",
+    "ImportOptions": "importing.importing",
     "KinematicChain": "kinematics.chain",
     "RobotFileError": "errors",
     "RobotModel": "model.robot_model",
     "RobotSpec": "robot.spec",
-    "SerialChain": "kinematics.serial",
-    "SerialJoint": "kinematics.serial",
+    "SerialChain": "kinematics.serial_chain",
+    "SerialJoint": "kinematics.serial_chain",
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
-    "convert_robot": "imports.converted",
+    "convert_robot": "importing.convert",
     "forward_kinematics": "kinematics.forward",
     "frame_poses": "kinematics.forward",
-    "geometric_jacobian": "kinematics.jacobian",
-    "import_robot": "imports.files",
-    "load_robot": "robot.load",
-    "parse_robot": "robot.load",
-    "recover_table": "kinematics.assignment.recover",
-    "robot_file_text": "robot.writing.robot_file",
-    "to_mjcf": "formats.mjcf",
-    "to_scene": "formats.scene",
-    "to_urdf": "formats.urdf",
+    "geometric_jacobian": "kinematics.forward",
+    "import_robot": "importing.importing",
+    "load_robot": "robot.read",
+    "parse_robot": "robot.read",
+    "recover_table": "kinematics.frame_assignment.recover",
+    "robot_file_text": "robot.write",
+    "to_mjcf": "formats.mjcf.write",
+    "to_scene": "formats.mjcf.scene",
+    "to_urdf": "formats.urdf.write",
 }
 
 

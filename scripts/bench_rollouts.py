@@ -30,7 +30,7 @@ def rollouts() -> Iterator[Row]:
     import mujoco
     import mujoco.rollout
 
-    from dh2sim.simulate.engine import quiet_engine
+    from dh2sim.simulate.mujoco_runtime import quiet_engine
 
     mjcf, q0, ctrl = _held_arms()
     model = mujoco.MjModel.from_xml_string(mjcf)  # as exported
@@ -86,8 +86,8 @@ def steady() -> Iterator[Row]:
     """60 s of simulation of 1000 arms: time per step in the last tenth, against the first."""
     from dh2sim import build_model, load_robot
     from dh2sim.simulate.block import simulate_block
+    from dh2sim.simulate.options import Wish
     from dh2sim.simulate.prepare import prepare
-    from dh2sim.simulate.wish import Wish
 
     model = build_model(load_robot("stanford"))
     for controller in ("sine", "computed-torque"):
@@ -147,8 +147,8 @@ class _Paces:
 
 def _job(controller: str, count: int) -> Job:
     from dh2sim import build_model, load_robot
+    from dh2sim.simulate.options import Wish
     from dh2sim.simulate.prepare import prepare
-    from dh2sim.simulate.wish import Wish
 
     wish = Wish(rollouts=count, steps=STEPS, controller=controller, start="random", record=RECORD)
     return prepare(build_model(load_robot("stanford")), wish)

@@ -134,7 +134,7 @@ def _slider_delays(page: Page, pause: float) -> tuple[list[float], list[float], 
 def _long_chain(browser: Browser) -> Iterator[Row]:
     """60 joints: the server's own time for a move, and frames a second while a joint moves and while none does."""
     from dh2sim import parse_robot
-    from dh2sim.view.opening import open_state
+    from dh2sim.view.initial_state import open_state
     from dh2sim.view.server import Viewer
 
     viewer = Viewer(open_state(parse_robot(_chain(60))))

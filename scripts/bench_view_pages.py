@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from dh2sim.view.notation import subscript
+from dh2sim.view.scene.annotations import subscript
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page

@@ -11,9 +11,9 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from dh2sim.imports.axes import import_axes
-from dh2sim.imports.picture.picture import draw_assignment
-from dh2sim.robot.axes.load import read_axes
+from dh2sim.draw.frame_figure.figure import draw_assignment
+from dh2sim.importing.importing import import_axes
+from dh2sim.robot.axes_file import read_axes
 
 DOCS: Final = Path(__file__).resolve().parents[1] / "docs"
 PUMA: Final = DOCS / "puma560_axes.yaml"

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from dh2sim.robot.load import load_robot
-from dh2sim.view.opening import folder_of, open_state
+from dh2sim.robot.read import load_robot
+from dh2sim.view.initial_state import folder_of, open_state
 from dh2sim.view.server import Viewer, free_port
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "images" / "viewer.png"

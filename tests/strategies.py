@@ -13,17 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.robot.spec import (
-    BaseSpec,
-    Convention,
-    Dynamics,
-    JointType,
-    Limits,
-    LinkSpec,
-    Pose,
-    RobotSpec,
-    Row,
-)
+from dh2sim.robot.spec import BaseSpec, Convention, Dynamics, JointType, Limits, LinkSpec, Pose, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 
 ODD_TWIST = math.radians(37.3)

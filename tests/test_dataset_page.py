@@ -16,11 +16,11 @@ import pytest
 import xarray as xr
 
 from dh2sim import build_model, load_robot
-from dh2sim.simulate.layout import STATUS, Layout
+from dh2sim.simulate.dataset_layout import STATUS, Layout
+from dh2sim.simulate.options import Wish
 from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.settings import DEFAULT_RECORD, RECORDABLE
 from dh2sim.simulate.store.skeleton import make_skeleton
-from dh2sim.simulate.wish import Wish
 from tests.program import contents, dh2sim
 
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "dataset.md").read_text(encoding="utf-8")

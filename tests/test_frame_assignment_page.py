@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dh2sim import load_robot
-from dh2sim.robot.load import parse_robot
+from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import RobotSpec
 from scripts.draw_frame_assignment import main as draw_pictures
 from scripts.draw_frame_assignment import stanford_axes

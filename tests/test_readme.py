@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dh2sim.robot.load import parse_robot
+from dh2sim.robot.read import parse_robot
 from dh2sim.simulate import rollout
 from scripts.update_readme import files
 from tests.program import dh2sim_process

@@ -6,19 +6,15 @@ from typing import Annotated
 
 import typer
 
-from dh2sim.cli.convert import convert
+from dh2sim.cli.common import guarded
 from dh2sim.cli.export import export
 from dh2sim.cli.fk import fk
-from dh2sim.cli.frames import frames
-from dh2sim.cli.import_robot import import_robot
+from dh2sim.cli.importing import convert, frames, import_robot
 from dh2sim.cli.info import info
-from dh2sim.cli.plot import plot
-from dh2sim.cli.render import render
-from dh2sim.cli.robots import list_robots
+from dh2sim.cli.pictures import plot, render
+from dh2sim.cli.robots import list_robots, schema
 from dh2sim.cli.rollout import rollout
-from dh2sim.cli.running import guarded
 from dh2sim.cli.runs import runs
-from dh2sim.cli.schema import schema
 from dh2sim.cli.validate import validate
 from dh2sim.cli.view import view
 

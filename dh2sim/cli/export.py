@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.running import DONE, FELL_SHORT, build_all, complain
+from dh2sim.cli.common import DONE, FELL_SHORT, build_all, complain
 from dh2sim.errors import Dh2simError, OutputError
 
 if TYPE_CHECKING:
-    from dh2sim.export.render import Format
-    from dh2sim.export.run import ExportReport
+    from dh2sim.export import ExportReport, Format
     from dh2sim.model.robot_model import RobotModel
 
 
@@ -57,7 +56,7 @@ def export(
     models = build_all(robots)
     if check:
         return _check(models, out, wanted, dh_frames=not no_dh_frames)
-    from dh2sim.export.run import export_robot
+    from dh2sim.export import export_robot
 
     status = DONE
     for model in models:
@@ -73,7 +72,7 @@ def export(
 
 
 def _formats(names: list[str] | None) -> list[Format]:
-    from dh2sim.export.render import Format
+    from dh2sim.export import Format
 
     wanted = []
     for name in names or [format_.value for format_ in Format]:
@@ -84,7 +83,7 @@ def _formats(names: list[str] | None) -> list[Format]:
 
 
 def _check(models: list[RobotModel], out: Path, formats: list[Format], *, dh_frames: bool) -> int:
-    from dh2sim.export.run import drift
+    from dh2sim.export import drift
 
     status = 0
     for model in models:
@@ -130,12 +129,12 @@ def _list(title: str, lines: Iterable[str]) -> None:
 
 
 def _estimated(model: RobotModel) -> list[str]:
-    from dh2sim.formats.xml import estimates
+    from dh2sim.formats.xml_write import estimates
 
     return [line.removeprefix("Estimated from the shapes, not measured: ") for line in estimates(model.links)]
 
 
 def _assumed(model: RobotModel) -> list[str]:
-    from dh2sim.formats.xml import assumptions
+    from dh2sim.formats.xml_write import assumptions
 
     return [line.removeprefix("Assumed, not given: ") for line in assumptions(model.joints)]

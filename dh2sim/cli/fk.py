@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.running import load_all
+from dh2sim.cli.common import load_all
 from dh2sim.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def fk(
     import numpy as np
 
     from dh2sim.kinematics.chain import build_chain
-    from dh2sim.kinematics.frames import frame_pose
+    from dh2sim.kinematics.forward import frame_pose
     from dh2sim.kinematics.transforms import quaternion_from_rotation, rpy_from_rotation
 
     [spec] = load_all([robot])
@@ -76,8 +76,8 @@ def _rounded(value: float) -> float:
 
 
 def _joint_vector(spec: RobotSpec, texts: list[str], *, degrees: bool) -> list[float]:
+    from dh2sim.messages import shown
     from dh2sim.robot.expressions import ExpressionError, evaluate
-    from dh2sim.robot.words import shown
 
     if not texts:
         return [float(x) for x in spec.configurations.get("home", [0.0] * len(spec.moving_rows))]
@@ -100,7 +100,7 @@ def _joint_vector(spec: RobotSpec, texts: list[str], *, degrees: bool) -> list[f
 
 
 def _wrong_count(spec: RobotSpec, texts: list[str], *, degrees: bool) -> str:
-    from dh2sim.robot.words import did_you_mean, listed, shown
+    from dh2sim.messages import did_you_mean, listed, shown
 
     moving = spec.moving_rows
     names = ", ".join(f"{row.name} ({'m' if not row.type.turns else 'deg' if degrees else 'rad'})" for row in moving)

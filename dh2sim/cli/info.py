@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.console import make_console, print_whole
-from dh2sim.cli.running import build_all
+from dh2sim.cli.common import build_all, make_console, print_whole
 
 if TYPE_CHECKING:
     from dh2sim.model.robot_model import JointModel, RobotModel
@@ -192,7 +191,7 @@ def _frame_table(model: RobotModel) -> Any:
 
 
 def _remarks(model: RobotModel) -> list[str]:
-    from dh2sim.formats.xml import assumptions, estimates
+    from dh2sim.formats.xml_write import assumptions, estimates
 
     lines = [*estimates(model.links), *assumptions(model.joints)]
     if any(joint.range is not None and joint.range.assumed for joint in model.moving_joints):

@@ -14,17 +14,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.progress import progress_bar
-from dh2sim.cli.running import INTERRUPTED, build_all
-from dh2sim.cli.sizes import size_text
+from dh2sim.cli.common import INTERRUPTED, build_all, progress_bar, size_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import FrameType
 
+    from dh2sim.simulate.description import RunSummary
     from dh2sim.simulate.prepare import Job
     from dh2sim.simulate.run import Progress
-    from dh2sim.simulate.store.summary import RunSummary
 
 
 def rollout(
@@ -94,10 +92,10 @@ def rollout(
       dh2sim render run.zarr
     """
     model = build_all([robot])[0]
+    from dh2sim.simulate.description import summarize
+    from dh2sim.simulate.options import Wish, names_of
     from dh2sim.simulate.prepare import prepare
     from dh2sim.simulate.run import fill, open_run
-    from dh2sim.simulate.store.summary import summarize
-    from dh2sim.simulate.wish import Wish, names_of
 
     gc.enable()
     wish = Wish(

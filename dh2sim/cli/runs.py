@@ -13,12 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.console import make_console
-from dh2sim.cli.progress import progress_bar
-from dh2sim.cli.running import complain
-from dh2sim.cli.sizes import size_text
+from dh2sim.cli.common import complain, make_console, progress_bar, size_text
 from dh2sim.errors import Dh2simError
-from dh2sim.robot.words import did_you_mean
+from dh2sim.messages import did_you_mean
 
 if TYPE_CHECKING:
     from dh2sim.simulate.description import RunDescription
@@ -108,7 +105,7 @@ def _raise_last(errors: list[Dh2simError]) -> None:
 def _convert(paths: list[Path], to: str, out: Path | None, *, overwrite: bool, quiet: bool) -> None:
     from dh2sim.simulate.convert.hdf5 import to_hdf5
     from dh2sim.simulate.convert.parquet import to_parquet
-    from dh2sim.simulate.store.summary import summarize
+    from dh2sim.simulate.description import summarize
 
     gc.enable()
     convert = {"parquet": to_parquet, "hdf5": to_hdf5}[to]

@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.console import make_console, print_whole
-from dh2sim.cli.progress import progress_bar
-from dh2sim.cli.running import FELL_SHORT, build_all, complain
+from dh2sim.cli.common import FELL_SHORT, build_all, complain, make_console, print_whole, progress_bar
 from dh2sim.errors import Dh2simError, OutputError
 
 if TYPE_CHECKING:
@@ -72,8 +70,7 @@ def validate(
     models = build_all(robots)
     if folder is not None:
         _require_folders(robots, models, folder)
-    from dh2sim.validate.junit import to_junit
-    from dh2sim.validate.report import ValidationReport
+    from dh2sim.validate.report import ValidationReport, to_junit
     from dh2sim.validate.run import engine_samples, validate_robot
 
     gc.enable()
@@ -105,7 +102,7 @@ def validate(
 
 def _simulated(model: RobotModel, report: RobotReport, seed: int) -> RobotReport:
     """Add the physics checks to a robot's report."""
-    from dh2sim.simulate.physics.run import check_physics
+    from dh2sim.validate.motion.run import check_physics
 
     return replace(report, checks=(*report.checks, *check_physics(model, seed=seed)))
 
@@ -197,7 +194,7 @@ def _table(robot: RobotReport) -> Table:
 
 def _remarks(robot: RobotReport) -> Iterator[tuple[str, str]]:
     """What did not hold or was not checked, each with its colour."""
-    from dh2sim.validate.junit import failure_text
+    from dh2sim.validate.report import failure_text
 
     for check in robot.checks:
         if check.ok is False:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.robot_file import require_free
+from dh2sim.cli.common import require_free
 
 if TYPE_CHECKING:
     from dh2sim.view.server import Viewer
@@ -62,8 +62,8 @@ def view(
     if rollout != 0 and (export is None or run is None):
         raise typer.BadParameter("only with a run and --export: the page lets one choose", param_hint="--rollout")
     require_free(export, force=force)
-    from dh2sim.robot.load import load_robot
-    from dh2sim.view.opening import folder_of, open_state
+    from dh2sim.robot.read import load_robot
+    from dh2sim.view.initial_state import folder_of, open_state
 
     state = open_state(load_robot(robot), folder_of(robot))
     if export is None:
@@ -98,7 +98,7 @@ def _export(state: ViewState, run: Path | None, rollout: int, page: Path) -> Non
 
     data = None
     if run is not None:
-        from dh2sim.simulate.pictures.selection import open_rollout
+        from dh2sim.draw.rollout_data import open_rollout
 
         data = open_rollout(run, rollout)
     export_page(state.model, state.q, page, rollout=data)

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
-from dh2sim.kinematics.serial import SerialChain
+from dh2sim.kinematics.serial_chain import SerialChain
 from dh2sim.model.mass import MassProperties
 from dh2sim.robot.spec import ActuatorSpec, Dynamics, Limits
 from dh2sim.typing import Array, read_only

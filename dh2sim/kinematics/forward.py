@@ -1,17 +1,30 @@
-"""Forward kinematics of a chain, for any number of configurations at once."""
+"""Forward kinematics of a chain, for any number of configurations at once.
+
+Frames by the names that every export uses.
+
+The geometric Jacobian of a chain, for any number of configurations at once.
+"""
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.errors import ConfigurationError
-from dh2sim.kinematics.block import BLOCK, BlockFrame, sines_and_cosines
-from dh2sim.kinematics.chain import KinematicChain
-from dh2sim.kinematics.configurations import joint_vectors
-from dh2sim.kinematics.transforms import compose, joint_part
+from dh2sim.errors import ConfigurationError, UnknownFrameError
+from dh2sim.kinematics.batch_frame import (
+    BLOCK,
+    BlockFrame,
+    Column,
+    cross,
+    difference,
+    sines_and_cosines,
+    write_column,
+)
+from dh2sim.kinematics.chain import KinematicChain, joint_vectors
+from dh2sim.kinematics.transforms import compose, identity, joint_part
 from dh2sim.typing import Array
 
 
@@ -157,3 +170,83 @@ def in_blocks(
         block = slice(start, start + BLOCK)
         fill(results[block], np.ascontiguousarray(vectors[block].T))
     return results.reshape(*batch, *shape)
+
+
+def frame_names(chain: KinematicChain) -> tuple[str, ...]:
+    """Return the names: base_link, link_1 … link_n, dh_0 … dh_n, tool0."""
+    n = len(chain.joints)
+    links = (f"link_{i}" for i in range(1, n + 1))
+    return ("base_link", *links, *(f"dh_{i}" for i in range(n + 1)), "tool0")
+
+
+def frame_pose(chain: KinematicChain, frame: str, q: ArrayLike) -> Array:
+    """Return the pose of a named frame in base_link.
+
+    Args:
+        chain: The robot.
+        frame: One of ``frame_names``; link_i stands at joint i, dh_i is the table's frame i.
+        q: Joint vector, rad and m, shape (n,).
+
+    Returns:
+        Shape (4, 4).
+
+    Raises:
+        UnknownFrameError: There is no such frame.
+        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
+    """
+    names = frame_names(chain)
+    if frame not in names:
+        close = difflib.get_close_matches(frame, names, n=1)
+        hint = f" Did you mean '{close[0]}'?" if close else ""
+        n = len(chain.joints)
+        raise UnknownFrameError(
+            f"there is no frame '{frame}'.{hint} Frames: base_link, link_1 to link_{n}, dh_0 to dh_{n}, tool0"
+        )
+    tool = forward_kinematics(chain, q)
+    if frame == "tool0":
+        return tool
+    if frame == "base_link":
+        return identity()
+    kind, index = frame.split("_")
+    poses, number = (frame_poses(chain, q), int(index)) if kind == "dh" else (joint_poses(chain, q), int(index) - 1)
+    return np.asarray(poses[number])
+
+
+_NOTHING: Column = (0.0, 0.0, 0.0)
+
+
+def geometric_jacobian(chain: KinematicChain, q: ArrayLike) -> Array:
+    """Return the Jacobian of tool0 in base_link: [velocity; angular velocity] = J · dq/dt.
+
+    For a joint that turns about the unit axis z through p the column is [z x (p_tool0 - p); z], for one that
+    slides along z it is [z; 0]. Source: M. W. Spong, S. Hutchinson, M. Vidyasagar, Robot Modeling and
+    Control, 2006, section 4.6.
+
+    Args:
+        chain: The robot.
+        q: Joint vectors, rad and m, shape (..., n).
+
+    Returns:
+        Shape (..., 6, n): rows 0-2 velocity of tool0's origin, m/s; rows 3-5 angular velocity, rad/s; both
+        along the axes of base_link, for each rad/s or m/s of a joint coordinate.
+
+    Raises:
+        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
+    """
+    T_joint_tool0 = compose(chain.joints[-1].T_joint_dh, chain.T_dhn_tool0)
+
+    def fill(out: Array, columns: Array) -> None:
+        frames = list(joint_frames(chain, columns))
+        tool = frames[-1].then(T_joint_tool0)
+        moving = [pair for pair in zip(chain.joints, frames, strict=True) if pair[0].type.moves]
+        for i, (joint, frame) in enumerate(moving):
+            _write(out[:, :, i], frame, tool, turns=joint.type.turns, sign=joint.sign * frame.signs[2])
+
+    return in_blocks(chain, q, (6, chain.n), fill)
+
+
+def _write(out: Array, frame: BlockFrame, tool: BlockFrame, *, turns: bool, sign: float) -> None:
+    """Put one joint's column, shape (N, 6), into ``out``."""
+    linear, angular = (cross(frame.z, difference(tool.p, frame.p)), frame.z) if turns else (frame.z, _NOTHING)
+    write_column(linear, sign, out[:, :3])
+    write_column(angular, sign, out[:, 3:])

@@ -2,6 +2,10 @@
 
 Written out in Python's own floating-point arithmetic: a matrix product by BLAS may fuse multiplications and
 additions, and then the last bit depends on the processor.
+
+Points and tensors seen from another frame, the same bits on every machine.
+
+How far poses are from the poses that they should be.
 """
 
 from __future__ import annotations
@@ -9,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.kinematics.trig import atan2, sin_cos
@@ -173,3 +178,76 @@ def _transform(rotation: Sequence[Sequence[float]], position: Sequence[float]) -
 def _clean(values: Sequence[float]) -> list[float]:
     """Turn -0.0 into 0.0."""
     return [value + 0.0 for value in values]
+
+
+def move_point(T_a_b: Array, point: Array) -> list[float]:
+    """Return a point of frame b in frame a.
+
+    Args:
+        T_a_b: Pose of frame b in frame a, shape (4, 4).
+        point: m, in frame b, shape (3,).
+
+    Returns:
+        Its three coordinates, m.
+    """
+    x, y, z = point.tolist()
+    return [row[0] * x + row[1] * y + row[2] * z + row[3] for row in T_a_b[:3].tolist()]
+
+
+def rotate_tensor(T_a_b: Array, tensor: Array) -> Array:
+    """Return a symmetric tensor given along the axes of frame b along those of frame a: R A Rᵀ.
+
+    Args:
+        T_a_b: Pose of frame b in frame a, of which the rotation R counts; shape (4, 4) or (3, 3).
+        tensor: A, shape (3, 3).
+
+    Returns:
+        Exactly symmetric, shape (3, 3).
+    """
+    R, A = T_a_b.tolist(), tensor.tolist()
+    RA = [[R[i][0] * A[0][j] + R[i][1] * A[1][j] + R[i][2] * A[2][j] for j in range(3)] for i in range(3)]
+    turned = [[0.0] * 3 for _ in range(3)]
+    for i in range(3):
+        for j in range(i, 3):
+            value = RA[i][0] * R[j][0] + RA[i][1] * R[j][1] + RA[i][2] * R[j][2]
+            turned[i][j] = turned[j][i] = value + 0.0
+    return read_only(turned)
+
+
+_BLOCK = 2048
+"""Poses handled at a time: a block fits in the cache, and is too small for BLAS to start threads for."""
+_SELECTION = np.zeros((16, 2))
+"""Sums the squares of a pose's rotation, and of its position."""
+_SELECTION[[0, 1, 2, 4, 5, 6, 8, 9, 10], 0] = 1.0
+_SELECTION[[3, 7, 11], 1] = 1.0
+
+
+def pose_errors(T: Array, T_reference: Array) -> tuple[Array, Array]:
+    """Return how far poses are from their reference.
+
+    The rotation error is the angle of R^T R_reference, from ‖R - R_reference‖ = 2 sqrt(2) sin(angle/2) in the
+    Frobenius norm, which keeps its precision at tiny angles, where the trace loses it.
+
+    Args:
+        T: Poses, m, shape (..., 4, 4).
+        T_reference: The poses they should be, the same shape.
+
+    Returns:
+        Distances of the positions, m, and angles between the rotations, rad in [0, pi], each of shape (...).
+        NaN where a pose holds NaN: compare with ``error <= tolerance``, which NaN fails.
+
+    Raises:
+        ValueError: The shapes differ, or are not of poses.
+    """
+    if T.shape != T_reference.shape or T.shape[-2:] != (4, 4):
+        raise ValueError(f"expected two equal shapes (..., 4, 4), got {T.shape} and {T_reference.shape}")
+    left, right = T.reshape(-1, 16), T_reference.reshape(-1, 16)
+    squares = np.empty((len(left), 2))
+    with np.errstate(invalid="ignore", over="ignore"):
+        for start in range(0, len(left), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            gap = left[block] - right[block]
+            np.matmul(gap * gap, _SELECTION, out=squares[block])
+        norms = np.sqrt(squares).reshape(*T.shape[:-2], 2)
+        angles = 2.0 * np.arcsin(np.minimum(1.0, norms[..., 0] / (2.0 * np.sqrt(2.0))))
+    return norms[..., 1], angles

@@ -7,21 +7,14 @@ from collections.abc import Sequence
 from types import MappingProxyType
 
 from dh2sim.kinematics.chain import Joint, KinematicChain, build_chain
-from dh2sim.model.actuators import actuator_model
-from dh2sim.model.inertial import link_inertial
-from dh2sim.model.layout import lay_out, link_scale, neat
-from dh2sim.model.limits import (
-    ASSUMED_SLIDE_RATE,
-    ASSUMED_TURN_RATE,
-    PositionRange,
-    position_range,
-    reach_bound,
-)
+from dh2sim.model.actuators import actuator_model, gravity_loads, seen_inertias
+from dh2sim.model.collision_exclusions import excluded_pairs
+from dh2sim.model.limits import ASSUMED_SLIDE_RATE, ASSUMED_TURN_RATE, PositionRange, position_range, reach_bound
+from dh2sim.model.link_shapes import lay_out, link_scale, neat
+from dh2sim.model.mass import link_inertial
 from dh2sim.model.meshes import load_mesh
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape
-from dh2sim.model.statics import gravity_loads, seen_inertias
-from dh2sim.model.touching import excluded_pairs
 from dh2sim.robot.spec import JointType, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 

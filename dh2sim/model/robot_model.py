@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dh2sim.kinematics.chain import Joint, KinematicChain
+from dh2sim.model.collision_exclusions import ExcludedPair
 from dh2sim.model.limits import PositionRange
 from dh2sim.model.mass import MassProperties
 from dh2sim.model.meshes import MeshAsset
 from dh2sim.model.shapes import Shape
-from dh2sim.model.touching import ExcludedPair
 from dh2sim.robot.spec import ActuatorType, Dynamics, RobotSpec
 from dh2sim.typing import Array
 

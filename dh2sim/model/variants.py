@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dh2sim.model.actuators import actuator_model
-from dh2sim.model.inertial import ASSUMED_DENSITY
-from dh2sim.model.mass import combine, of_shape
+from dh2sim.model.actuators import actuator_model, seen_inertias
+from dh2sim.model.mass import ASSUMED_DENSITY, combine, of_shape
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.model.statics import seen_inertias
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType
 
 

@@ -13,20 +13,16 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from dh2sim.errors import ControllerError, EngineError
-from dh2sim.simulate.checked import checked
-from dh2sim.simulate.closed_loop import simulate_closed_loop
+from dh2sim.simulate.batch import BatchObservation, Group, Weights
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, Lanes, OpenLoop
-from dh2sim.simulate.engine import quiet_engine
-from dh2sim.simulate.group import Group
-from dh2sim.simulate.observation import BatchObservation, Weights
-from dh2sim.simulate.open_loop import Scheduled, simulate_open_loop
+from dh2sim.simulate.dataset_layout import run_sizes, run_variables
+from dh2sim.simulate.initial_states import starts
+from dh2sim.simulate.loops import Scheduled, checked, simulate_closed_loop, simulate_open_loop
+from dh2sim.simulate.mujoco_runtime import quiet_engine
 from dh2sim.simulate.plant import Plant, make_plant
-from dh2sim.simulate.randomization import apply_scales, scales
+from dh2sim.simulate.randomization import Generators, Purpose, apply_scales, scales
 from dh2sim.simulate.records import Recorder
-from dh2sim.simulate.seeds import Generators, Purpose
 from dh2sim.simulate.settings import Settings
-from dh2sim.simulate.starts import starts
-from dh2sim.simulate.variables import run_sizes, run_variables
 from dh2sim.typing import Array, read_only
 
 GROUP = 256

@@ -1,20 +1,139 @@
-"""All that there is to tell of a run: the counts of its summary, and what a person asks next."""
+"""All that there is to tell of a run: the counts of its summary, and what a person asks next.
+
+What a run holds, in a few numbers.
+"""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dh2sim.simulate.convert.blocks import open_run
-from dh2sim.simulate.layout import FINISHED, STATUS
-from dh2sim.simulate.store.reader import reading
-from dh2sim.simulate.store.summary import RunSummary, summarize
+from dh2sim.simulate.dataset_layout import FINISHED, NOT_RUN, STATUS
+from dh2sim.simulate.store.blocks import Blocks
+from dh2sim.simulate.store.reader import read_attributes, read_seal, reading
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunSummary:
+    """What a run holds. Rollouts of a block that is not committed count as not run."""
+
+    path: str
+    robot: str
+    controller: str
+    rollouts: int
+    finished: int
+    """Rollouts that ran to their end."""
+    unstable: int
+    """Rollouts that stopped early."""
+    not_run: int
+    reasons: Mapping[str, int]
+    """Why rollouts stopped early, and how many for each reason."""
+    saturated: int
+    """Rollouts in which a wanted control was outside its range at least once."""
+    steps: int
+    """Time steps of a rollout."""
+    timestep: float
+    """s."""
+    every: int
+    """A state in so many is recorded."""
+    duration: float
+    """Simulated time of a rollout, s."""
+    variables: tuple[str, ...]
+    bytes_on_disk: int
+    blocks: int
+    blocks_done: int
+    seconds: float
+    """Time that the blocks took together, as far as it is known."""
+    steps_per_second: float | None
+    """Time steps of all rollouts of the blocks whose time is known, by that time."""
+    seed: int
+    created: str
+    """ISO time, UTC."""
+    versions: Mapping[str, str]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every block is committed."""
+        return self.blocks_done == self.blocks
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON values."""
+        values = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        values |= {"reasons": dict(self.reasons), "versions": dict(self.versions), "variables": list(self.variables)}
+        return {**values, "complete": self.complete}
+
+
+def summarize(path: str | PathLike[str]) -> RunSummary:
+    """Return what a run holds; of its numbers only a few per rollout are read, and chunks are not checked.
+
+    Raises:
+        RunError: there is no run.
+        RunDamagedError: what is read is damaged.
+    """
+    path = Path(path)
+    attributes = read_attributes(path)
+    blocks = Blocks(path=path, seal=read_seal(path, attributes))
+    settings = attributes["settings"]
+    done = [block for block in range(blocks.seal.blocks) if blocks.committed(block)]
+    status, stop_step, saturation = (_read(path, name) for name in ("status", "stop_step", "saturation"))
+    run = np.zeros(blocks.seal.rollouts, dtype=bool)
+    for block in done:
+        run[_part(blocks, block)] = True
+    status = np.where(run, status, NOT_RUN)
+    steps = np.where(stop_step >= 0, stop_step, settings["steps"])
+    times = {block: seconds for block in done if (seconds := blocks.seconds(block)) and np.isfinite(seconds)}
+    timed = sum(int(steps[_part(blocks, block)].sum()) for block in times)
+    seconds = sum(times.values())
+    return RunSummary(
+        path=str(path),
+        robot=attributes["robot"],
+        controller=settings["controller"],
+        rollouts=blocks.seal.rollouts,
+        finished=int((status == FINISHED).sum()),
+        unstable=int((status > FINISHED).sum()),
+        not_run=int((status == NOT_RUN).sum()),
+        reasons=MappingProxyType(_reasons(status)),
+        saturated=int((saturation[run] > 0).any(axis=1).sum()),
+        steps=settings["steps"],
+        timestep=attributes["timestep"],
+        every=settings["every"],
+        duration=settings["steps"] * attributes["timestep"],
+        variables=tuple(blocks.seal.variables),
+        bytes_on_disk=sum(file.stat().st_size for file in path.rglob("*") if file.is_file()),
+        blocks=blocks.seal.blocks,
+        blocks_done=len(done),
+        seconds=seconds,
+        steps_per_second=timed / seconds if seconds else None,
+        seed=settings["seed"],
+        created=attributes["created"],
+        versions=MappingProxyType(dict(attributes["versions"])),
+    )
+
+
+def _read(path: Path, name: str) -> NDArray[Any]:
+    import zarr
+
+    with reading(path):
+        return np.asarray(zarr.open_array(path / name, mode="r")[...])
+
+
+def _part(blocks: Blocks, block: int) -> slice:
+    first = block * blocks.seal.block
+    return slice(first, first + blocks.seal.size(block))
+
+
+def _reasons(status: NDArray[Any]) -> dict[str, int]:
+    counts = {name: int((status == value).sum()) for name, value in STATUS.items() if value > FINISHED}
+    return {name: count for name, count in counts.items() if count}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

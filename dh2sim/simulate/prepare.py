@@ -14,22 +14,20 @@ from typing import Any
 import numpy as np
 
 from dh2sim.errors import Dh2simError, SettingsError
-from dh2sim.formats.mjcf import MjcfOptions, to_mjcf
-from dh2sim.formats.scene import to_scene
+from dh2sim.formats.mjcf.scene import to_scene
+from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.block import plant_of, rehearse
-from dh2sim.simulate.controllers.choice import ControllerChoice
+from dh2sim.simulate.controllers.options import ControllerChoice
 from dh2sim.simulate.controllers.registry import choose
-from dh2sim.simulate.layout import FORMAT, Layout
+from dh2sim.simulate.dataset_layout import FORMAT, Layout, run_layout, run_sizes, run_variables
+from dh2sim.simulate.initial_states import Start, check_start, read_start
+from dh2sim.simulate.options import Wish, check_wish
 from dh2sim.simulate.plant import Plant
 from dh2sim.simulate.records import SENSED
 from dh2sim.simulate.settings import RANDOMIZABLE, Settings
-from dh2sim.simulate.start_text import Start, read_start
-from dh2sim.simulate.starts import check_start
-from dh2sim.simulate.variables import run_layout, run_sizes, run_variables
-from dh2sim.simulate.wish import Wish, check_wish
 
 BLOCK_BYTES = 2**26
 """What a block of rollouts records, at most; two of them are in memory at a time."""

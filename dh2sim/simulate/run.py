@@ -1,4 +1,7 @@
-"""Runs: block after block simulated, and each put where it is safe while the next one is on its way."""
+"""Runs: block after block simulated, and each put where it is safe while the next one is on its way.
+
+A run in memory.
+"""
 
 from __future__ import annotations
 
@@ -9,21 +12,39 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, SupportsIndex
+from typing import TYPE_CHECKING, Any, SupportsIndex
+
+import numpy as np
 
 from dh2sim.errors import SettingsError
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.load import load_robot
-from dh2sim.simulate.block import simulate_block
+from dh2sim.robot.read import load_robot
+from dh2sim.simulate.block import Block, simulate_block
+from dh2sim.simulate.dataset_layout import Layout
+from dh2sim.simulate.options import Wish, names_of
 from dh2sim.simulate.prepare import Job, prepare
 from dh2sim.simulate.settings import DEFAULT_RECORD
-from dh2sim.simulate.wish import Wish, names_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from dh2sim.simulate.store.writer import RunWriter
+
+
+def to_dataset(layout: Layout, arrays: Block) -> xr.Dataset:
+    """Put the variables of a whole run together; the same dataset as one that was written and opened."""
+    import xarray as xr
+
+    coordinates: dict[str, Any] = {
+        item.name: (item.dimension, np.asarray(item.values), dict(item.attributes)) for item in layout.coordinates
+    }
+    variables = {
+        variable.name: (variable.dimensions, arrays[variable.name], dict(variable.attributes))
+        for variable in layout.variables
+    }
+    return xr.Dataset(variables, coordinates, dict(layout.attributes))
+
 
 Advance = Callable[[int], None]
 """Told how many rollouts are done since it was last called."""
@@ -113,8 +134,6 @@ def rollout(
     )
     job = prepare(model, wish)
     if out is None:
-        from dh2sim.simulate.dataset import to_dataset
-
         try:
             whole = range(job.settings.rollouts)
             arrays = simulate_block(job.mjcf, job.settings, whole, threads=threads, advance=advance)

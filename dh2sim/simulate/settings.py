@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from dh2sim.simulate.controllers.choice import ControllerChoice
+from dh2sim.simulate.controllers.options import ControllerChoice
 from dh2sim.typing import Array
 
 RECORDABLE = ("qpos", "qvel", "ctrl", "tool_pose", "reference", "qacc", "torque", "energy", "contacts")

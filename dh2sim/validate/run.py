@@ -13,17 +13,20 @@ from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
 from dh2sim.errors import EngineCapacityError, EngineError
-from dh2sim.export.run import export_robot
-from dh2sim.export.signals import signals_deferred
-from dh2sim.export.verify import sampling_limits
+from dh2sim.export import export_robot, sampling_limits
+from dh2sim.files import signals_deferred
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.validate.dynamics import check_dynamics, check_inertias
-from dh2sim.validate.jacobians import DIFFERENCE_TOLERANCE, check_jacobian, table_jacobian
-from dh2sim.validate.library import LibraryEngine
-from dh2sim.validate.poses import check_poses
-from dh2sim.validate.quaternions import check_unit_quaternions
+from dh2sim.validate.kinematics import (
+    DIFFERENCE_TOLERANCE,
+    LibraryEngine,
+    check_jacobian,
+    check_poses,
+    check_unit_quaternions,
+    table_jacobian,
+)
 from dh2sim.validate.report import Check, Quantity, RobotReport
 
 SLOW_ROWS = 8000

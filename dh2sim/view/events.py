@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from dh2sim.robot.spec import Convention
-from dh2sim.robot.units import AngleUnit, LengthUnit
-from dh2sim.view.sight import Sight
+from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
+from dh2sim.view.scene.pinhole import Sight
 from dh2sim.view.state import Ghost, Matrix, Mode, Part, Pull
 
 

@@ -8,22 +8,22 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
 from dh2sim.errors import Dh2simError
-from dh2sim.view.camera import Watch
 from dh2sim.view.events import Event, Tell
-from dh2sim.view.link_grabs import LinkGrabs
-from dh2sim.view.mover import Mover
-from dh2sim.view.painter import Painter
+from dh2sim.view.motion.link_grabs import LinkGrabs
+from dh2sim.view.motion.motion_source import Mover
+from dh2sim.view.motion.tool_handle import ToolHandle
 from dh2sim.view.panel.panel import Panel
 from dh2sim.view.reduce import reduce
 from dh2sim.view.robot_files import RobotFiles
-from dh2sim.view.scene import scene_of
+from dh2sim.view.scene.camera import Watch
+from dh2sim.view.scene.painter import Painter
+from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import ViewState
-from dh2sim.view.tool_handle import ToolHandle
 
 if TYPE_CHECKING:
     import viser
 
-    from dh2sim.view.replay import Replay
+    from dh2sim.view.motion.replay import Replay
 
 GONE = ("on a closed connection", "Event loop is closed")
 """In what viser and asyncio say where a browser is gone: a warning (an error where warnings are), and an error."""

@@ -1,30 +1,175 @@
-"""A robot, still or moving, as one HTML file that opens without a server and without a network."""
+"""A robot, still or moving, as one HTML file that opens without a server and without a network.
+
+How much room scenes take.
+
+Scenes as one HTML page: viser's own page with what viser would have sent to it inside.
+
+viser's page is one file without references to others; a recording of what a server sends goes into it as
+base64, and is played back by the same code that draws for a server.
+"""
 
 from __future__ import annotations
 
+import html
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import PictureError
-from dh2sim.export.placing import written_whole
+from dh2sim.files import written_whole
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.transforms import compose, identity
+from dh2sim.messages import listed
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.words import listed
 from dh2sim.typing import Array
-from dh2sim.view.extent import triad_length
-from dh2sim.view.items import Item, Label, Placed, Scene, Triad
-from dh2sim.view.page_export_extent import extent_of
-from dh2sim.view.page_export_html import page_html
-from dh2sim.view.solids import orientation_of, position_of, robot_solids
+from dh2sim.view.scene.items import Arrow, Item, Label, Placed, Polyline, Quaternion, Scene, Solid, Triad, Vector
+from dh2sim.view.scene.painter import Painter
+from dh2sim.view.scene.robot_size import triad_length
+from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids
+from dh2sim.view.server import server_for_nobody
 
 if TYPE_CHECKING:
-    from dh2sim.simulate.pictures.selection import RolloutData
+    import viser
+
+    from dh2sim.draw.rollout_data import RolloutData
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Extent:
+    """A ball."""
+
+    centre: Vector
+    """m."""
+    radius: float
+    """m, positive."""
+
+
+def extent_of(scenes: Iterable[Scene]) -> Extent:
+    """Return a ball around all that scenes hold; its centre is that of the box along base_link's axes.
+
+    Args:
+        scenes: At least one, with at least one item; what carries others comes before them.
+    """
+    boxes: dict[int, Array] = {}
+    corners = []
+    for scene in scenes:
+        poses: dict[str, Array] = {}
+        for name, item in scene.items():
+            pose = poses[name] = poses.get(name.rsplit("/", 1)[0], np.eye(4)) @ _pose(item)
+            corners.append(_box(item, boxes) @ pose[:3, :3].T + pose[:3, 3])
+    points = np.concatenate(corners)
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    x, y, z = (float(value) for value in centre)
+    return Extent(centre=(x, y, z), radius=float(np.linalg.norm(points - centre, axis=1).max()) or 1.0)
+
+
+def _box(item: Item, boxes: dict[int, Array]) -> Array:
+    """Return the corners of a box around an item, in its own frame, shape (8, 3)."""
+    match item:
+        case Solid():
+            if id(item.vertices) not in boxes:  # solids share them from scene to scene
+                boxes[id(item.vertices)] = _corners(np.array(item.vertices))
+            return boxes[id(item.vertices)]
+        case Polyline():
+            return _corners(np.array(item.points))
+        case Arrow():
+            return _corners(np.array([item.start, item.end]))
+        case Triad():
+            return _corners(np.array([np.zeros(3), np.full(3, item.length)]))
+        case _:
+            return np.zeros((8, 3))
+
+
+def _corners(points: Array) -> Array:
+    ends = np.array([points.min(axis=0), points.max(axis=0)])
+    return np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+
+
+def _pose(item: Item) -> Array:
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = _rotation(item.orientation), item.position
+    return T
+
+
+def _rotation(quaternion: Quaternion) -> Array:
+    """Return the rotation of a unit quaternion, shape (3, 3)."""
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+_FIELD: Final = math.radians(40.0)
+"""How wide the camera sees, up and down."""
+_FROM: Final = (1.0, -1.25, 0.7)
+"""Where the camera is, seen from the middle."""
+_ROOM: Final = 1.05
+"""Around the extent."""
+_LAST: Final = 1.0 / 30.0
+"""s: how long the end of an animation stands, before it begins again."""
+_TITLE: Final = "<title>Viser</title>"
+
+
+def page_html(moments: Sequence[tuple[float, Scene]], *, title: str, extent: Extent) -> str:
+    """Return a page that needs nothing but a browser.
+
+    Args:
+        moments: Times, s, ascending from 0, and what is seen then; a single one stands still, more are played again
+            and again, with a time slider.
+        title: Of the page.
+        extent: What the camera looks at first.
+    """
+    with server_for_nobody() as server:
+        _look_at(server, extent)
+        _add_ground(server, extent)
+        painter = Painter(server.scene)
+        painter.draw(moments[0][1])
+        recording = server.get_scene_serializer()
+        now = moments[0][0]
+        for time, scene in moments[1:]:
+            recording.insert_sleep(time - now)
+            painter.draw(scene)
+            now = time
+        if len(moments) > 1:
+            recording.insert_sleep(_LAST)
+        page = recording.as_html()
+    return page.replace(_TITLE, f"<title>{html.escape(title)}</title>", 1)
+
+
+def _look_at(server: viser.ViserServer, extent: Extent) -> None:
+    distance = _ROOM * extent.radius / math.sin(0.5 * _FIELD)
+    direction = np.array(_FROM) / np.linalg.norm(_FROM)
+    camera = server.initial_camera
+    camera.look_at = extent.centre
+    camera.position = np.array(extent.centre) + distance * direction
+    camera.fov = _FIELD
+    camera.near, camera.far = 0.01 * distance, 100.0 * distance
+
+
+def _add_ground(server: viser.ViserServer, extent: Extent) -> None:
+    """Add a grid of a round number of metres on the ground, below the middle of what is seen."""
+    cell = _round_length(extent.radius / 4.0)
+    side = 20.0 * cell
+    x, y = (5.0 * cell * round(value / (5.0 * cell)) for value in extent.centre[:2])
+    server.scene.add_grid(
+        "/ground", width=side, height=side, cell_size=cell, section_size=5.0 * cell, position=(x, y, 0.0)
+    )
+
+
+def _round_length(length: float) -> float:
+    """Return 1, 2 or 5 times a power of ten, at most ``length``."""
+    unit = 10.0 ** math.floor(math.log10(length))
+    return max(step for step in (1.0, 2.0, 5.0) if step * unit <= length) * unit
+
 
 RATE = 30.0
 """Pictures a second of an animation, at most."""

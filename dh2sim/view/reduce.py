@@ -1,22 +1,97 @@
-"""What comes of a page when something happens: a pure function, which never raises."""
+"""What comes of a page when something happens: a pure function, which never raises.
+
+Edits of the table can be taken back, one after the other.
+
+Where tool0 has been.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import assert_never
+from typing import Final, assert_never
 
-from dh2sim.export.verify import sampling_limits
-from dh2sim.kinematics.frames import frame_names
+import numpy as np
+
+from dh2sim.export import sampling_limits
+from dh2sim.kinematics.forward import forward_kinematics, frame_names
 from dh2sim.kinematics.sampling import random_configurations
+from dh2sim.kinematics.transforms import compose
+from dh2sim.messages import shown as shown_word
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.words import shown as shown_word
 from dh2sim.view import events
+from dh2sim.view.events import EditCell, Event, OpenText, Undo
+from dh2sim.view.scene.items import Vector
+from dh2sim.view.scene.solids import position_of
 from dh2sim.view.state import IDENTITY, Goal, Matrix, Mode, Part, Pull, ViewState, configurations, travel, within
 from dh2sim.view.table_edits import reading_of, replaced, table_changed
-from dh2sim.view.trace import traced
-from dh2sim.view.undo import remembered, undone
 from dh2sim.view.uploads import opened
+
+MOST: Final = 100
+"""Edits that can be taken back."""
+MOST_LETTERS: Final = 4_000_000
+"""Of all the robot files that are kept for that."""
+
+
+def remembered(before: ViewState, event: Event, after: ViewState) -> ViewState:
+    """Return the state ``after`` an event, from which one can return to the robot file of ``before``.
+
+    What is typed into one cell, letter by letter, is one edit. Another file begins anew.
+    """
+    if isinstance(event, Undo | OpenText) or after.text == before.text:
+        return after
+    cell = (event.row, event.column) if isinstance(event, EditCell) else None
+    if cell is not None and cell == before.typed:
+        return after
+    return replace(after, earlier=_bounded((*before.earlier, before.text)), typed=cell)
+
+
+def undone(state: ViewState) -> ViewState:
+    """Return the state with the robot file of before the last edit, if there is one."""
+    if not state.earlier:
+        return replace(state, notice="There is no edit to take back.")
+    after = replaced(state, state.earlier[-1])
+    return after if after.text == state.text else replace(after, earlier=state.earlier[:-1], typed=None)
+
+
+def _bounded(texts: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the last of the texts, as many as are kept."""
+    kept = texts[-MOST:]
+    while len(kept) > 1 and sum(map(len, kept)) > MOST_LETTERS:
+        kept = kept[1:]
+    return kept
+
+
+LONGEST: Final = 2000
+"""Points: older ones are forgotten."""
+_NEAR: Final = 1e-3
+"""Points nearer to the last one than this share of the reach are left out."""
+
+
+def traced(before: ViewState, after: ViewState) -> ViewState:
+    """Return the state ``after`` with the way of tool0, in the world, since ``before``; none where it is not shown.
+
+    Another robot begins another trace, and so does a base that goes where it was before a recording.
+    """
+    moved = after.T_world_base_link != before.T_world_base_link
+    brought_back = moved and after.mode is not before.mode
+    if Part.TRACE not in after.shown or after.model is not before.model or brought_back:
+        return replace(after, trace=()) if after.trace else after
+    if after.q == before.q and not moved and after.trace:
+        return after
+    points = after.trace or (_tool(before),)
+    place = _tool(after)
+    if math.dist(points[-1], place) <= _NEAR * (after.model.reach or 1.0):
+        return after if after.trace else replace(after, trace=points)
+    return replace(after, trace=(*points, place)[-LONGEST:])
+
+
+def _tool(state: ViewState) -> Vector:
+    T_base_tool = forward_kinematics(state.model.chain, state.q)
+    if not state.floats:
+        return position_of(T_base_tool)
+    return position_of(compose(np.array(state.T_world_base_link), T_base_tool))
+
 
 TURN_STEP = math.radians(3.0)
 """rad: of a nudge."""

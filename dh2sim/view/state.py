@@ -11,10 +11,9 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from dh2sim.model.robot_model import JointModel, RobotModel
-from dh2sim.robot.spec import Convention, JointType, RobotSpec
-from dh2sim.robot.units import AngleUnit, Units
-from dh2sim.view.items import Vector
-from dh2sim.view.sight import Sight
+from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Units
+from dh2sim.view.scene.items import Vector
+from dh2sim.view.scene.pinhole import Sight
 
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 """A pose of shape (4, 4), as tuples, so that states compare by value."""

@@ -7,16 +7,16 @@ from dataclasses import replace
 from typing import TypeAlias
 
 from dh2sim.errors import Dh2simError
-from dh2sim.kinematics.frames import frame_names
+from dh2sim.kinematics.forward import frame_names
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.robot.edit import Cell, own_conventions
 from dh2sim.robot.spec import Convention, JointType
-from dh2sim.robot.writing.robot_file import robot_file_text
-from dh2sim.view.draft import LONGEST_CELL, Source, Wrong, complaints_of, draft_of, read, too_long, try_cells
+from dh2sim.robot.write import robot_file_text
 from dh2sim.view.events import ConvertTable, EditCell, SetConvention, SetUnits
-from dh2sim.view.ghost import other_reading
+from dh2sim.view.scene.ghost import other_reading
 from dh2sim.view.state import COLUMNS, CONVENTION, Complaint, Ghost, Mode, ViewState, configurations, within
-from dh2sim.view.table_text import Cell, own_conventions
+from dh2sim.view.table_state import LONGEST_CELL, Source, Wrong, complaints_of, draft_of, read, too_long, try_cells
 
 TableEvent: TypeAlias = EditCell | SetConvention | ConvertTable | SetUnits
 
@@ -126,7 +126,7 @@ def _with_robot(
 
 
 def _converted(state: ViewState, convention: Convention) -> ViewState:
-    from dh2sim.imports.converted import convert_robot
+    from dh2sim.importing.convert import convert_robot
 
     if convention is Convention.HAYATI:
         return replace(state, notice="A table can be converted to standard or modified, not to Hayati.")

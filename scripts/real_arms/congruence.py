@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dh2sim.kinematics.comparison import pose_errors
 from dh2sim.kinematics.sampling import random_configurations
-from dh2sim.kinematics.table import table_tool_pose
-from dh2sim.kinematics.transforms import invert, pose_from_rpy, rpy_from_rotation
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.kinematics.transforms import invert, pose_errors, pose_from_rpy, rpy_from_rotation
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from scripts.real_arms.published import Published

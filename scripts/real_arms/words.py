@@ -58,7 +58,7 @@ REPEAT = """\
 
 downloads the four packages of the versions above into `wheels` (or takes them from there), unpacks the descriptions,
 imports every arm, and writes this page; `--check` compares with it instead, but for the digits of errors that are
-rounding. The lists of arms and of published tables are in `scripts/real_arms`. `tests/imports/test_real_robots.py`
+rounding. The lists of arms and of published tables are in `scripts/real_arms`. `tests/importing/test_real_robots.py`
 imports the same arms out of those of the packages that are installed, and takes them all the way: file → table →
 URDF → pinocchio. `tests/test_imported_robots_page.py` computes the poses of the tables that are printed here.
 """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dh2sim.robot.load import load_robot, parse_robot
+from dh2sim.robot.read import load_robot, parse_robot
 from tests.program import dh2sim
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dh2sim import build_chain, forward_kinematics, load_robot
-from dh2sim.kinematics.frames import frame_names, frame_pose
+from dh2sim.kinematics.forward import frame_names, frame_pose
 from tests.export.robots import ODD, write
 from tests.program import Outcome, dh2sim
 

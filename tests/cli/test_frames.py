@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dh2sim.robot.load import parse_robot
+from dh2sim.robot.read import parse_robot
 from tests.program import contents, dh2sim
 
 AXES = """\

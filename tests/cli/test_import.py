@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from dh2sim.formats.urdf import to_urdf
+from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
-from dh2sim.robot.load import load_robot, parse_robot
+from dh2sim.robot.read import load_robot, parse_robot
 from tests.program import contents, dh2sim, dh2sim_process
 
 CSV = "theta,d (m),a (m),alpha (deg)\nq1,0.4,0,-90\nq2,0.15,0,90\n"

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.draw.drawing import require_gl
 from tests.program import Outcome, dh2sim, environment
-from tests.simulate.pictures.drawing import require_gl
 
 UNSTABLE = """
 name: shaky

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from dh2sim.cli.sizes import size_text
+from dh2sim.cli.common import size_text
+from dh2sim.simulate.dataset_layout import STATUS, Layout
 from dh2sim.simulate.description import resumed
-from dh2sim.simulate.layout import STATUS, Layout
 from tests.program import Outcome, contents, dh2sim
 from tests.simulate.convert.samples import Arrays, make_arrays, make_layout, write_run
 

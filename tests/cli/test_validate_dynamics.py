@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tests.export.robots import small, write
 from tests.program import Outcome, dh2sim, dh2sim_process
-from tests.simulate.physics.robots import FOLDED, WEAK
+from tests.validate.motion.robots import FOLDED, WEAK
 
 QUANTITIES = ["energy order", "momentum", "rest", "tracking", "inverse dynamics", "self-contact"]
 

@@ -19,11 +19,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim.kinematics.table import table_tool_pose
-from dh2sim.robot.catalog import builtin_robots
-from dh2sim.robot.load import load_robot
-from dh2sim.view.opening import folder_of, open_state
-from dh2sim.view.scene import scene_of
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.read import builtin_robots, load_robot
+from dh2sim.view.initial_state import folder_of, open_state
+from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.server import is_private
 from tests.program import dh2sim, dh2sim_process, environment
 

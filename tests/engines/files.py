@@ -8,8 +8,8 @@ from dh2sim.engines.engine import DynamicsEngine, PoseEngine
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
-from dh2sim.formats.mjcf import to_mjcf
-from dh2sim.formats.urdf import to_urdf
+from dh2sim.formats.mjcf.write import to_mjcf
+from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.robot_model import RobotModel
 
 ENGINES = ["mujoco-mjcf", "mujoco-urdf", "pinocchio", "yourdfpy"]

@@ -13,8 +13,8 @@ from dh2sim.engines.engine import PoseEngine
 from dh2sim.engines.mujoco_engine import BLOCK_BYTES, MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.errors import EngineError
-from dh2sim.formats.urdf import to_urdf
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
+from dh2sim.formats.urdf.write import to_urdf
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import Dynamics, JointType, RobotSpec, Row

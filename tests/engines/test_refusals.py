@@ -10,8 +10,8 @@ import yourdfpy
 
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.errors import EngineCapacityError, EngineError
-from dh2sim.formats.mjcf import to_mjcf
-from dh2sim.formats.urdf import to_urdf
+from dh2sim.formats.mjcf.write import to_mjcf
+from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 from tests.engines.files import ENGINES, joint_names, path_of, pose_engine, write

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dh2sim import build_model
-from dh2sim.export.run import drift
+from dh2sim.export import drift
 from tests.robots.samples import NAMES, robot
 
 GENERATED = Path(__file__).parents[2] / "generated"

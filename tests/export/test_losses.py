@@ -6,9 +6,7 @@ import pytest
 import trimesh
 
 from dh2sim import build_model, parse_robot
-from dh2sim.export.losses import losses
-from dh2sim.export.render import Format
-from dh2sim.export.run import ALL_FORMATS
+from dh2sim.export import ALL_FORMATS, Format, losses
 from tests.export.robots import ODD, RICH, small, write
 from tests.program import contents, dh2sim
 

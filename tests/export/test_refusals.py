@@ -6,7 +6,7 @@ import pytest
 
 from dh2sim import build_model, parse_robot
 from dh2sim.errors import MismatchError
-from dh2sim.export.run import export_robot
+from dh2sim.export import export_robot
 from tests.export.broken import shifted_chain
 from tests.export.robots import small, snake, write
 from tests.program import Outcome, contents, dh2sim

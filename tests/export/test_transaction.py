@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from dh2sim.errors import OutputError
-from dh2sim.export.transaction import put_in_place, staged
+from dh2sim.files import put_in_place, staged
 from tests.export.robots import small, write
 from tests.program import Outcome, contents, dh2sim, environment
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 from dh2sim.errors import ModelError
-from dh2sim.formats.mjcf import EXPORTED, to_mjcf
+from dh2sim.formats.mjcf.write import EXPORTED, to_mjcf
 from dh2sim.kinematics.transforms import quaternion_from_rotation
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel

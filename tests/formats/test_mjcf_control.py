@@ -8,10 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from dh2sim.formats.mjcf import to_mjcf
-from dh2sim.formats.mjcf_control import holding_controls
-from dh2sim.formats.scene import to_scene
-from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.formats.mjcf.scene import to_scene
+from dh2sim.formats.mjcf.write import holding_controls, to_mjcf
+from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Limits, RobotSpec, Row

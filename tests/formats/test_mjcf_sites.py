@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from dh2sim.formats.mjcf import to_mjcf
-from dh2sim.formats.mjcf_sites import needs_body
+from dh2sim.formats.mjcf.sites import needs_body
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.kinematics.transforms import identity, pose_from_rpy
 from dh2sim.model.build import build_model
 from dh2sim.model.mass import MassProperties

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from dh2sim.formats.mjcf import to_mjcf
-from dh2sim.formats.urdf import to_urdf
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
+from dh2sim.formats.mjcf.write import to_mjcf
+from dh2sim.formats.urdf.write import to_urdf
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import BaseSpec, LinkSpec, Pose, RobotSpec, Row

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from dh2sim.formats.mjcf import to_mjcf
-from dh2sim.formats.scene import to_scene
+from dh2sim.formats.mjcf.scene import to_scene
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import BaseSpec, JointType, Pose, RobotSpec, Row

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from dh2sim.formats.urdf import to_urdf
-from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.formats.urdf.write import to_urdf
+from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import rpy_from_rotation
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel

@@ -9,10 +9,10 @@ import pytest
 import trimesh
 import yourdfpy
 
-from dh2sim.formats.urdf import to_urdf
-from dh2sim.kinematics.table import table_frame_poses
+from dh2sim.formats.urdf.write import to_urdf
+from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.model.build import build_model
-from dh2sim.robot.load import parse_robot
+from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.formats.readers import floats, in_check_urdf, parsed

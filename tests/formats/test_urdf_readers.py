@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from dh2sim.formats.urdf import to_urdf
+from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import RobotSpec

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dh2sim.formats.mjcf import to_mjcf
-from dh2sim.formats.scene import to_scene
-from dh2sim.formats.urdf import to_urdf
-from dh2sim.formats.xml import assumptions, estimates, number, numbers
+from dh2sim.formats.mjcf.scene import to_scene
+from dh2sim.formats.mjcf.write import to_mjcf
+from dh2sim.formats.urdf.write import to_urdf
+from dh2sim.formats.xml_write import assumptions, estimates, number, numbers
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import Limits, LinkSpec, RobotSpec, Row, SourceFile
 from dh2sim.typing import read_only

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from dh2sim.errors import ImportedFileError
-from dh2sim.formats.xml_tree import (
+from dh2sim.formats.xml_read import (
     MAX_ATTRIBUTE,
     MAX_ATTRIBUTES,
     MAX_BYTES,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import BaseSpec, Convention, Pose, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 from tests.kinematics.robots import HAYATI, MODIFIED, ODD, STANDARD, row

@@ -9,7 +9,7 @@ from hypothesis import given
 
 from dh2sim.kinematics.chain import KinematicChain, build_chain
 from dh2sim.kinematics.forward import frame_poses
-from dh2sim.kinematics.table import row_matrix, table_frame_poses
+from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses
 from dh2sim.kinematics.transforms import compose, joint_part, link_part
 from dh2sim.robot.spec import Pose, RobotSpec, Row
 from dh2sim.typing import Array, read_only

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dh2sim.kinematics.comparison import pose_errors
-from dh2sim.kinematics.transforms import compose, pose_from_rpy
+from dh2sim.kinematics.transforms import compose, pose_errors, pose_from_rpy
 from dh2sim.typing import Array
 from tests.strategies import angles, lengths, vectors
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.kinematics.conversion import convert_rows
-from dh2sim.kinematics.table import table_frame_poses
-from dh2sim.robot.load import load_robot
+from dh2sim.kinematics.table_oracle import table_frame_poses
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import Convention, Limits, RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.kinematics.arms import (

@@ -14,7 +14,7 @@ from hypothesis.strategies import DrawFn
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.forward import reference_joint_poses
-from dh2sim.kinematics.table import table_frame_poses
+from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import BaseSpec, Convention, LinkSpec, MeshSpec, RobotSpec

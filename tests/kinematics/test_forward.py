@@ -9,15 +9,10 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.kinematics.block import BLOCK, sines_and_cosines
+from dh2sim.kinematics.batch_frame import BLOCK, sines_and_cosines
 from dh2sim.kinematics.chain import build_chain
-from dh2sim.kinematics.forward import (
-    forward_kinematics,
-    frame_poses,
-    joint_poses,
-    reference_joint_poses,
-)
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
+from dh2sim.kinematics.forward import forward_kinematics, frame_poses, joint_poses, reference_joint_poses
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.trig import sin_cos
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.kinematics.block import BLOCK
+from dh2sim.kinematics.batch_frame import BLOCK
 from dh2sim.kinematics.chain import build_chain
-from dh2sim.kinematics.jacobian import geometric_jacobian
-from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.kinematics.forward import geometric_jacobian
+from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.kinematics.robots import ODD_ARM, STANFORD, row

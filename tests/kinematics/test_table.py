@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.kinematics import table
-from dh2sim.kinematics.table import row_matrix, table_frame_poses, table_tool_pose
+from dh2sim.kinematics import table_oracle as table
+from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses, table_tool_pose
 from dh2sim.robot.spec import Convention, Pose, RobotSpec
 from dh2sim.typing import read_only
 from tests.kinematics.robots import HAYATI, MODIFIED, ODD, ODD_ARM, STANDARD, STANFORD, row

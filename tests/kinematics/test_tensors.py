@@ -3,8 +3,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 
-from dh2sim.kinematics.tensors import move_point, rotate_tensor
-from dh2sim.kinematics.transforms import pose_from_rpy
+from dh2sim.kinematics.transforms import move_point, pose_from_rpy, rotate_tensor
 from dh2sim.typing import Array
 from tests.strategies import angles, inertias, lengths, vectors
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from dh2sim.kinematics.conversion import XPart, as_pose, before, behind, inverse, merged, x_part_of
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.kinematics.x_parts import XPart, as_pose, before, behind, inverse, merged, x_part_of
 from dh2sim.robot.spec import Pose
 from dh2sim.typing import Array, read_only
 from tests.kinematics.robots import ODD

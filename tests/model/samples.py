@@ -9,7 +9,7 @@ from types import MappingProxyType
 import mujoco
 import numpy as np
 
-from dh2sim.formats.mjcf import to_mjcf
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import BaseSpec, Convention, JointType, Limits, LinkSpec, Pose, RobotSpec, Row

@@ -10,13 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim.formats.mjcf import to_mjcf
-from dh2sim.formats.scene import to_scene
-from dh2sim.formats.urdf import to_urdf
-from dh2sim.model.actuators import ASSUMED_BANDWIDTH
+from dh2sim.formats.mjcf.scene import to_scene
+from dh2sim.formats.mjcf.write import to_mjcf
+from dh2sim.formats.urdf.write import to_urdf
+from dh2sim.model.actuators import ASSUMED_BANDWIDTH, seen_inertias
 from dh2sim.model.build import BASE_COLOR, JOINT_COLOR, PALETTE, build_model
 from dh2sim.model.robot_model import ActuatorModel, RobotModel
-from dh2sim.model.statics import seen_inertias
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, BaseSpec, Dynamics, LinkSpec, RobotSpec, Row
 from tests.model.samples import ODD_ROBOT, REVOLUTE, STANDARD, model
 from tests.robots.samples import NAMES

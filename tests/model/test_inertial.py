@@ -7,11 +7,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from dh2sim.formats.mjcf import to_mjcf
-from dh2sim.formats.urdf import to_urdf
+from dh2sim.formats.mjcf.write import to_mjcf
+from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
-from dh2sim.model.inertial import ASSUMED_DENSITY, LEAST_INERTIA, LEAST_MASS
-from dh2sim.model.mass import MassProperties
+from dh2sim.model.mass import ASSUMED_DENSITY, LEAST_INERTIA, LEAST_MASS, MassProperties
 from dh2sim.model.robot_model import LinkModel
 from dh2sim.robot.spec import Convention, LinkSpec, RobotSpec, Row
 from dh2sim.typing import Array, read_only

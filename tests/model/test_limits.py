@@ -7,23 +7,13 @@ import pytest
 from hypothesis import given, settings
 
 from dh2sim.kinematics.forward import joint_poses
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.limits import ASSUMED_SLIDE_RATE, ASSUMED_TURN_RATE
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import BaseSpec, JointType, Limits, Pose, RobotSpec, Row
 from dh2sim.typing import read_only
-from tests.model.samples import (
-    CONTINUOUS,
-    FIXED,
-    MODIFIED,
-    ODD,
-    PRISMATIC,
-    REVOLUTE,
-    STANDARD,
-    in_limits,
-    model,
-)
+from tests.model.samples import CONTINUOUS, FIXED, MODIFIED, ODD, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
 from tests.robots.samples import NAMES
 from tests.strategies import robot_specs
 

@@ -9,7 +9,7 @@ import trimesh
 from dh2sim.errors import MeshError, RobotFileError
 from dh2sim.model.build import build_model
 from dh2sim.model.meshes import MOST_FACES
-from dh2sim.robot.load import parse_robot
+from dh2sim.robot.read import parse_robot
 
 WHERE = "robot.yaml:5:58: joints[1].link.mesh.file"
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from dh2sim.formats.mjcf import to_mjcf
-from dh2sim.kinematics.table import table_frame_poses
+from dh2sim.formats.mjcf.write import to_mjcf
+from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.model.build import build_model
 from dh2sim.model.meshes import STL_FACE, STL_HEADER
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.load import parse_robot
+from dh2sim.robot.read import parse_robot
 from dh2sim.typing import Array
 
 FORMATS = ["stl", "stl_ascii", "obj", "ply", "glb"]

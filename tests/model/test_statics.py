@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from dh2sim.model.actuators import gravity_loads, seen_inertias
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.model.statics import gravity_loads, seen_inertias
 from dh2sim.robot.spec import RobotSpec, Row
 from dh2sim.typing import Array, read_only
 from tests.model.samples import ODD_ROBOT, PRISMATIC, REVOLUTE, STANDARD, compiled, in_limits, model

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 
 from dh2sim.model.build import build_model
+from dh2sim.model.collision_exclusions import ExcludedPair, Reason, segment_distance
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.model.touching import ExcludedPair, Reason, segment_distance
 from dh2sim.robot.spec import JointType, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 from tests.model.samples import FIXED, MODIFIED, REVOLUTE, STANDARD, compiled, model

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import dh2sim
-from dh2sim.formats.mjcf import MjcfOptions, to_mjcf
+from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes

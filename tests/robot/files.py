@@ -6,7 +6,7 @@ import textwrap
 from pathlib import Path
 
 from dh2sim.errors import RobotFileError
-from dh2sim.robot.load import parse_robot
+from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import RobotSpec
 
 MINIMAL = "name: r\nconvention: standard\njoints:\n- {type: revolute}\n"

@@ -6,9 +6,7 @@ import time
 
 import pytest
 
-from dh2sim.robot.compose import MAX_DEPTH, MAX_NODES, compose
-from dh2sim.robot.document import MAX_BYTES, MAX_LINE, Node, decode
-from dh2sim.robot.report import Report
+from dh2sim.robot.yaml_tree import MAX_BYTES, MAX_DEPTH, MAX_LINE, MAX_NODES, Node, Report, compose, decode
 from tests.robot.files import MINIMAL, complaints, robot
 
 

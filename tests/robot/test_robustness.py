@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dh2sim.errors import Dh2simError, RobotFileError
-from dh2sim.robot.load import parse_robot
+from dh2sim.robot.read import parse_robot
 from tests.robot.files import FULL, MINIMAL
 
 SPICE = "{}[]:,-?&*!|>'\"%@`#\n\t\r \\0aé\u2028\ufeff~<="

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from dh2sim.robot.scalars import Scalar, resolve_plain
+from dh2sim.robot.yaml_tree import Scalar, resolve_plain
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from dh2sim import build_chain, forward_kinematics, frame_poses, load_robot
-from dh2sim.kinematics.table import table_frame_poses
+from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 

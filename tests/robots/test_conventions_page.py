@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from dh2sim import build_chain
-from dh2sim.kinematics.table import row_matrix, table_tool_pose
-from dh2sim.robot.load import parse_robot
+from dh2sim.kinematics.table_oracle import row_matrix, table_tool_pose
+from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import Convention, JointType, Pose, RobotSpec, Row
 from dh2sim.typing import Array
 

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import pytest
 
-from dh2sim.kinematics.table import table_frame_poses
+from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.typing import Array
 
 from .samples import random_configurations, robot

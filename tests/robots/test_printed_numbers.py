@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dh2sim import build_chain, forward_kinematics
-from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 

@@ -6,8 +6,9 @@ import mujoco
 import pytest
 
 from dh2sim.errors import ControllerError
-from dh2sim.simulate import engine, rollout
-from dh2sim.simulate.engine import quiet_engine
+from dh2sim.simulate import mujoco_runtime as engine
+from dh2sim.simulate import rollout
+from dh2sim.simulate.mujoco_runtime import quiet_engine
 from tests.simulate import robots
 
 

@@ -15,15 +15,15 @@ from pathlib import Path
 import pytest
 import xarray
 
-from dh2sim.cli.running import BAD_INPUT, INTERRUPTED
+from dh2sim.cli.common import BAD_INPUT, INTERRUPTED
 from dh2sim.model.build import build_model
-from dh2sim.robot.load import load_robot
+from dh2sim.robot.read import load_robot
+from dh2sim.simulate.description import summarize
+from dh2sim.simulate.options import Wish
 from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.run import fill
 from dh2sim.simulate.store.reader import open_dataset
-from dh2sim.simulate.store.summary import summarize
 from dh2sim.simulate.store.writer import RunWriter
-from dh2sim.simulate.wish import Wish
 from tests.export.robots import small
 from tests.program import Outcome, contents, dh2sim, dh2sim_process, environment
 

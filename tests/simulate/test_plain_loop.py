@@ -11,7 +11,7 @@ import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import quaternion_from_rotation
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel

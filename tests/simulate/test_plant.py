@@ -7,9 +7,9 @@ from dh2sim.errors import EngineError
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import ActuatorType, Convention, Limits, RobotSpec, Row
 from dh2sim.simulate.block import plant_of
+from dh2sim.simulate.options import Wish
 from dh2sim.simulate.plant import Plant
 from dh2sim.simulate.prepare import prepare
-from dh2sim.simulate.wish import Wish
 from tests.model.samples import CONTINUOUS, FIXED, PRISMATIC, REVOLUTE, model
 from tests.simulate import robots
 

@@ -19,10 +19,10 @@ import dh2sim
 from dh2sim.errors import SettingsError
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import builtin_robots
 from dh2sim.robot.spec import ActuatorType
+from dh2sim.simulate.options import Wish
 from dh2sim.simulate.prepare import Job, prepare
-from dh2sim.simulate.wish import Wish
 from tests.export.robots import write
 from tests.model.samples import ODD_ROBOT, model
 from tests.simulate import robots

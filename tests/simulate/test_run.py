@@ -14,9 +14,9 @@ import dh2sim
 import dh2sim.simulate
 from dh2sim.errors import ControllerError, RunDiffersError, RunExistsError, SettingsError, UnknownRobotError
 from dh2sim.simulate import open_dataset, rollout
+from dh2sim.simulate.options import Wish
 from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.run import fill, open_run
-from dh2sim.simulate.wish import Wish
 from tests.model.samples import model
 from tests.program import contents
 from tests.simulate import robots
@@ -152,7 +152,7 @@ def test_blocks_are_filled_until_one_is_asked_to_stop(tmp_path: Path, monkeypatc
 
 def test_memory_is_bounded_by_the_block_and_not_by_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dh2sim.simulate.prepare.BLOCK_BYTES", 2**21)
-    monkeypatch.setattr("dh2sim.simulate.open_loop.SEGMENT_BYTES", 2**20)
+    monkeypatch.setattr("dh2sim.simulate.loops.SEGMENT_BYTES", 2**20)
     rollout("planar_2r", rollouts=10, steps=200, out=tmp_path / "warm.zarr", threads=2)
     peaks = []
     for name, how in (

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dh2sim.simulate import block, closed_loop, open_loop, rollout
+from dh2sim.simulate import block, rollout
+from dh2sim.simulate import loops as closed_loop
+from dh2sim.simulate import loops as open_loop
 from dh2sim.simulate.block import simulate_block
+from dh2sim.simulate.options import Wish
 from dh2sim.simulate.prepare import Job, prepare
-from dh2sim.simulate.wish import Wish
 from tests.program import environment
 from tests.simulate import robots
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dh2sim.simulate import rollout
-from dh2sim.simulate.seeds import Generators, Purpose, generator
+from dh2sim.simulate.randomization import Generators, Purpose, generator
 from tests.simulate import robots
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from dh2sim.errors import SettingsError
 from dh2sim.simulate import rollout
-from dh2sim.simulate.start_text import Start, read_start
+from dh2sim.simulate.initial_states import Start, read_start
 
 JOINTS = ("joint_1", "slide")
 CONFIGURATIONS = {"home": np.array([0.1, 0.2]), "folded": np.array([0.3, 0.4])}

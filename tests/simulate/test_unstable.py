@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dh2sim.simulate import block, open_loop, rollout
+from dh2sim.simulate import block, rollout
+from dh2sim.simulate import loops as open_loop
 from dh2sim.simulate.block import simulate_block
-from dh2sim.simulate.layout import STATUS
+from dh2sim.simulate.dataset_layout import STATUS
+from dh2sim.simulate.options import Wish
 from dh2sim.simulate.prepare import prepare
-from dh2sim.simulate.wish import Wish
 from dh2sim.typing import Array
 from tests.simulate import plain, robots
 

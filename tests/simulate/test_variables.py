@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dh2sim.simulate.layout import STATUS, Layout
+from dh2sim.simulate.dataset_layout import STATUS, Layout
+from dh2sim.simulate.options import Wish
 from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.settings import RECORDABLE
-from dh2sim.simulate.wish import Wish
 from tests.model.samples import model
 from tests.simulate import robots
 

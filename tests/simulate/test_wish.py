@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from dh2sim.simulate.options import Wish, check_wish, names_of
 from dh2sim.simulate.settings import RECORDABLE
-from dh2sim.simulate.wish import Wish, check_wish, names_of
 
 QUANTITIES = "mass, friction, damping, armature, gain"
 

@@ -8,9 +8,7 @@ import pytest
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.robot.spec import JointType, RobotSpec
 from dh2sim.typing import Array
-from dh2sim.validate.jacobians import check_jacobian, table_jacobian
-from dh2sim.validate.library import LibraryEngine
-from dh2sim.validate.poses import check_poses
+from dh2sim.validate.kinematics import LibraryEngine, check_jacobian, check_poses, table_jacobian
 from dh2sim.validate.report import Check
 from tests.kinematics.robots import row
 

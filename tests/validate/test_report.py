@@ -10,8 +10,7 @@ from typing import Any
 
 import pytest
 
-from dh2sim.validate.junit import failure_text, to_junit
-from dh2sim.validate.report import Check, Quantity, RobotReport, ValidationReport, Worst
+from dh2sim.validate.report import Check, Quantity, RobotReport, ValidationReport, Worst, failure_text, to_junit
 from tests.export.robots import ODD, small, write
 from tests.program import dh2sim
 from tests.validate.files import change, numbers, part, validated

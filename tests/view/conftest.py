@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dh2sim.robot.load import load_robot
-from dh2sim.view.opening import open_state
+from dh2sim.robot.read import load_robot
+from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import ViewState

@@ -9,13 +9,11 @@ from hypothesis import strategies as st
 
 from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.chain import build_chain
-from dh2sim.kinematics.table import table_frame_poses
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
-from dh2sim.robot.units import AngleUnit
+from dh2sim.kinematics.table_oracle import table_frame_poses
+from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Row
 from dh2sim.typing import Array
-from dh2sim.view.annotations import COLORS, row_annotations
-from dh2sim.view.items import Arrow, Item, Label, Path, Scene
-from dh2sim.view.notation import Quantity
+from dh2sim.view.scene.annotations import COLORS, Quantity, row_annotations
+from dh2sim.view.scene.items import Arrow, Item, Label, Polyline, Scene
 from tests.kinematics.robots import HAYATI, MODIFIED, ODD_ARM, STANDARD, row
 from tests.robots.samples import robot
 from tests.strategies import robots_with_joint_vectors
@@ -64,7 +62,7 @@ def along(scene: Scene, order: tuple[str, ...], T: Array) -> Array:
             axis = R[:, 0 if name == "a" else 2]
             np.testing.assert_allclose(np.cross(way, axis), 0.0, rtol=0, atol=1e-8)
             origin = origin + way
-        elif isinstance(item, Path):
+        elif isinstance(item, Polyline):
             points = np.array(item.points)
             start, about = (R[:, k] for k in ACROSS[name])
             radius = np.linalg.norm(points[0] - origin)
@@ -113,7 +111,7 @@ def test_an_angle_of_several_turns_is_drawn_as_one_turn_and_the_rest() -> None:
     for q in (2 * math.pi + 1.0, -6 * math.pi - 1.0, 1e6):
         scene, frames = explained(spec, 0, [q]), table_frame_poses(spec, [q])
         arc = scene["/row/theta"]
-        assert isinstance(arc, Path)
+        assert isinstance(arc, Polyline)
         assert len(arc.points) < 300
         drawn = turned_by(np.array(arc.points), np.zeros(3), np.array([0.0, 0.0, 1.0]))
         assert 2 * math.pi <= math.copysign(drawn, drawn * q) < 4 * math.pi
@@ -174,12 +172,12 @@ def test_every_quantity_and_both_axes_have_a_label_beside_them(
         if isinstance(item, Arrow):
             middle = 0.5 * np.add(item.start, item.end)
             assert np.linalg.norm(labels[f"/row/{name}_label"] - middle) < 0.5 * SIZE
-        elif isinstance(item, Path):
+        elif isinstance(item, Polyline):
             points = np.array(item.points)
             assert np.linalg.norm(points - labels[f"/row/{name}_label"], axis=1).min() < 0.5 * SIZE
     for name in ("axis_before", "axis_behind"):
         line = scene[f"/row/{name}"]
-        assert isinstance(line, Path)
+        assert isinstance(line, Polyline)
         assert np.linalg.norm(labels[f"/row/{name}_label"] - np.array(line.points[1])) < 0.5 * SIZE
 
 
@@ -190,7 +188,7 @@ def test_the_axes_are_those_of_the_two_frames_and_pass_through_both_ends_of_the_
         scene = explained(spec, number, q)
         for name, T in (("axis_before", frames[number]), ("axis_behind", frames[number + 1])):
             line = scene[f"/row/{name}"]
-            assert isinstance(line, Path)
+            assert isinstance(line, Polyline)
             ends = np.array(line.points) - T[:3, 3]
             np.testing.assert_allclose(np.cross(ends, T[:3, 2]), 0.0, rtol=0, atol=1e-12)
             heights = ends @ T[:3, 2]
@@ -206,7 +204,7 @@ def test_the_normal_crosses_both_axes_at_a_right_angle(drawn: tuple[RobotSpec, A
         if entry.beta != 0.0:
             continue
         line = explained(spec, number, vectors[0])["/row/normal"]
-        assert isinstance(line, Path)
+        assert isinstance(line, Polyline)
         start, end = np.array(line.points)
         way = (end - start) / np.linalg.norm(end - start)
         for T in frames[number : number + 2]:
@@ -224,7 +222,7 @@ def test_colours_belong_to_quantities_and_are_all_different() -> None:
         own = [item for name, item in scene.items() if name.split("/")[-1].split("_")[0] == quantity.value]
         assert len(own) == (2 if quantity is Quantity.A else 5)
         for item in own:
-            assert isinstance(item, Arrow | Path | Label)
+            assert isinstance(item, Arrow | Polyline | Label)
             assert item.color == COLORS[quantity]
 
 
@@ -232,8 +230,8 @@ def test_the_tip_of_an_arc_points_the_way_it_goes() -> None:
     for theta in (1.0, -1.0, 0.05, -3.0):
         scene = explained(RobotSpec(name="r", rows=(row("j", theta=theta),)), 0, [0.0])
         arc, tip = scene["/row/theta"], scene["/row/theta_tip"]
-        assert isinstance(arc, Path)
-        assert isinstance(tip, Path)
+        assert isinstance(arc, Polyline)
+        assert isinstance(tip, Polyline)
         first, point, second = (np.array(corner) for corner in tip.points)
         np.testing.assert_allclose(point, arc.points[-1], rtol=0, atol=1e-15)
         onwards = point - 0.5 * (first + second)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dh2sim.view.batches import batched
-from dh2sim.view.items import Label, Placed, Triad, Triads
+from dh2sim.view.scene.items import Label, Placed, Triad, Triads, batched
 
 UP = (0.0, 0.0, 1.0)
 TURNED = (0.0, 1.0, 0.0, 0.0)

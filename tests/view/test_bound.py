@@ -9,7 +9,7 @@ import pytest
 
 from dh2sim.view.events import Tell
 from dh2sim.view.panel.bound import Bound, bind
-from dh2sim.view.quiet_server import quiet_server, stop_quietly
+from dh2sim.view.server import quiet_server, stop_quietly
 from tests.view.on_page import wait_until
 from tests.view.without_browser import speaking
 

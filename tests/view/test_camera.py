@@ -14,14 +14,13 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
-from dh2sim.robot.catalog import builtin_robots
-from dh2sim.robot.load import load_robot, parse_robot
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.robot.read import builtin_robots, load_robot, parse_robot
 from dh2sim.typing import Array
-from dh2sim.view.extent import FIELD, Eye, eye_of
-from dh2sim.view.items import Label
-from dh2sim.view.labels import HEIGHT, width
-from dh2sim.view.opening import open_state
+from dh2sim.view.initial_state import open_state
+from dh2sim.view.scene.items import Label
+from dh2sim.view.scene.labels import HEIGHT, width
+from dh2sim.view.scene.robot_size import FIELD, Eye, eye_of
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import ViewState
 from tests.view.on_page import choose, open_tab, pixel, wait_until

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dh2sim.robot.load import load_robot
+from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
 from dh2sim.view.events import CompareReading, Event, Follow, SetMode, Show
-from dh2sim.view.items import Path as Line
-from dh2sim.view.items import Scene
-from dh2sim.view.motion import Recording, Simulation
-from dh2sim.view.opening import open_state
+from dh2sim.view.initial_state import open_state
+from dh2sim.view.motion.motion import Recording, Simulation
+from dh2sim.view.motion.replay import open_replay
 from dh2sim.view.panel.pose import whose_pose
 from dh2sim.view.reduce import reduce
-from dh2sim.view.replay import open_replay
-from dh2sim.view.scene import IN_BASE_LINK, scene_of
+from dh2sim.view.scene.items import Polyline as Line
+from dh2sim.view.scene.items import Scene
+from dh2sim.view.scene.scene import IN_BASE_LINK, scene_of
 from dh2sim.view.state import IDENTITY, Matrix, Mode, Part, ViewState
 from tests.program import dh2sim
 from tests.view.test_solids import matrix

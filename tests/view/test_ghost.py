@@ -9,11 +9,11 @@ from hypothesis import given
 
 from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.forward import joint_poses
-from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import Limits, RobotSpec, Row
 from dh2sim.typing import Array
-from dh2sim.view.ghost import (
+from dh2sim.view.scene.ghost import (
     Gap,
     ghost_configuration,
     ghost_scene,
@@ -22,7 +22,7 @@ from dh2sim.view.ghost import (
     told_ghost,
     told_reading,
 )
-from dh2sim.view.items import Placed, Solid
+from dh2sim.view.scene.items import Placed, Solid
 from tests.kinematics.robots import HAYATI, MODIFIED, ODD_ARM, STANDARD, row
 from tests.robots.samples import robot
 from tests.strategies import robots_with_joint_vectors

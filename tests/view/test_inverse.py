@@ -12,15 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.export.verify import sampling_limits
+from dh2sim.export import sampling_limits
 from dh2sim.kinematics.forward import forward_kinematics
 from dh2sim.kinematics.transforms import identity, pose_from_rpy
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.load import load_robot
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 from dh2sim.typing import Array
-from dh2sim.view.inverse import InverseKinematics, Solution
+from dh2sim.view.motion.inverse import InverseKinematics, Solution
 from tests import strategies
 
 ROBOTS = ("planar_2r", "rpr", "scara", "cylindrical", "arm_5r", "spherical_wrist", "stanford", "puma560", "ssrms")

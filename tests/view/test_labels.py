@@ -9,16 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dh2sim.robot.catalog import builtin_robots
-from dh2sim.robot.load import load_robot
+from dh2sim.robot.read import builtin_robots, load_robot
 from dh2sim.view.events import Look, SelectRow, Show
-from dh2sim.view.extent import FIELD, eye_of
-from dh2sim.view.items import Label, Scene, Vector
-from dh2sim.view.labels import HEIGHT, spread, width
-from dh2sim.view.opening import open_state
+from dh2sim.view.initial_state import open_state
 from dh2sim.view.reduce import reduce
-from dh2sim.view.scene import scene_of
-from dh2sim.view.sight import Sight
+from dh2sim.view.scene.items import Label, Scene, Vector
+from dh2sim.view.scene.labels import HEIGHT, spread, width
+from dh2sim.view.scene.pinhole import Sight
+from dh2sim.view.scene.robot_size import FIELD, eye_of
+from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import Part, ViewState
 
 FROM_AFAR = Sight(position=(0.0, -10.0, 0.0), right=(1.0, 0.0, 0.0), up=(0.0, 0.0, 1.0), focal=1000.0)

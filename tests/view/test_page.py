@@ -10,18 +10,10 @@ import numpy as np
 import pytest
 
 from dh2sim.engines.mujoco_engine import MujocoEngine
-from dh2sim.kinematics.table import table_tool_pose
-from dh2sim.robot.load import load_robot, parse_robot
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.view.server import Viewer
-from tests.view.on_page import (
-    DEADLINE,
-    OpenPage,
-    field,
-    open_tab,
-    shown,
-    wait_for_position,
-    wait_until,
-)
+from tests.view.on_page import DEADLINE, OpenPage, field, open_tab, shown, wait_for_position, wait_until
 
 HOME = load_robot("stanford").configurations["home"].tolist()
 

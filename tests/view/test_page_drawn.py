@@ -10,22 +10,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
-from dh2sim.robot.load import load_robot, parse_robot
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import Convention
-from dh2sim.view.ghost import told_reading
+from dh2sim.view.scene.ghost import told_reading
 from dh2sim.view.server import Viewer
-from tests.view.on_page import (
-    OpenPage,
-    choose,
-    field,
-    open_tab,
-    pixel,
-    shown,
-    wait_for_position,
-    wait_until,
-    xyz,
-)
+from tests.view.on_page import OpenPage, choose, field, open_tab, pixel, shown, wait_for_position, wait_until, xyz
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page

@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from dh2sim.robot.load import load_robot
-from dh2sim.view.opening import open_state
+from dh2sim.robot.read import load_robot
+from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import says_that_nobody_is_there
 from dh2sim.view.server import Viewer
 from tests.view.on_page import wait_until

@@ -10,27 +10,28 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from dh2sim.draw.rollout_data import RolloutData, select_rollout
 from dh2sim.errors import ConfigurationError, OutputError, PictureError
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.simulate.layout import POSE
-from dh2sim.simulate.pictures.selection import RolloutData, select_rollout
+from dh2sim.simulate.dataset_layout import POSE
 from dh2sim.typing import Array
-from dh2sim.view.items import Arrow, Label, Placed, Scene, Solid, Triad
-from dh2sim.view.items import Path as Line
 from dh2sim.view.page_export import (
     MOST_PICTURES,
     RATE,
+    Extent,
     export_page,
+    extent_of,
+    page_html,
     robot_page_scene,
     rollout_moments,
     shown_records,
 )
-from dh2sim.view.page_export_extent import Extent, extent_of
-from dh2sim.view.page_export_html import page_html
+from dh2sim.view.scene.items import Arrow, Label, Placed, Scene, Solid, Triad
+from dh2sim.view.scene.items import Polyline as Line
+from tests.draw.datasets import stopped, swinging
 from tests.robots.samples import NAMES, robot
-from tests.simulate.pictures.datasets import stopped, swinging
 from tests.view.test_solids import matrix
 
 RED = (1.0, 0.0, 0.0)

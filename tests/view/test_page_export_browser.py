@@ -15,15 +15,13 @@ import xarray as xr
 from numpy.typing import NDArray
 from PIL import Image
 
+from dh2sim.draw.rollout_data import select_rollout
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.simulate.pictures.selection import select_rollout
-from dh2sim.view.items import ORIGIN, Color, Placed, Scene, Solid, Vector
-from dh2sim.view.page_export import export_page
-from dh2sim.view.page_export_extent import Extent
-from dh2sim.view.page_export_html import page_html
+from dh2sim.view.page_export import Extent, export_page, page_html
+from dh2sim.view.scene.items import ORIGIN, Color, Placed, Scene, Solid, Vector
+from tests.draw.datasets import swinging
 from tests.robots.samples import robot
-from tests.simulate.pictures.datasets import swinging
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Route

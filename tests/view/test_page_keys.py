@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dh2sim.robot.load import load_robot
-from dh2sim.view.extent import eye_of
-from dh2sim.view.opening import open_state
+from dh2sim.robot.read import load_robot
+from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import Page as ServedPage
+from dh2sim.view.scene.robot_size import eye_of
 from tests.view.on_page import Serve, choose, field, open_tab, shown, wait_for_position, wait_until
 
 if TYPE_CHECKING:

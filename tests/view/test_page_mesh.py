@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import trimesh
 
-from dh2sim.kinematics.table import table_frame_poses
-from dh2sim.robot.load import load_robot
+from dh2sim.kinematics.table_oracle import table_frame_poses
+from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
-from dh2sim.view.opening import folder_of, open_state
+from dh2sim.view.initial_state import folder_of, open_state
 from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.state import Part
 from tests.view.on_page import Serve, open_tab, pixel, wait_until

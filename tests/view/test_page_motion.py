@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim.kinematics.table import table_tool_pose
-from dh2sim.robot.load import load_robot
-from dh2sim.view.motion import Recording, Simulation
-from dh2sim.view.opening import open_state
-from dh2sim.view.replay import Replay, open_replay
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.read import load_robot
+from dh2sim.view.initial_state import open_state
+from dh2sim.view.motion.motion import Recording, Simulation
+from dh2sim.view.motion.replay import Replay, open_replay
 from dh2sim.view.state import Pull
 from tests.program import dh2sim
 

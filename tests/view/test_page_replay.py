@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dh2sim.kinematics.table import table_tool_pose
-from dh2sim.robot.load import load_robot
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
-from dh2sim.view.opening import open_state
+from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import Page as ServedPage
-from dh2sim.view.scene import scene_of
+from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import Mode, Part
 from tests.program import dh2sim
 from tests.view.on_page import Serve, choose, field, open_tab, shown, wait_for_position, wait_until

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from dh2sim.robot.catalog import builtin_robots
-from dh2sim.robot.load import load_robot
-from dh2sim.view.opening import folder_of, open_state
+from dh2sim.robot.read import builtin_robots, load_robot
+from dh2sim.view.initial_state import folder_of, open_state
 from tests.view.on_page import Serve, wait_for_position, wait_until
 
 

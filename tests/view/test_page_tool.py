@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dh2sim.kinematics.table import table_tool_pose
-from dh2sim.robot.load import load_robot
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
-from dh2sim.view.extent import triad_length
 from dh2sim.view.page import Page as ServedPage
+from dh2sim.view.scene.robot_size import triad_length
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import Goal, Part
 from tests.view.on_page import OpenPage, open_tab, pixel, shown, wait_for_position, wait_until

@@ -7,11 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from dh2sim.kinematics.table import table_tool_pose
-from dh2sim.robot.load import load_robot, parse_robot
-from dh2sim.robot.spec import Convention
-from dh2sim.robot.units import AngleUnit, LengthUnit
-from dh2sim.view.opening import open_state
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.read import load_robot, parse_robot
+from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
+from dh2sim.view.initial_state import open_state
 from tests.view.on_page import Serve, choose, field, open_tab, shown, wait_for_position, wait_until
 
 STANFORD = load_robot("stanford")

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from dh2sim.kinematics.table import table_tool_pose
-from dh2sim.robot.catalog import builtin_path
-from dh2sim.robot.document import MAX_BYTES
-from dh2sim.robot.load import load_robot, parse_robot
-from dh2sim.view.opening import open_state
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.read import builtin_path, load_robot, parse_robot
+from dh2sim.robot.yaml_tree import MAX_BYTES
+from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.server import Viewer
 from tests.program import dh2sim

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dh2sim.view.items import Arrow, Item, Label, Lines, Path, Placed, Solid, Triad
-from dh2sim.view.painter import Painter
+from dh2sim.view.scene.items import Arrow, Item, Label, Lines, Placed, Polyline, Solid, Triad
+from dh2sim.view.scene.painter import Painter
 
 if TYPE_CHECKING:
     import viser
@@ -20,7 +20,7 @@ CORNERS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[viser.ViserServer]:
-    from dh2sim.view.quiet_server import quiet_server, stop_quietly
+    from dh2sim.view.server import quiet_server, stop_quietly
 
     made = quiet_server("127.0.0.1", 0)
     yield made
@@ -44,7 +44,7 @@ def test_every_kind_of_item_is_drawn(scene: viser.SceneApi) -> None:
         "/a/triad": Triad(length=0.2),
         "/a/triad/label": Label(text="of the triad"),
         "/a/lines": Lines(segments=(CORNERS[:2], CORNERS[1:]), color=(0.0, 1.0, 0.0)),
-        "/a/path": Path(points=CORNERS, color=(0.0, 1.0, 0.0)),
+        "/a/path": Polyline(points=CORNERS, color=(0.0, 1.0, 0.0)),
         "/a/arrow": Arrow(start=CORNERS[0], end=CORNERS[1], color=(0.0, 0.0, 1.0), thickness=0.1),
         "/a/label": Label(text="x"),
     }

@@ -6,10 +6,10 @@ import re
 
 import pytest
 
-from dh2sim.robot.load import load_robot, parse_robot
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.view.events import EditCell
-from dh2sim.view.opening import open_state
-from dh2sim.view.panel.table_text import overview
+from dh2sim.view.initial_state import open_state
+from dh2sim.view.panel.table import overview
 from dh2sim.view.reduce import reduce
 
 

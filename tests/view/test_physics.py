@@ -11,18 +11,17 @@ import numpy as np
 import pytest
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.kinematics.forward import forward_kinematics, joint_poses
-from dh2sim.kinematics.jacobian import geometric_jacobian
+from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian, joint_poses
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators
-from dh2sim.robot.load import load_robot
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import ActuatorType, Convention, Dynamics, JointType, LinkSpec, RobotSpec, Row
-from dh2sim.simulate.physics.mechanics import energy
-from dh2sim.simulate.physics.variants import frictionless, untouchable
 from dh2sim.typing import read_only
-from dh2sim.view.physics import BETWEEN_LOOKS, Drive, Physics
-from dh2sim.view.push import spring_for
+from dh2sim.validate.motion.free_motion import frictionless, untouchable
+from dh2sim.validate.motion.mechanics import energy
+from dh2sim.view.motion.applied_force import spring_for
+from dh2sim.view.motion.physics import BETWEEN_LOOKS, Drive, Physics
 
 PATIENT = 600.0
 """s: more than any simulation here takes, so that time never runs out."""

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from dh2sim.view.physics_pace import MOST_WAIT, RealTime
+from dh2sim.view.motion.real_time import MOST_WAIT, RealTime
 
 STEP = 0.002
 

@@ -8,12 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from dh2sim.robot.load import load_robot
-from dh2sim.simulate.physics.trial import compile_model
-from dh2sim.view.items import Arrow
-from dh2sim.view.opening import open_state
-from dh2sim.view.pull import grabbed_point
-from dh2sim.view.scene import scene_of
+from dh2sim.robot.read import load_robot
+from dh2sim.validate.motion.free_motion import compile_model
+from dh2sim.view.initial_state import open_state
+from dh2sim.view.scene.items import Arrow
+from dh2sim.view.scene.markers import grabbed_point
+from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import Mode, Pull
 
 STANFORD = open_state(load_robot("stanford"))

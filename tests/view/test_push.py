@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dh2sim.view.push import RATE, STRONGEST, Spring, dragged_point, spring_for, spring_force
+from dh2sim.view.motion.applied_force import RATE, STRONGEST, Spring, dragged_point, spring_for, spring_force
 from tests.strategies import vectors
 
 coordinates = st.floats(-10.0, 10.0, allow_subnormal=False)

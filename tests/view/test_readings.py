@@ -7,14 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
-from dh2sim.robot.catalog import builtin_robots
-from dh2sim.robot.load import load_robot
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.robot.read import builtin_robots, load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from dh2sim.view.events import ChooseFrame, RandomConfiguration, SetJoints
-from dh2sim.view.opening import open_state
-from dh2sim.view.readings import readings_of
+from dh2sim.view.initial_state import open_state
+from dh2sim.view.panel.readings import readings_of
 from dh2sim.view.reduce import reduce
 
 

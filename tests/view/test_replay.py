@@ -11,16 +11,16 @@ import pytest
 import xarray as xr
 
 from dh2sim.errors import PictureError, RunError
-from dh2sim.kinematics.table import table_tool_pose
+from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.load import load_robot
+from dh2sim.robot.read import load_robot
 from dh2sim.simulate import rollout
 from dh2sim.simulate.block import simulate_block
+from dh2sim.simulate.options import Wish
 from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.store.writer import RunWriter
-from dh2sim.simulate.wish import Wish
-from dh2sim.view.replay import open_replay
+from dh2sim.view.motion.replay import open_replay
 from tests.simulate import robots
 
 STEP, EVERY = 0.002, 5

@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 
 import pytest
 
-from dh2sim.robot.load import load_robot, parse_robot
-from dh2sim.view.opening import open_state
+from dh2sim.robot.read import load_robot, parse_robot
+from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import ViewState

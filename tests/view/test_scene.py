@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given, settings
 
 from dh2sim.kinematics.forward import joint_poses
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
-from dh2sim.robot.load import load_robot
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from dh2sim.view.events import CompareReading, Event, MoveJoint, SelectRow, SetJoints, Show
-from dh2sim.view.items import Label, Lines, Path, Scene, Solid, Triad
-from dh2sim.view.opening import open_state
+from dh2sim.view.initial_state import open_state
 from dh2sim.view.reduce import reduce
-from dh2sim.view.scene import scene_of
+from dh2sim.view.scene.items import Label, Lines, Polyline, Scene, Solid, Triad
+from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import Part, ViewState, within
 from tests.strategies import robots_with_joint_vectors
 from tests.view.test_solids import matrix
@@ -121,7 +121,7 @@ def test_the_trace_is_a_line_through_where_the_tool_was() -> None:
         STANFORD, Show(part=Part.TRACE, on=True), MoveJoint(joint=0, value=0.0), MoveJoint(joint=1, value=0.0)
     )
     trace = scene_of(state)["/trace"]
-    assert isinstance(trace, Path)
+    assert isinstance(trace, Polyline)
     qs = [STANFORD.q, (0.0, *STANFORD.q[1:]), (0.0, 0.0, *STANFORD.q[2:])]
     assert np.allclose(trace.points, [table_tool_pose(STANFORD.spec, q)[:3, 3] for q in qs], rtol=0, atol=1e-12)
 

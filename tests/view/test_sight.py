@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.typing import Array
-from dh2sim.view.sight import Sight, sight_of
+from dh2sim.view.scene.pinhole import Sight, sight_of
 
 
 @dataclass

@@ -13,9 +13,16 @@ from dh2sim.kinematics.transforms import identity, pose_from_rpy
 from dh2sim.model.build import build_model
 from dh2sim.model.meshes import MeshAsset
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
-from dh2sim.robot.load import load_robot
-from dh2sim.view.items import Item, Placed, Solid
-from dh2sim.view.solids import link_solids, mesh_triangles, orientation_of, position_of, robot_solids, shape_triangles
+from dh2sim.robot.read import load_robot
+from dh2sim.view.scene.items import Item, Placed, Solid
+from dh2sim.view.scene.solids import (
+    link_solids,
+    mesh_triangles,
+    orientation_of,
+    position_of,
+    robot_solids,
+    shape_triangles,
+)
 from tests.model.samples import ODD_ROBOT
 from tests.robots.samples import NAMES, robot
 

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
-from dh2sim.robot.load import load_robot
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
-from dh2sim.view.stance import stance_of
+from dh2sim.view.scene.link_poses import stance_of
 from tests.strategies import robots_with_joint_vectors
 
 

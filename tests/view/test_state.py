@@ -10,13 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
-from dh2sim.robot.load import load_robot, parse_robot
-from dh2sim.robot.spec import Convention, JointType, RobotSpec
-from dh2sim.robot.units import AngleUnit, LengthUnit
-from dh2sim.robot.writing.robot_file import robot_file_text
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.robot.read import load_robot, parse_robot
+from dh2sim.robot.spec import AngleUnit, Convention, JointType, LengthUnit, RobotSpec
+from dh2sim.robot.write import robot_file_text
 from dh2sim.view import events
-from dh2sim.view.opening import open_state
+from dh2sim.view.initial_state import open_state
 from dh2sim.view.reduce import reduce
 from dh2sim.view.state import COLUMNS, Complaint, Mode, Part, Pull, ViewState, travel
 from tests.strategies import robot_specs

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim.kinematics.table import table_tool_pose
-from dh2sim.robot.load import load_robot
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.read import load_robot
 from dh2sim.view.events import Event, Follow, SetMode, Show
-from dh2sim.view.motion import Recording
-from dh2sim.view.opening import open_state
+from dh2sim.view.initial_state import open_state
+from dh2sim.view.motion.motion import Recording
+from dh2sim.view.motion.replay import open_replay
 from dh2sim.view.reduce import reduce
-from dh2sim.view.replay import open_replay
 from dh2sim.view.state import Mode, Part, ViewState
 from tests.program import dh2sim
 

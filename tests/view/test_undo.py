@@ -6,14 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from dh2sim.robot.load import load_robot
-from dh2sim.robot.spec import Convention
-from dh2sim.robot.units import AngleUnit, LengthUnit
+from dh2sim.robot.read import load_robot
+from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
 from dh2sim.view.events import ConvertTable, EditCell, Event, OpenText, SelectRow, SetConvention, SetUnits, Undo
-from dh2sim.view.opening import open_state
-from dh2sim.view.reduce import reduce
+from dh2sim.view.initial_state import open_state
+from dh2sim.view.reduce import MOST, MOST_LETTERS, reduce
 from dh2sim.view.state import Mode, ViewState
-from dh2sim.view.undo import MOST, MOST_LETTERS
 
 STANFORD = open_state(load_robot("stanford"))
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dh2sim.kinematics.table import table_tool_pose
-from dh2sim.robot.load import load_robot
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.read import load_robot
 from dh2sim.view.events import Event, MoveJoint, MoveTool, SetMode, Show
-from dh2sim.view.items import Path
-from dh2sim.view.opening import open_state
+from dh2sim.view.initial_state import open_state
 from dh2sim.view.reduce import reduce
-from dh2sim.view.scene import scene_of
+from dh2sim.view.scene.items import Polyline
+from dh2sim.view.scene.markers import told_unreached
+from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import Matrix, Mode, Part, ViewState
-from dh2sim.view.unreached import told_unreached
 
 STANFORD = open_state(load_robot("stanford"))
 HANDLE = Show(part=Part.HANDLE, on=True)
@@ -42,7 +42,7 @@ def test_it_is_told_how_far_the_tool_is_from_its_handle_and_a_line_leads_there(t
     state = after(HANDLE, wanted(reached=False, turned=turned))
     assert told_unreached(state) == f"The handle is out of reach, or too far for one step: tool0 is {how_far}."
     line = scene_of(state)["/unreached"]
-    assert isinstance(line, Path)
+    assert isinstance(line, Polyline)
     x, y, z = TOOL[:3, 3]
     assert np.allclose(line.points, [(x, y, z), (x, y, z + 0.5)], rtol=0, atol=1e-12)
 

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.errors import Dh2simError
-from dh2sim.robot.document import MAX_BYTES
-from dh2sim.view.upload_intake import MOST_PARTS, Intake, Uploaded
+from dh2sim.robot.yaml_tree import MAX_BYTES
+from dh2sim.view.uploads import MOST_PARTS, Intake, Uploaded
 
 HALF = MAX_BYTES // 2
 

@@ -15,11 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dh2sim.errors import Dh2simError
-from dh2sim.kinematics.table import table_tool_pose
-from dh2sim.robot.catalog import builtin_path
-from dh2sim.robot.load import load_robot, parse_robot
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.read import builtin_path, load_robot, parse_robot
 from dh2sim.view import events
-from dh2sim.view.opening import builtin_ghost, open_state
+from dh2sim.view.initial_state import builtin_ghost, open_state
 from dh2sim.view.panel import markup
 from dh2sim.view.reduce import reduce
 from dh2sim.view.state import Mode, Part, ViewState

@@ -1,4 +1,9 @@
-"""Options of a controller: what its constructor's signature says of them, and values read from text."""
+"""Options of a controller: what its constructor's signature says of them, and values read from text.
+
+Which controller a run uses, and with which options.
+
+``NAME:key=value,…`` as typed: how it is taken apart, and how it is written.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +13,108 @@ import sys
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, Final, Literal
 
 from dh2sim.errors import ControllerError
-from dh2sim.robot.words import did_you_mean, listed
-from dh2sim.simulate.controllers.option_text import split_pairs, value_text
+from dh2sim.messages import did_you_mean, listed
+from dh2sim.robot.spec import ActuatorType
+from dh2sim.simulate.controllers.protocol import Controller, Lanes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerChoice:
+    """A controller by name, with its options checked."""
+
+    text: str
+    """As on the command line, ``NAME`` or ``NAME:key=value,…``: all options that were given, in a fixed order."""
+    name: str
+    make: Callable[[Lanes], Controller] = field(compare=False, repr=False)
+    """Makes the controller of a group of rollouts, options already bound."""
+    actuation: ActuatorType | None
+    """The actuators that the model is simulated with, one at every joint (none: no actuators at all); None: those of
+    the robot file."""
+    options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}), compare=False)
+    digest: str = ""
+    """SHA-256 of what the options do not show: files that the controller reads, code that is not dh2sim's own."""
+    follows: bool = False
+    """Whether it follows a reference, which can be recorded."""
+
+
+_QUOTES = "\"'"
+
+
+def split_pairs(text: str) -> tuple[list[tuple[str, str]], list[str]]:
+    """Take ``key=value,key=value`` apart.
+
+    A value that holds a comma, or spaces at its ends, stands in quotation marks.
+
+    Args:
+        text: what follows the controller's name; may be empty.
+
+    Returns:
+        Keys with their values in the order given, and what is wrong, a sentence each.
+    """
+    pairs: list[tuple[str, str]] = []
+    problems = []
+    for part in _split(text):
+        key, equals, value = part.partition("=")
+        key, value = key.strip(), value.strip()
+        if not equals or not key:
+            problems.append(f"{part.strip()!r} is not of the form key=value")
+        elif value[:1] in _QUOTES and value[:1]:
+            if len(value) < 2 or value[-1] != value[0]:
+                problems.append(f"the value of '{key}' has a quotation mark {value[0]} that is not closed")
+            else:
+                pairs.append((key, value[1:-1]))
+        else:
+            pairs.append((key, value))
+    return pairs, problems
+
+
+def join_pairs(name: str, pairs: Iterable[tuple[str, object]]) -> str:
+    """Write a controller's name with options, so that ``split_pairs`` gives the same values back."""
+    text = ",".join(f"{key}={_quoted(value_text(value))}" for key, value in pairs)
+    return f"{name}:{text}" if text else name
+
+
+def value_text(value: object) -> str:
+    """Return an option's value as it is typed."""
+    match value:
+        case None:
+            return "none"
+        case bool():
+            return "true" if value else "false"
+        case float() if value.is_integer() and abs(value) < 1e15:
+            return str(int(value))
+        case float():
+            return repr(value)
+        case _:
+            return str(value)
+
+
+def _split(text: str) -> list[str]:
+    """Split at commas that are in no value's quotation marks; empty parts are left out."""
+    parts = [""]
+    quote = ""
+    for character in text:
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in _QUOTES and parts[-1].rstrip().endswith("="):
+            quote = character
+        elif character == ",":
+            parts.append("")
+            continue
+        parts[-1] += character
+    return [part for part in parts if part.strip()]
+
+
+def _quoted(text: str) -> str:
+    if "," not in text and text == text.strip() and text[:1] not in (*_QUOTES,):
+        return text
+    return f"'{text}'" if '"' in text else f'"{text}"'
+
 
 _WORDS: Final = {
     "true": True,

@@ -1,18 +1,21 @@
 """What a controller is: it drives many rollouts at once, all arrays with the rollouts first.
 
-A rollout's controls may depend on that rollout alone: not on which others share its group, nor on how many there are.
-Then a run gives the same bits however it is cut up. So no sums over the first axis, no matrix products that a library
-blocks by size, and random numbers from the rollout's own generator only.
+A rollout's controls may depend on that rollout alone: not on which others share its group, nor on how many
+there are. Then a run gives the same bits however it is cut up. So no sums over the first axis, no matrix
+products that a library blocks by size, and random numbers from the rollout's own generator only.
+
+What a controller class may say of itself before it drives anything, where its attributes do not suffice.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.plant import Plant
 from dh2sim.typing import Array
 
@@ -118,3 +121,21 @@ class Follows(Protocol):
         Each of shape (batch, count, n). ``first + count - 1`` may be ``steps``: the end of the run.
         """
         ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prepared:
+    """What the static method ``prepare`` of a controller class returns, given the options.
+
+    A class has one if it reads files: their digest is a part of what a run is, and what they hold may decide how the
+    robot is driven.
+    """
+
+    make: Callable[[Lanes], Controller] = field(repr=False)
+    """Makes the controller of a group of rollouts."""
+    actuation: ActuatorType | str | None = None
+    """As the class attribute."""
+    digest: str = ""
+    """Hexadecimal SHA-256 of the files that were read."""
+    follows: bool = False
+    """Whether the controller has a ``reference``."""

@@ -9,23 +9,15 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from dh2sim.errors import ControllerError
+from dh2sim.messages import did_you_mean, listed
 from dh2sim.robot.spec import ActuatorType
-from dh2sim.robot.words import did_you_mean, listed
-from dh2sim.simulate.controllers import discovery
-from dh2sim.simulate.controllers.blame import blamed, guarded
-from dh2sim.simulate.controllers.choice import ControllerChoice
-from dh2sim.simulate.controllers.computed_torque import ComputedTorque
-from dh2sim.simulate.controllers.gravity_compensation import GravityCompensation
-from dh2sim.simulate.controllers.hold import Hold
-from dh2sim.simulate.controllers.noise import Noise
-from dh2sim.simulate.controllers.option_text import join_pairs
-from dh2sim.simulate.controllers.options import Option, options_of, read_options
-from dh2sim.simulate.controllers.passive import Passive
-from dh2sim.simulate.controllers.pd import PD
-from dh2sim.simulate.controllers.prepared import Prepared
-from dh2sim.simulate.controllers.protocol import Controller, Lanes
+from dh2sim.simulate.controllers import user_code as discovery
+from dh2sim.simulate.controllers.options import ControllerChoice, Option, join_pairs, options_of, read_options
+from dh2sim.simulate.controllers.position import Hold, Noise, Sine
+from dh2sim.simulate.controllers.protocol import Controller, Lanes, Prepared
 from dh2sim.simulate.controllers.replay import Replay
-from dh2sim.simulate.controllers.sine import Sine
+from dh2sim.simulate.controllers.torque import PD, ComputedTorque, GravityCompensation, Passive
+from dh2sim.simulate.controllers.user_code import blamed, guarded
 
 BUILT_IN: Final[Mapping[str, type]] = MappingProxyType(
     {

@@ -8,12 +8,10 @@ from typing import Annotated, Literal
 import numpy as np
 
 from dh2sim.errors import ControllerError
-from dh2sim.robot.words import listed
+from dh2sim.messages import listed
 from dh2sim.simulate.controllers.options import Within
-from dh2sim.simulate.controllers.prepared import Prepared
-from dh2sim.simulate.controllers.protocol import Lanes
-from dh2sim.simulate.controllers.recording import Recording
-from dh2sim.simulate.controllers.replay_files import read_recording
+from dh2sim.simulate.controllers.protocol import Lanes, Prepared
+from dh2sim.simulate.controllers.recording import Recording, read_recording
 from dh2sim.typing import Array
 
 _EARLY = 1e-6

@@ -3,6 +3,10 @@
 Three files, one for each kind of row: ``RUN.parquet`` has a row for every rollout, step and joint,
 ``RUN.steps.parquet`` one for every rollout and step, ``RUN.rollouts.parquet`` one for every rollout. What was not
 recorded is null: the last step of what belongs to intervals, all that follows an early stop, rollouts not yet run.
+
+Tables of a run's numbers: columns, keys, and the rows of a part of the run. Needs pyarrow.
+
+Which variable of a run goes into which Parquet table, and how its columns are named. Needs pyarrow.
 """
 
 from __future__ import annotations
@@ -14,14 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dh2sim.errors import Dh2simError
+from dh2sim.files import new_files, refuse_folder
 from dh2sim.simulate.convert.blocks import attribute_text, open_run, plain, untold
-from dh2sim.simulate.convert.files import new_files, refuse_folder
 
 if TYPE_CHECKING:
     import pyarrow as pa
     import xarray as xr
 
-    from dh2sim.simulate.convert.columns import Table
+    from dh2sim.simulate.convert.tables import Table
 
 SUFFIX = ".parquet"
 GROUP_ROWS = 1 << 20

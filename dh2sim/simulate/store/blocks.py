@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.simulate.layout import Layout
+from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.store.codec import encode, last_checksum, plain, read_plain, sound_checksum
 from dh2sim.simulate.store.files import all_of, partial_of, put, remove, sync_folder, write_partial
 from dh2sim.simulate.store.seal import BLOCKS, CHECKSUM, SECONDS, Seal

@@ -6,8 +6,8 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from dh2sim.robot.words import listed, shown
-from dh2sim.simulate.layout import Layout
+from dh2sim.messages import listed, shown
+from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.store.seal import Seal, stored_variables
 
 _OF_ROBOT: Final = ("home", "velocity_limits", "kp", "kv")

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final
 
 from dh2sim.errors import RunBusyError, RunError, RunExistsError, RunOutputError
-from dh2sim.export.signals import signals_deferred
+from dh2sim.files import signals_deferred
 from dh2sim.simulate.store.files import PARTIAL, lock_folder, locks, sync_folder, unlock, write_tree
 from dh2sim.simulate.store.seal import seals, stored_attributes
 

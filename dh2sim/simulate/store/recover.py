@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dh2sim.errors import RunDamagedError, RunDiffersError, RunError
-from dh2sim.simulate.layout import FORMAT, Layout
+from dh2sim.simulate.dataset_layout import FORMAT, Layout
 from dh2sim.simulate.store.files import PARTIAL, put, remove, sync_folder
 from dh2sim.simulate.store.identity import differences
 from dh2sim.simulate.store.place import is_run, not_a_run

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from dh2sim.simulate.layout import Layout
+from dh2sim.simulate.dataset_layout import Layout
 
 BLOCKS: Final = "blocks"
 """Name of the group that holds the seal, as attributes, and the record of committed blocks."""

@@ -15,7 +15,7 @@ from zarr.core.buffer import Buffer
 from zarr.storage import MemoryStore
 
 from dh2sim.errors import RunError
-from dh2sim.simulate.layout import Coordinate, Layout, Variable
+from dh2sim.simulate.dataset_layout import Coordinate, Layout, Variable
 from dh2sim.simulate.store.codec import CODECS, LARGEST_CHUNK
 from dh2sim.simulate.store.seal import BLOCKS, CHECKSUM, COORDINATES, SECONDS, make_seal
 

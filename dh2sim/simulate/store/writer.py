@@ -13,7 +13,7 @@ from typing import Any, Final
 from numpy.typing import NDArray
 
 from dh2sim.errors import RunError, RunOutputError
-from dh2sim.simulate.layout import Layout
+from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.store.blocks import Blocks
 from dh2sim.simulate.store.files import all_of, unlock
 from dh2sim.simulate.store.place import is_vacant, lock_run, make_run

@@ -12,9 +12,9 @@ from dh2sim.view.state import Mode, ViewState
 if TYPE_CHECKING:
     import viser
 
-    from dh2sim.view.mover import Mover
-    from dh2sim.view.physics import Drive
-    from dh2sim.view.replay import Replay
+    from dh2sim.view.motion.motion_source import Mover
+    from dh2sim.view.motion.physics import Drive
+    from dh2sim.view.motion.replay import Replay
 
 _WORDS = {Mode.STILL: "me", Mode.PHYSICS: "physics", Mode.REPLAY: "the recording"}
 

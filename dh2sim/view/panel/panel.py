@@ -1,27 +1,40 @@
-"""The panel of a page: tabs, and a line for what there is to tell."""
+"""The panel of a page: tabs, and a line for what there is to tell.
+
+Files: a robot to open; and to take home the robot file as edited, and the models made of it.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dh2sim.export import Format
 from dh2sim.view.panel import markup
-from dh2sim.view.panel.bound import Send
-from dh2sim.view.panel.files import add_files
-from dh2sim.view.panel.joints import JointsTab
-from dh2sim.view.panel.keys import add_keys
+from dh2sim.view.panel.bound import Send, on_click
+from dh2sim.view.panel.joints import JointsTab, add_keys
 from dh2sim.view.panel.motion import MotionTab
 from dh2sim.view.panel.pose import PoseTab
 from dh2sim.view.panel.show import ShowTab
 from dh2sim.view.panel.table import TableTab
 from dh2sim.view.panel.uploads import UploadButtons
+from dh2sim.view.scene.markers import told_unreached
 from dh2sim.view.state import ViewState
-from dh2sim.view.unreached import told_unreached
 
 if TYPE_CHECKING:
     import viser
 
-    from dh2sim.view.mover import Mover
+    from dh2sim.view.motion.motion_source import Mover
     from dh2sim.view.robot_files import RobotFiles
+
+
+def add_files(client: viser.ClientHandle, send: Send, uploads: UploadButtons, files: RobotFiles) -> None:
+    """Add the buttons to viser's current container."""
+    gui = client.gui
+    uploads.add("Open a robot file", files.open)
+    checked = "Compared with the table before it is handed out"
+    on_click(gui.add_button("Save robot file"), send, lambda: files.save)
+    on_click(gui.add_button("Save URDF", hint=checked), send, lambda: lambda: files.export(Format.URDF))
+    on_click(gui.add_button("Save MJCF", hint=checked), send, lambda: lambda: files.export(Format.MJCF))
+    on_click(gui.add_button("Back to the opened file", hint="Forgets all edits"), send, lambda: files.back)
 
 
 class Panel:

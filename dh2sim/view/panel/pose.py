@@ -6,14 +6,14 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dh2sim.kinematics.frames import frame_names
-from dh2sim.robot.units import AngleUnit
+from dh2sim.kinematics.forward import frame_names
+from dh2sim.robot.spec import AngleUnit
 from dh2sim.view.events import ChooseFrame
+from dh2sim.view.motion.mujoco_pose import Twin
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Send, bind
-from dh2sim.view.readings import Readings, difference, readings_of
+from dh2sim.view.panel.readings import Readings, difference, readings_of
 from dh2sim.view.state import ViewState
-from dh2sim.view.twin import Twin
 
 if TYPE_CHECKING:
     import viser

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import builtin_robots
 from dh2sim.view.events import Compare, CompareReading, Event, Show
-from dh2sim.view.ghost import told_ghost, told_reading
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Send, bind
-from dh2sim.view.panel.keys import KEYS
+from dh2sim.view.panel.joints import KEYS
 from dh2sim.view.panel.uploads import UploadButtons
+from dh2sim.view.scene.ghost import told_ghost, told_reading
 from dh2sim.view.state import Part, ViewState
 
 if TYPE_CHECKING:

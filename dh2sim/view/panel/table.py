@@ -1,20 +1,167 @@
-"""The table: all of it to be read, one row at a time to be edited, and files to take home."""
+"""The table: all of it to be read, one row at a time to be edited, and files to take home.
+
+The table as it is printed: indices as in the textbooks, the joint's own variable in its column.
+
+The cells of one row of the table, to be typed into.
+"""
 
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from dh2sim.robot.spec import Convention
-from dh2sim.robot.units import AngleUnit, LengthUnit
-from dh2sim.view.events import ConvertTable, SelectRow, SetConvention, SetUnits, Show, Undo
+from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
+from dh2sim.view.events import ConvertTable, EditCell, SelectRow, SetConvention, SetUnits, Show, Undo
+from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
-from dh2sim.view.panel.row_editor import RowEditor
-from dh2sim.view.panel.table_text import overview
-from dh2sim.view.state import Part, ViewState
+from dh2sim.view.scene.annotations import Quantity, subscript, symbol
+from dh2sim.view.state import CONVENTION, Complaint, Draft, Part, ViewState
 
 if TYPE_CHECKING:
     import viser
+
+_WRONG = "background:#fde2df;color:#b42318;border-radius:3px;padding:0 0.2em"
+_CHOSEN = "font-weight:700"
+
+
+def overview(state: ViewState) -> str:
+    """Return the table as HTML; cells that are wrong are marked, and say why when pointed at."""
+    draft = state.draft
+    hayati = any(row.convention is Convention.HAYATI for row in draft.rows)
+    angle = "°" if draft.units.angle is AngleUnit.DEG else "rad"
+    length = draft.units.length.value
+    head = ["i", "joint", f"a<br>{length}", f"α<br>{angle}", f"d<br>{length}", f"θ<br>{angle}"]
+    head += [f"β<br>{angle}"] if hayati else []
+    rows = [_row(state, i, hayati=hayati) for i in range(len(draft.rows))]
+    return markup.table(rows, head=[*head, "convention"], name="table") + markup.note(_legend(draft))
+
+
+def _row(state: ViewState, i: int, *, hayati: bool) -> list[str]:
+    row = state.draft.rows[i]
+    number = f"<span style='{_CHOSEN}'>{i + 1}</span>" if i == state.selected_row else str(i + 1)
+    columns = ("a", "alpha", "d", "theta", *(("beta",) if hayati else ()))
+    cells = [_cell(state, i, column, text) for column, text in zip(columns, row.cells, strict=False)]
+    flips = [spec.flip for spec in state.spec.rows]
+    variable = _variable(i, flip=flips[i])
+    if row.type.moves:
+        moved = 3 if row.type.turns else 2
+        marked = state.draft.complaint(i, columns[moved]) is not None
+        cells[moved] = f"{variable} + {cells[moved]}" if marked else variable + _offset(row.cells[moved])
+    return [number, markup.text(row.name), *cells, row.convention.value]
+
+
+def _cell(state: ViewState, row: int, column: str, text: str) -> str:
+    found: Complaint | None = state.draft.complaint(row, column)
+    if found is None:
+        return markup.text(text)
+    return f'<span title="{markup.text(found.message)}" style="{_WRONG}">{markup.text(text) or "?"}</span>'
+
+
+def _variable(i: int, *, flip: bool) -> str:
+    return f"{'−' if flip else ''}q<sub>{i + 1}</sub>"
+
+
+def _offset(text: str) -> str:
+    """Return what follows a joint's variable: nothing where the offset is zero."""
+    number = text.strip().removeprefix("+").strip()
+    if not number or _is_zero(number):
+        return ""
+    sign, rest = ("−", number[1:].strip()) if number.startswith("-") else ("+", number)
+    return f" {sign} {markup.text(rest)}"
+
+
+def _is_zero(text: str) -> bool:
+    try:
+        return float(text) == 0.0
+    except ValueError:  # an expression
+        return False
+
+
+def _legend(draft: Draft) -> str:
+    kinds = {row.convention for row in draft.rows}
+    said = {
+        Convention.STANDARD: "standard: Rz(θ) Tz(d) Tx(a) Rx(α)",
+        Convention.MODIFIED: "modified: Tx(a) Rx(α) Rz(θ) Tz(d), a and α of index i − 1",
+        Convention.HAYATI: "hayati: Rz(θ) Tx(a) Rx(α) Ry(β)",
+    }
+    return "<br>".join(words for kind, words in said.items() if kind in kinds)
+
+
+_STEP: Final = 0.01
+"""Between the places of widgets: they stand between two that were placed by viser, whose places are whole numbers."""
+
+
+class RowEditor:
+    """Fields of one row, named as it is; another row is given fields of its own.
+
+    What is typed goes to the row whose name stands beside the field, also where another row was chosen a moment ago
+    and the page has not followed yet.
+    """
+
+    def __init__(self, gui: viser.GuiApi, send: Send, state: ViewState, row: int, place: float) -> None:
+        """Add the widgets to viser's current container.
+
+        Args:
+            gui: The page's widgets.
+            send: Where events go.
+            state: That has the row.
+            row: From 0.
+            place: Of the widget that they stand below.
+        """
+        self._row = row
+        shown = state.draft.rows[row]
+        self._convention_shown = shown.convention
+        self._cells: dict[Quantity, Bound[str]] = {}
+        for k, quantity in enumerate(Quantity, start=1):
+            widget = gui.add_text(
+                symbol(quantity, shown.convention, row),
+                shown.cells[k - 1],
+                hint="A number, or an expression such as pi/2 or d1 + 0.1",
+                order=place + k * _STEP,
+            )
+            self._cells[quantity] = bind(widget, send, partial(self._edit, quantity.value))
+        end = place + len(Quantity) * _STEP
+        self._convention = bind(
+            gui.add_dropdown(
+                f"convention{subscript(row + 1)}",
+                [convention.value for convention in Convention],
+                initial_value=shown.convention.value,
+                hint="Reads the same numbers another way: the robot becomes another one",
+                order=end + _STEP,
+            ),
+            send,
+            lambda name: SetConvention(row=row, convention=Convention(name)),
+        )
+        self._complaint = gui.add_html("", order=end + 2 * _STEP)
+
+    def show(self, state: ViewState) -> None:
+        """Show a state, which has the row."""
+        row = state.draft.rows[self._row]
+        for (quantity, cell), text in zip(self._cells.items(), row.cells, strict=True):
+            cell.show(text)
+            marked = state.draft.complaint(self._row, quantity.value) is not None
+            cell.handle.visible = marked or quantity is not Quantity.BETA or row.convention is Convention.HAYATI
+            if row.convention is not self._convention_shown:
+                cell.handle.label = symbol(quantity, row.convention, self._row)
+        self._convention_shown = row.convention
+        self._convention.show(row.convention.value)
+        ours = [found for found in state.draft.complaints if found.row == self._row]
+        told = "<br>".join(_told(found, row.convention) for found in ours)
+        self._complaint.content = markup.note(told, wrong=True, name="complaint")
+
+    def remove(self) -> None:
+        """Take the widgets off the page."""
+        for widget in (*(cell.handle for cell in self._cells.values()), self._convention.handle, self._complaint):
+            widget.remove()
+
+    def _edit(self, column: str, text: str) -> EditCell:
+        return EditCell(row=self._row, column=column, text=text)
+
+
+def _told(found: Complaint, convention: Convention) -> str:
+    if found.column == CONVENTION:
+        return f"<b>convention</b>: {markup.text(found.message)}"
+    return f"<b>{symbol(Quantity(found.column), convention, found.row)}</b>: {markup.text(found.message)}"
 
 
 class TableTab:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from dh2sim.errors import Dh2simError
 from dh2sim.view.events import Tell
 from dh2sim.view.panel.bound import Send
-from dh2sim.view.upload_intake import Intake, Uploaded
+from dh2sim.view.uploads import Intake, Uploaded
 
 if TYPE_CHECKING:
     import viser

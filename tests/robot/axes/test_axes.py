@@ -12,10 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dh2sim.kinematics.table import table_frame_poses
-from dh2sim.robot.axes.load import read_axes
-from dh2sim.robot.axes.spec import AxesSpec
-from dh2sim.robot.load import load_robot
+from dh2sim.kinematics.table_oracle import table_frame_poses
+from dh2sim.robot.axes_file import AxesSpec, read_axes
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import ActuatorType, Convention, JointType
 
 PUMA = Path(__file__).parents[3] / "docs" / "puma560_axes.yaml"

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.errors import ImportedFileError
-from dh2sim.robot.axes.load import read_axes
+from dh2sim.robot.axes_file import read_axes
 
 TOP = "name, description, source, convention, units, parameters, axes, tool, gravity, configurations, actuators"
 AXIS = "name, type, point, direction, limits, dynamics, actuator"

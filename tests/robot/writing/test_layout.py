@@ -8,13 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from dh2sim.robot.load import load_robot, parse_robot
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import (
     ActuatorSpec,
     ActuatorType,
+    AngleUnit,
     BaseSpec,
     Convention,
     JointType,
+    LengthUnit,
     Limits,
     LinkSpec,
     MeshSpec,
@@ -22,8 +24,7 @@ from dh2sim.robot.spec import (
     RobotSpec,
     Row,
 )
-from dh2sim.robot.units import AngleUnit, LengthUnit
-from dh2sim.robot.writing.robot_file import robot_file_text
+from dh2sim.robot.write import robot_file_text
 from dh2sim.typing import read_only
 from tests.robot.files import FULL, complaints, robot
 

@@ -8,16 +8,9 @@ from pathlib import Path
 import pytest
 
 from dh2sim.errors import ModelError
-from dh2sim.robot.load import parse_robot
-from dh2sim.robot.spec import (
-    Convention,
-    JointType,
-    LinkSpec,
-    MeshSpec,
-    RobotSpec,
-    Row,
-)
-from dh2sim.robot.writing.robot_file import robot_file_text
+from dh2sim.robot.read import parse_robot
+from dh2sim.robot.spec import Convention, JointType, LinkSpec, MeshSpec, RobotSpec, Row
+from dh2sim.robot.write import robot_file_text
 
 
 def _shown_by(file: Path) -> RobotSpec:

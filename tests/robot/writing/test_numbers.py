@@ -11,9 +11,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dh2sim.errors import ModelError
-from dh2sim.robot.scalars import resolve_plain
-from dh2sim.robot.units import AngleUnit, LengthUnit, Units
-from dh2sim.robot.writing.numbers import UnitWriter, number
+from dh2sim.robot.spec import AngleUnit, LengthUnit, Units
+from dh2sim.robot.write import UnitWriter, number
+from dh2sim.robot.yaml_tree import resolve_plain
 
 DEGREES = UnitWriter(units=Units(angle=AngleUnit.DEG))
 

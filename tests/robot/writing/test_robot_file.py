@@ -16,21 +16,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
 
-from dh2sim.kinematics.table import table_frame_poses, table_tool_pose
-from dh2sim.robot.catalog import builtin_robots
-from dh2sim.robot.document import NOT_PRINTABLE
-from dh2sim.robot.load import load_robot, parse_robot
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.robot.read import builtin_robots, load_robot, parse_robot
 from dh2sim.robot.spec import (
     ActuatorSpec,
     ActuatorType,
+    AngleUnit,
     BaseSpec,
     JointType,
+    LengthUnit,
     MeshSpec,
     RobotSpec,
     Row,
 )
-from dh2sim.robot.units import AngleUnit, LengthUnit
-from dh2sim.robot.writing.robot_file import robot_file_text
+from dh2sim.robot.write import robot_file_text
+from dh2sim.robot.yaml_tree import NOT_PRINTABLE
 from tests.robot.files import FULL, robot
 from tests.strategies import joint_vectors_for, lengths, names, poses, robot_specs, robots_with_joint_vectors, vectors
 

@@ -6,10 +6,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dh2sim.robot.compose import compose
-from dh2sim.robot.document import NOT_PRINTABLE, decode
-from dh2sim.robot.report import Report
-from dh2sim.robot.writing.text import WIDTH, comment_lines, quoted, text_lines, word
+from dh2sim.robot.write import WIDTH, comment_lines, quoted, text_lines, word
+from dh2sim.robot.yaml_tree import NOT_PRINTABLE, Report, compose, decode
 
 ALPHABET = st.characters(exclude_categories=["Cs"]) | st.sampled_from(
     " \n\t\r\"'\\:#-?[]{},&*!|>%@`~\x85\u2028\ufeff"

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dh2sim.simulate.controllers.curves import (
+from dh2sim.simulate.controllers.trajectories import (
     MINIMUM_JERK_PEAK,
     cubic_spline_weights,
     minimum_jerk,

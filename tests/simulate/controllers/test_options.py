@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.errors import ControllerError
-from dh2sim.simulate.controllers.option_text import join_pairs, split_pairs
-from dh2sim.simulate.controllers.options import Option, Within, options_of, read_options
+from dh2sim.simulate.controllers.options import Option, Within, join_pairs, options_of, read_options, split_pairs
 from dh2sim.simulate.controllers.registry import choose
 
 

@@ -55,7 +55,7 @@ def test_a_digest_is_also_that_of_the_file_of_a_base_class(folder: Path) -> None
 
 
 def test_an_inherited_constructor_keeps_its_options(folder: Path) -> None:
-    text = "from dh2sim.simulate.controllers.computed_torque import ComputedTorque\n\n\n"
+    text = "from dh2sim.simulate.controllers.torque import ComputedTorque\n\n\n"
     write(folder, "inheriting.py", f"{text}class Mine(ComputedTorque):\n    pass\n")
     assert choose("inheriting:Mine:bandwidth=5,period=2").text == "inheriting:Mine:bandwidth=5,period=2"
 
@@ -118,7 +118,7 @@ def test_options_are_checked_against_the_signature(folder: Path) -> None:
 PREPARED = """
     from pathlib import Path
 
-    from dh2sim.simulate.controllers.prepared import Prepared
+    from dh2sim.simulate.controllers.protocol import Prepared
 
 
     class Reading:

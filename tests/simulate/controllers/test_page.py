@@ -76,6 +76,6 @@ def test_the_class_on_the_page_drives_an_arm(tmp_path: Path, monkeypatch: pytest
 
 
 def test_a_package_is_offered_as_the_page_says() -> None:
-    from dh2sim.simulate.controllers.discovery import GROUP
+    from dh2sim.simulate.controllers.user_code import GROUP
 
     assert f'[project.entry-points."{GROUP}"]' in PAGE

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import RobotSpec
-from dh2sim.simulate.controllers.references import SmoothReference
+from dh2sim.simulate.controllers.trajectories import SmoothReference
 from dh2sim.typing import Array
 from tests.simulate.controllers.samples import arm, lanes, make
 from tests.strategies import robot_specs

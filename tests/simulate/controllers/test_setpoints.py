@@ -10,10 +10,8 @@ from hypothesis import strategies as st
 
 from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import ActuatorType, RobotSpec
-from dh2sim.simulate.controllers.hold import Hold
-from dh2sim.simulate.controllers.noise import Noise
+from dh2sim.simulate.controllers.position import Hold, Noise, Sine
 from dh2sim.simulate.controllers.protocol import OpenLoop
-from dh2sim.simulate.controllers.sine import Sine
 from tests.simulate.controllers.samples import arm, driven, lanes, make
 from tests.strategies import robot_specs
 

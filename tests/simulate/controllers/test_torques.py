@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 
 from dh2sim.robot.spec import ActuatorType
-from dh2sim.simulate.controllers.computed_torque import ComputedTorque
-from dh2sim.simulate.controllers.gains import steady_gains
-from dh2sim.simulate.controllers.gravity_compensation import GravityCompensation
-from dh2sim.simulate.controllers.pd import PD
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Lanes
+from dh2sim.simulate.controllers.torque import PD, ComputedTorque, GravityCompensation, steady_gains
 from dh2sim.typing import Array, read_only
 from tests.simulate.controllers.samples import arm, driven, lanes, observe, plant, see
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.simulate.layout import POSE, STATUS, TWIST, Coordinate, Layout, Variable
+from dh2sim.simulate.dataset_layout import POSE, STATUS, TWIST, Coordinate, Layout, Variable
 from dh2sim.simulate.store.writer import RunWriter
 
 ROLLOUTS, BLOCK, RECORDS = 7, 3, 4

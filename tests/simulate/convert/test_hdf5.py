@@ -12,16 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.simulate.convert.hdf5 import CHUNK_BYTES, chunk_shape, to_hdf5
-from dh2sim.simulate.layout import NOT_RUN
-from tests.simulate.convert.samples import (
-    BLOCK,
-    JOINTS,
-    ROLLOUTS,
-    Arrays,
-    make_arrays,
-    make_layout,
-    write_run,
-)
+from dh2sim.simulate.dataset_layout import NOT_RUN
+from tests.simulate.convert.samples import BLOCK, JOINTS, ROLLOUTS, Arrays, make_arrays, make_layout, write_run
 
 
 def _flat(dataset: xr.Dataset) -> xr.Dataset:

@@ -13,7 +13,7 @@ import pytest
 
 from dh2sim.simulate.convert import parquet
 from dh2sim.simulate.convert.parquet import parquet_files, to_parquet
-from dh2sim.simulate.layout import POSE, STATUS, TWIST, Layout
+from dh2sim.simulate.dataset_layout import POSE, STATUS, TWIST, Layout
 from tests.simulate.convert.samples import (
     ACTUATORS,
     BLOCK,

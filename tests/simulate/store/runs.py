@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.simulate.layout import POSE, STATUS, Coordinate, Layout, Variable
+from dh2sim.simulate.dataset_layout import POSE, STATUS, Coordinate, Layout, Variable
 from dh2sim.simulate.store.writer import RunWriter
 from tests.program import contents
 

@@ -9,9 +9,9 @@ import pytest
 import zarr
 
 from dh2sim.errors import RunDamagedError, RunError
-from dh2sim.simulate.layout import Layout
+from dh2sim.simulate.dataset_layout import Layout
+from dh2sim.simulate.description import summarize
 from dh2sim.simulate.store.reader import open_dataset, reading
-from dh2sim.simulate.store.summary import summarize
 from dh2sim.simulate.store.writer import RunWriter
 from tests.program import contents
 from tests.simulate.store.runs import copy, lasting, layout, make, resume

@@ -10,7 +10,7 @@ import zarr
 from zarr.codecs import BloscCodec, Crc32cCodec
 
 from dh2sim.errors import RunDamagedError, RunError
-from dh2sim.simulate.layout import Layout
+from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.store.reader import open_dataset, reading
 from dh2sim.simulate.store.writer import RunWriter
 from tests.simulate.store.runs import JOINTS, SECONDS, block_of, finish, lasting, layout, make, whole

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from dh2sim.errors import RunDiffersError
-from dh2sim.simulate.layout import Layout
+from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.store.writer import RunWriter
 from tests.program import contents
 from tests.simulate.store.runs import finish, lasting, layout, make, resume

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from dh2sim.simulate.description import summarize
 from dh2sim.simulate.store.reader import open_dataset
-from dh2sim.simulate.store.summary import summarize
 from tests.simulate.store.runs import lasting, layout, make, resume, whole
 from tests.simulate.store.workers import workers
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dh2sim.errors import RunDamagedError, RunError
-from dh2sim.simulate.store.summary import summarize
+from dh2sim.simulate.description import summarize
 from dh2sim.simulate.store.writer import RunWriter
 from tests.program import contents
 from tests.simulate.store.runs import block_of, layout, make, whole

@@ -1,0 +1,199 @@
+"""``dh2sim convert``.
+
+``dh2sim import``.
+
+``dh2sim frames``.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dh2sim.cli.common import choice, hand_over, require_free, tolerance_of
+
+if TYPE_CHECKING:
+    from dh2sim.importing.result import Imported
+
+
+def import_robot(
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="URDF, MJCF, or a table in Markdown, CSV or TSV; - reads a table.")
+    ],
+    base: Annotated[
+        str | None, typer.Option(metavar="LINK", help="What becomes base_link. [default: the root]")
+    ] = None,
+    tip: Annotated[
+        str | None, typer.Option(metavar="LINK|SITE", help="What becomes tool0. [default: where the arm ends]")
+    ] = None,
+    convention: Annotated[
+        str | None,
+        typer.Option(metavar="standard|modified", help="Of the table made (default standard), or of the table read."),
+    ] = None,
+    angle: Annotated[str | None, typer.Option(metavar="deg|rad", help="Unit of a table's angles.")] = None,
+    length: Annotated[str | None, typer.Option(metavar="m|mm|cm|in", help="Unit of a table's lengths.")] = None,
+    tolerance: Annotated[
+        float, typer.Option(metavar="T", help="Greatest residual, rad and m; numbers within it are made simple.")
+    ] = 1e-9,
+    package_path: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FOLDER", help="Where package:// is looked for; may be repeated."),
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the robot. [default: the file's]")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="Write it there. [default: print it]")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over a file that exists.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the robot file, and errors.")] = False,
+) -> None:
+    """Make a robot file of a URDF, an MJCF, or a table.
+
+    A URDF's or MJCF's joints become DH rows, whatever way their axes lie. All joint axes and the tip are
+    compared with the file's own kinematics at 1000 random configurations; a residual above the tolerance is an
+    error. Limits, masses, inertias and meshes come along; what cannot is listed. Where axes are nearly parallel
+    the row is Hayati's. Angles such as 1.5708 become 90 degrees with --tolerance 1e-4.
+
+    \b
+    Examples:
+      dh2sim import panda.urdf --tip panda_link8 -o panda.yaml
+      dh2sim import arm.xml --base base_link --tip attachment_site
+      dh2sim import table.md --convention modified --angle deg -o arm.yaml
+      dh2sim import - --convention standard < table.csv
+    """
+    from dh2sim.importing.importing import STDIN, ImportOptions, import_data, read_file
+    from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
+
+    require_free(out, force=force)
+    options = ImportOptions(
+        base=base,
+        tip=tip,
+        convention=choice(convention, Convention, "--convention", without=(Convention.HAYATI,)),
+        angle=choice(angle, AngleUnit, "--angle"),
+        length=choice(length, LengthUnit, "--length"),
+        tolerance=tolerance_of(tolerance),
+        package_paths=tuple(package_path or ()),
+        name=name,
+    )
+    folder = Path.cwd() if out is None else out.resolve().parent
+    data = sys.stdin.buffer.read() if file == STDIN else read_file(Path(file))
+    imported = import_data(data, file, options, folder=folder)
+    hand_over(imported.text, out, summary=summary(imported), notes=imported.notes, quiet=quiet)
+
+
+def summary(imported: Imported) -> str:
+    """Return one line on a robot file that was made."""
+    from dh2sim.importing.serial import residual_text
+
+    spec = imported.spec
+    conventions = list(dict.fromkeys(row.convention.value for row in spec.rows))
+    rows = f"{spec.name}, {len(spec.rows)} {'row' if len(spec.rows) == 1 else 'rows'}, {' and '.join(conventions)}"
+    residual = imported.residual
+    if residual is None:
+        return rows
+    return f"{rows}; off by at most {residual_text(residual)} at {residual.configurations} configurations"
+
+
+def frames(
+    axes: Annotated[str, typer.Argument(metavar="AXES.yaml", help="Joint axes: points and directions.")],
+    convention: Annotated[
+        str | None, typer.Option(metavar="standard|modified", help="Of the table. [default: the file's, or standard]")
+    ] = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Tell every step at the head of the robot file, and draw the frames.")
+    ] = False,
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw them: .svg, .png or .pdf. [with --explain: NAME-frames.svg]"),
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option(metavar="T", help="Greatest residual, rad and m; numbers within it are made simple.")
+    ] = 1e-9,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="Write it there. [default: print it]")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over files that exist.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the robot file, and errors.")] = False,
+) -> None:
+    """Assign DH frames to joint axes, step by step as in a textbook.
+
+    The file lists the axes, base first, in base_link at joint coordinates zero:
+
+    \b
+      name: two_joints
+      axes:
+        - {type: revolute, point: [0, 0, 0], direction: [0, 0, 1]}
+        - {type: prismatic, direction: [1, 0, 0]}
+      tool: {xyz: [0.5, 0, 0.2]}
+
+    Every case is met: axes that intersect, are parallel, antiparallel, coincident, skew or nearly parallel.
+
+    \b
+    Examples:
+      dh2sim frames axes.yaml
+      dh2sim frames axes.yaml --explain -o arm.yaml
+    """
+    from dh2sim.importing.importing import import_axes, read_file
+    from dh2sim.robot.axes_file import read_axes
+    from dh2sim.robot.spec import Convention
+
+    wanted = choice(convention, Convention, "--convention", without=(Convention.HAYATI,))
+    allowed = tolerance_of(tolerance)
+    if picture is not None:
+        _require_picture_ending(picture)
+    require_free(out, force=force)
+    spec = read_axes(read_file(Path(axes)), file=axes, directory=Path(axes).parent)
+    drawing = picture
+    if drawing is None and explain:
+        drawing = (out.parent if out is not None else Path()) / f"{spec.name}-frames.svg"
+    require_free(drawing, force=force)
+    folder = Path.cwd() if out is None else out.resolve().parent
+    imported = import_axes(spec, convention=wanted, tolerance=allowed, explain=explain, folder=folder)
+    hand_over(imported.text, out, summary=summary(imported), notes=imported.notes, quiet=quiet)
+    if drawing is not None:
+        from dh2sim.draw.frame_figure.figure import draw_assignment
+
+        draw_assignment(imported, drawing)
+        if not quiet:
+            print(f"{drawing}: axes and frames", file=sys.stderr if out is None else sys.stdout)
+
+
+def _require_picture_ending(path: Path) -> None:
+    from dh2sim.draw.frame_figure.figure import require_picture_ending
+
+    require_picture_ending(path)
+
+
+def convert(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="Robot file, or name of a robot that comes with dh2sim.")
+    ],
+    to: Annotated[str, typer.Option(metavar="standard|modified", help="The convention wanted.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="Write it there. [default: print it]")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over a file that exists.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the robot file, and errors.")] = False,
+) -> None:
+    """Write a robot's table in the other convention.
+
+    a and alpha move by one row; what they leave over at the ends goes to base and tool. The arm stays the same:
+    poses of tool0 are compared at 1000 configurations. DH frames 1 to n do not: masses and meshes are moved along.
+
+    \b
+    Examples:
+      dh2sim convert stanford --to modified
+      dh2sim convert my_arm.yaml --to standard -o my_arm_standard.yaml
+    """
+    from dh2sim.importing.convert import convert_robot
+    from dh2sim.robot.read import load_robot
+    from dh2sim.robot.spec import Convention
+
+    wanted = choice(to, Convention, "--to", without=(Convention.HAYATI,))
+    require_free(out, force=force)
+    spec = load_robot(robot)
+    folder = Path.cwd() if out is None else out.resolve().parent
+    converted = convert_robot(spec, wanted or Convention.STANDARD, folder=folder)
+    hand_over(converted.text, out, summary=converted.summary, notes=converted.notes, quiet=quiet)

@@ -1,0 +1,136 @@
+"""From where a robot is looked at, so that nothing hides what it is about."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dh2sim.draw.frame_figure.scene import SAME, Scene
+from dh2sim.typing import Array
+
+_AZIMUTHS = tuple(sign * azimuth for azimuth in (*range(20, 75, 5), *range(110, 165, 5)) for sign in (-1, 1))
+_ELEVATIONS = tuple(range(14, 40, 4))
+_USUAL = (-55, 22)
+"""Azimuth and elevation that are taken unless others show more, degrees."""
+_ENOUGH = 0.06
+"""Of the picture's size: points that far from each other are well apart."""
+_LONG = 0.55
+"""Of its length: what is left of an axis in the picture."""
+_OPEN = math.radians(22)
+"""Between axes in the picture."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class View:
+    """Parallel projection; base_link's z is upright."""
+
+    right: Array
+    """What is to the right in the picture, shape (3,)."""
+    up: Array
+    """What is upwards in the picture, shape (3,)."""
+
+    def flat(self, points: ArrayLike) -> Array:
+        """Project points, shape (..., 3), on the paper, shape (..., 2)."""
+        return np.stack([np.asarray(points) @ self.right, np.asarray(points) @ self.up], axis=-1)
+
+
+def look_from(azimuth: float, elevation: float) -> View:
+    """Return the view from a direction, degrees."""
+    az, el = math.radians(azimuth), math.radians(elevation)
+    return View(
+        right=np.array([-math.sin(az), math.cos(az), 0.0]),
+        up=np.array([-math.sin(el) * math.cos(az), -math.sin(el) * math.sin(az), math.cos(el)]),
+    )
+
+
+def best_view(scene: Scene) -> View:
+    """Return the view that keeps points, lines and directions apart that are so in space."""
+    places = itertools.product(_AZIMUTHS, _ELEVATIONS)
+    directions = _distinct_directions(scene)
+    azimuth, elevation = max(places, key=lambda place: round(_merit(scene, directions, *place), 6))
+    return look_from(azimuth, elevation)
+
+
+def _merit(scene: Scene, directions: Array, azimuth: int, elevation: int) -> float:
+    view = look_from(azimuth, elevation)
+    corners = scene.corners
+    size = float(np.ptp(view.flat(corners), axis=0).max()) or 1.0
+    turned = abs((azimuth - _USUAL[0] + 180) % 360 - 180)
+    unusual = turned / 90 + abs(elevation - _USUAL[1]) / 60
+    return (
+        _directions(view.flat(directions))
+        + _distances(scene, view, size)
+        - 0.5 * _crossings(scene, view)
+        - 0.3 * unusual
+    )
+
+
+def _distinct_directions(scene: Scene) -> Array:
+    """Return the directions of all x and z axes, opposite ones once, shape (number, 3)."""
+    kept: list[Array] = []
+    for pointer in scene.pointers:
+        if pointer.letter != "y" and all(np.linalg.norm(np.cross(pointer.direction, other)) > SAME for other in kept):
+            kept.append(pointer.direction)
+    return np.array(kept)
+
+
+def _directions(flat: Array) -> float:
+    """How well directions can be seen, and told from each other; shape (number, 2)."""
+    lengths = np.linalg.norm(flat, axis=1)
+    least = min(_LONG, float(lengths.min())) / _LONG
+    angles = [
+        math.asin(min(1.0, abs(float(a[0] * b[1] - a[1] * b[0])) / float(la * lb + 1e-12)))
+        for (a, la), (b, lb) in itertools.combinations(zip(flat, lengths, strict=True), 2)
+    ]
+    return least + min([_OPEN, *angles]) / _OPEN
+
+
+def _distances(scene: Scene, view: View, size: float) -> float:
+    """How well points keep apart from each other, and from lengths that they do not belong to."""
+    points = view.flat(np.array(scene.origins))
+    enough = _ENOUGH * size
+    apart = [min(enough, float(np.linalg.norm(a - b))) / enough for a, b in itertools.combinations(points, 2)] or [
+        1.0
+    ]
+    beside = [1.0]
+    for segment in scene.segments:
+        start, end = view.flat([segment.start, segment.end])
+        for origin, point in zip(scene.origins, points, strict=True):
+            if min(_gap(origin, segment.start), _gap(origin, segment.end)) > SAME * size:
+                beside.append(min(enough, _to_segment(point, start, end)) / enough)
+    return min(apart) + float(np.mean(apart)) + min(beside)
+
+
+def _crossings(scene: Scene, view: View) -> int:
+    """How many lengths cross each other in the picture."""
+    flat = [view.flat([segment.start, segment.end]) for segment in scene.segments]
+    return sum(_cross(a, b) for a, b in itertools.combinations(flat, 2))
+
+
+def _cross(a: Array, b: Array) -> bool:
+    """Whether the inner parts of two segments meet on the paper, each of shape (2, 2)."""
+    (p, q), (r, s) = a, b
+    sides = [_side(p, q, r), _side(p, q, s), _side(r, s, p), _side(r, s, q)]
+    least = 1e-9 * (_gap(p, q) + _gap(r, s)) ** 2
+    if min(map(abs, sides)) <= least:
+        return False
+    return sides[0] * sides[1] < 0.0 and sides[2] * sides[3] < 0.0
+
+
+def _side(start: Array, end: Array, point: Array) -> float:
+    way, there = end - start, point - start
+    return float(way[0] * there[1] - way[1] * there[0])
+
+
+def _gap(a: Array, b: Array) -> float:
+    return float(np.linalg.norm(a - b))
+
+
+def _to_segment(point: Array, start: Array, end: Array) -> float:
+    way = end - start
+    share = float((point - start) @ way) / (float(way @ way) or 1.0)
+    return _gap(point, start + min(1.0, max(0.0, share)) * way)

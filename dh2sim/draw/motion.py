@@ -1,0 +1,137 @@
+"""What a film shows: a compiled model, and the positions that it goes through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dh2sim.draw.offscreen import import_mujoco
+from dh2sim.errors import PictureError
+from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.typing import Array, read_only
+
+if TYPE_CHECKING:
+    from dh2sim.draw.rollout_data import RolloutData
+    from dh2sim.model.robot_model import RobotModel
+
+MOST_POSES = 600
+"""Poses in which the extent of a motion is measured, and points of the tool's trace."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """A model in its scene and a row of its positions."""
+
+    model: Any = field(repr=False)
+    """``mujoco.MjModel``."""
+    qpos: Array = field(repr=False)
+    """Positions, MuJoCo's ``qpos``, shape (count, nq)."""
+    time: Array = field(repr=False)
+    """s, shape (count,), ascending."""
+
+    @property
+    def floats(self) -> bool:
+        """Whether base_link floats: the first seven positions are its pose."""
+        free = import_mujoco().mjtJoint.mjJNT_FREE.value
+        return bool(self.model.njnt > 0 and self.model.jnt_type[0] == free)
+
+    @property
+    def travel(self) -> Array:
+        """How far base_link has gone from where it was at first, m, shape (count, 3)."""
+        return self.qpos[:, :3] - self.qpos[0, :3] if self.floats else np.zeros((len(self.qpos), 3))
+
+    def place(self, data: Any, number: int) -> None:
+        """Put the robot, its cameras and lights where they are in a position."""
+        mujoco = import_mujoco()
+        data.qpos[:] = self.qpos[number]
+        mujoco.mj_kinematics(self.model, data)
+        mujoco.mj_comPos(self.model, data)
+        mujoco.mj_camlight(self.model, data)
+
+    def nearest(self, time: float) -> int:
+        """Return the number of the position nearest to an instant, s."""
+        after = int(np.searchsorted(self.time, time))
+        if after == 0:
+            return 0
+        if after == len(self.time) or time - self.time[after - 1] <= self.time[after] - time:
+            return after - 1
+        return after
+
+    def number_at(self, time: float | None) -> int:
+        """Return the number of the position at an instant, s; None: the last.
+
+        Raises:
+            PictureError: there is none at that time.
+        """
+        if time is None:
+            return len(self.time) - 1
+        first, last = float(self.time[0]), float(self.time[-1])
+        if not first <= time <= last * (1.0 + 1e-9):
+            raise PictureError(f"there is nothing at {time:g} s: the motion goes from {first:g} to {last:g} s")
+        return self.nearest(time)
+
+    def sampled(self) -> list[int]:
+        """Return numbers of at most ``MOST_POSES`` positions, evenly spread, the first and the last among them."""
+        last = len(self.time) - 1
+        return sorted({round(k) for k in np.linspace(0, last, min(last + 1, MOST_POSES))})
+
+
+def motion_of_run(rollout: RolloutData) -> Motion:
+    """Return the motion of one rollout, up to where it stopped.
+
+    Raises:
+        PictureError: positions were not recorded, or the model in the run's attributes cannot be read.
+    """
+    mujoco = import_mujoco()
+    rollout.require("qpos", what="a film")
+    attributes = rollout.attributes
+    try:
+        robot, mjcf, scene = (str(attributes[name]) for name in ("robot", "mjcf", "scene"))
+        model = mujoco.MjModel.from_xml_string(scene, {f"{robot}.xml": mjcf.encode()})
+    except KeyError as error:
+        raise PictureError(
+            f"{rollout.run}: the attribute {error} is missing, and so there is no model to show"
+        ) from None
+    except ValueError as error:
+        told = " ".join(str(error).split())
+        raise PictureError(f"{rollout.run}: MuJoCo refuses the model in the run's attributes: {told}") from error
+    parts = [rollout.values(name) for name in ("base_pose", "qpos") if name in rollout.data]
+    qpos = np.concatenate(parts, axis=1)
+    if qpos.shape[1] != model.nq:
+        raise PictureError(
+            f"{rollout.run}: {qpos.shape[1]} positions were recorded, but the model in the run's attributes has "
+            f"{model.nq}"
+        )
+    return Motion(model=model, qpos=read_only(qpos), time=read_only(rollout.values("time")))
+
+
+def motion_of_robot(robot: RobotModel, configuration: str | None = None) -> Motion:
+    """Return a robot at rest in one of its configurations; by default at home.
+
+    Raises:
+        PictureError: it has no configuration of that name.
+    """
+    from dh2sim.formats.mjcf.scene import to_scene
+    from dh2sim.formats.mjcf.write import to_mjcf
+
+    mujoco = import_mujoco()
+    configurations = robot.spec.configurations
+    if configuration is None:
+        q = robot.home
+    elif configuration in configurations:
+        q = np.asarray(configurations[configuration], dtype=float)
+    else:
+        hint = did_you_mean(configuration, configurations)
+        raise PictureError(
+            f"{robot.name} has no configuration {shown(configuration)}.{hint} Configurations: "
+            f"{listed(configurations)}"
+        )
+    meshes = {link.mesh.file_name: link.mesh.data for link in robot.all_links if link.mesh is not None}
+    assets = {f"{robot.name}.xml": to_mjcf(robot).encode(), **meshes}
+    try:
+        model = mujoco.MjModel.from_xml_string(to_scene(robot), assets)
+    except ValueError as error:
+        raise PictureError(f"{robot.name}: MuJoCo refuses the model: {' '.join(str(error).split())}") from error
+    return Motion(model=model, qpos=read_only(np.asarray(q)[None, :]), time=read_only([0.0]))

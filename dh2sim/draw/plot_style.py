@@ -1,0 +1,175 @@
+"""How plots look, and how they become files that are the same every time.
+
+The line above a plot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dh2sim.draw.rollout_data import RolloutData
+from dh2sim.errors import PictureError
+from dh2sim.files import written_whole
+from dh2sim.messages import shown
+
+
+def title(rollout: RolloutData) -> str:
+    """Return robot, controller, run and rollout, and why it stopped if it did."""
+    attributes = rollout.attributes
+    parts = [str(attributes[name]) for name in ("robot", "controller") if attributes.get(name)]
+    parts.append(rollout.label)
+    if rollout.reason:
+        parts.append(f"stopped: {rollout.reason}")
+    return " · ".join(part if len(part) <= 40 else part[:39] + "…" for part in parts)
+
+
+ENDINGS = (".png", ".svg", ".pdf")
+BLUE, TEAL, PURPLE, ORANGE, RED, INK, GREY = (
+    "#1f5fa8",
+    "#18807c",
+    "#7a4fa3",
+    "#d9730d",
+    "#c0302a",
+    "#2b2f36",
+    "#8a9099",
+)
+FORBIDDEN = "#fbe3e1"
+"""Background outside the limits."""
+SETTINGS: Mapping[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.titlecolor": INK,
+    "axes.labelsize": 8.5,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.limits": (-3, 4),
+    "axes.formatter.use_mathtext": True,
+    "grid.color": "#e4e7eb",
+    "grid.linewidth": 0.7,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+    "agg.path.chunksize": 20_000,
+    # no random names and no date: the same run gives the same bytes
+    "svg.hashsalt": "dh2sim",
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def drawing() -> Iterator[None]:
+    """Draw with these settings, and with matplotlib's defaults whatever a user's own are; put back in the end."""
+    import matplotlib as mpl
+
+    with mpl.rc_context():
+        # the backend is not a matter of looks, and choosing one would import it
+        mpl.rcParams.update({name: value for name, value in mpl.rcParamsDefault.items() if name != "backend"})
+        mpl.rcParams.update(SETTINGS)
+        yield
+
+
+def make_figure(width: float, height: float, title: str) -> Any:
+    """Return a ``matplotlib.figure.Figure`` of a size in inches, with a title."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    engine: Any = figure.get_layout_engine()
+    engine.set(w_pad=0.06, h_pad=0.05)
+    letters = min(11.0, (width - 0.3) * 72 / (0.68 * max(1, len(title))))
+    figure.suptitle(title, x=0.012, ha="left", fontweight="bold", color=INK, fontsize=letters)
+    return figure
+
+
+def legend_below(figure: Any, axes: Any) -> None:
+    """Put one legend for the whole figure at the bottom, with every label of some axes once."""
+    found: dict[str, Any] = {}
+    for ax in axes:
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    if found:
+        figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=len(found))
+
+
+def legend_beside(ax: Any) -> None:
+    """Put a legend of one row above the right end of some axes."""
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=4, handlelength=1.4, borderaxespad=0.2)
+
+
+def require_plot_ending(out: Path) -> None:
+    """Check that the name of a file says what it shall be.
+
+    Raises:
+        PictureError: it does not.
+    """
+    if out.suffix.lower() not in ENDINGS:
+        raise PictureError(f"{shown(out.name)} is no plot that can be written; allowed endings: .png, .svg, .pdf")
+
+
+def save(figure: Any, out: Path, *, dpi: float) -> None:
+    """Write a figure, whole or not at all.
+
+    Args:
+        figure: ``matplotlib.figure.Figure``, drawn within ``drawing``.
+        out: .png, .svg or .pdf.
+        dpi: pixels an inch, of .png.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    dates: dict[str, dict[str, Any]] = {
+        ".svg": {"Date": None, "Creator": "dh2sim"},
+        ".pdf": {"CreationDate": None, "Creator": "dh2sim", "Producer": None},
+        ".png": {"Software": "dh2sim"},
+    }
+    ending = out.suffix.lower()
+    with written_whole(out) as draft:
+        figure.savefig(draft, dpi=dpi, format=ending[1:], metadata=dates[ending])
+
+
+def view_range(*values: NDArray[Any], margin: float = 0.07) -> tuple[float, float]:
+    """Return the range of an axis that shows values, and is not all noise where they hardly change."""
+    together = np.concatenate([np.ravel(value) for value in values if np.size(value)] or [np.zeros(1)])
+    together = together[np.isfinite(together)]
+    low, high = (float(together.min()), float(together.max())) if len(together) else (0.0, 0.0)
+    least = 1e-6 * max(1.0, abs(low), abs(high))
+    if high - low < least:
+        low, high = 0.5 * (low + high) - least, 0.5 * (low + high) + least
+    return low - margin * (high - low), high + margin * (high - low)
+
+
+def shade_outside(ax: Any, lower: float, upper: float, low: float, high: float) -> None:
+    """Set the range of an axis, and shade what of it is outside of limits.
+
+    Args:
+        ax: the axes.
+        lower: limit, or -inf.
+        upper: limit, or inf.
+        low: of the axis.
+        high: of the axis.
+    """
+    ax.set_ylim(low, high)
+    for begin, end in ((low, min(lower, high)), (max(upper, low), high)):
+        if end > begin:
+            ax.axhspan(begin, end, color=FORBIDDEN, lw=0, zorder=0, label="outside the limits")
+    for limit in (lower, upper):
+        if low < limit < high:
+            ax.axhline(limit, color=RED, lw=0.8, alpha=0.7, zorder=1)

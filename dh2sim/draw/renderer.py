@@ -1,0 +1,275 @@
+"""Pictures of a motion, one at a time.
+
+The scene around the robot is made for the robot at home; here it is made large enough for a motion.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dh2sim.draw.camera import View, extreme_points, goes_along, make_camera
+from dh2sim.draw.markers import TRACE_RADIUS, add_trace, corners, draw_frames, frame_sites
+from dh2sim.draw.motion import Motion
+from dh2sim.draw.offscreen import gl_context, import_mujoco
+from dh2sim.draw.projection import scene_projection
+from dh2sim.errors import PictureError
+from dh2sim.typing import Array
+
+GAP = 0.1
+"""Between the lowest part of the robot and a floor that had to be lowered, as a share of the scene's extent."""
+BRIGHTEST = 1.07
+"""Light of all lamps on the floor, together."""
+PEDESTAL_COLOR = (0.62, 0.64, 0.68, 1.0)
+
+
+def widen(model: Any, points: Array, *, floor: bool = True) -> None:
+    """Lower the floor under the whole motion, and move the lights so that all of it has a shadow.
+
+    A run is simulated without a floor: it only shows.
+
+    Args:
+        model: ``mujoco.MjModel``, changed in place.
+        points: of the motion, shape (count, 3), m.
+        floor: whether there is one.
+    """
+    size = float(model.stat.extent)
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    radius = float(np.linalg.norm(points - centre, axis=1).max())
+    if radius > size:
+        model.light_pos[:] = centre + (model.light_pos - model.stat.center) * (radius / size)
+        model.stat.center[:] = centre
+        model.stat.extent = radius
+    ground, pedestal = _geom(model, "floor"), _geom(model, "pedestal")
+    lowest = float(points[:, 2].min())
+    if ground >= 0 and lowest < model.geom_pos[ground, 2] - 1e-6 * size:
+        model.geom_pos[ground, 2] = lowest - GAP * size
+        if pedestal >= 0:
+            model.geom_pos[pedestal, 2] = model.geom_pos[ground, 2] / 2
+            model.geom_size[pedestal, 1] = -model.geom_pos[ground, 2] / 2
+    for geom, shown in ((ground, floor), (pedestal, not _floats(model))):
+        if geom >= 0 and not shown:
+            model.geom_matid[geom] = -1
+            model.geom_rgba[geom] = 0.0
+
+
+def dim(model: Any, elevation: float) -> None:
+    """Take light from the lamp at the camera where it looks down so steeply that the floor would be all white.
+
+    Args:
+        model: ``mujoco.MjModel``, changed in place.
+        elevation: of the direction of sight, degrees.
+    """
+    ambient, down = float(model.vis.headlight.ambient[0]), abs(math.sin(math.radians(elevation)))
+    others = sum(float(color[0]) for color in model.light_diffuse)
+    allowed = max(0.1, BRIGHTEST - ambient - others)
+    if down * float(model.vis.headlight.diffuse[0]) > allowed:
+        model.vis.headlight.diffuse[:] = allowed / down
+
+
+def complete(scene: Any, model: Any) -> None:
+    """Make the surroundings in a scene as they shall be drawn.
+
+    The floor takes no part in the shadows' map, where a plane without end makes stains of rounding errors; a shadow
+    falls on it all the same. And a base that would hang in the air above a lowered floor gets a pedestal.
+
+    Args:
+        scene: ``mujoco.MjvScene``, updated before.
+        model: ``mujoco.MjModel``, after ``widen``.
+    """
+    mujoco = import_mujoco()
+    for number in range(scene.ngeom):
+        if scene.geoms[number].type == mujoco.mjtGeom.mjGEOM_PLANE.value:
+            scene.geoms[number].category = mujoco.mjtCatBit.mjCAT_DECOR.value
+    _add_pedestal(scene, model)
+
+
+def foot(model: Any) -> Array:
+    """Return corners around where the pedestal stands on the floor, shape (4, 3), m; (0, 3) if there is none.
+
+    Args:
+        model: ``mujoco.MjModel``, after ``widen``.
+    """
+    radius, z = _pedestal(model)
+    corners = [[x * radius, y * radius, z] for x in (-1, 1) for y in (-1, 1)]
+    return np.array(corners if radius > 0.0 else []).reshape(-1, 3)
+
+
+def _pedestal(model: Any) -> tuple[float, float]:
+    """Radius of the pedestal, 0 if there is none, and height of the floor, m."""
+    mujoco = import_mujoco()
+    floor, base = _geom(model, "floor"), mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY.value, "base_link")
+    if floor < 0 or base < 0 or _floats(model) or model.geom_pos[floor, 2] >= 0.0:
+        return 0.0, 0.0
+    z, own = float(model.geom_pos[floor, 2]), _geom(model, "pedestal")
+    if own >= 0:
+        return float(model.geom_size[own, 0]), z
+    widths = model.geom_size[model.geom_bodyid == base, 0]
+    return 0.8 * float(widths.max(initial=0.0)), z
+
+
+def _add_pedestal(scene: Any, model: Any) -> None:
+    mujoco = import_mujoco()
+    radius, z = _pedestal(model)
+    if radius == 0.0 or _geom(model, "pedestal") >= 0 or scene.ngeom >= scene.maxgeom:
+        return
+    geom = scene.geoms[scene.ngeom]
+    size, place = np.array([radius, radius, -z / 2]), np.array([0.0, 0.0, z / 2])
+    rgba = np.array(PEDESTAL_COLOR, dtype=np.float32)
+    mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_CYLINDER.value, size, place, np.eye(3).ravel(), rgba)
+    geom.category = mujoco.mjtCatBit.mjCAT_STATIC.value
+    scene.ngeom += 1
+
+
+def _geom(model: Any, name: str) -> int:
+    mujoco = import_mujoco()
+    return int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM.value, name))
+
+
+def _floats(model: Any) -> bool:
+    mujoco = import_mujoco()
+    return bool(model.njnt > 0 and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE.value)
+
+
+SMALLEST, LARGEST = 64, 8192
+"""Width and height of pictures, pixels."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """How pictures look."""
+
+    width: int = 1280
+    height: int = 720
+    view: View = field(default_factory=View)
+    frames: bool = False
+    """Whether the DH frames are shown."""
+    trace: bool = True
+    """Whether the way of the tool is shown."""
+
+    def __post_init__(self) -> None:
+        """Check the size.
+
+        Raises:
+            PictureError: it is too small or too large.
+        """
+        for name, value in (("width", self.width), ("height", self.height)):
+            if not SMALLEST <= value <= LARGEST:
+                raise PictureError(f"the {name} of {value} pixels is not from {SMALLEST} to {LARGEST}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stage:
+    """A motion in front of a camera; made by ``stage``."""
+
+    motion: Motion
+    look: Look
+    data: Any = field(repr=False)
+    scene: Any = field(repr=False)
+    camera: Any = field(repr=False)
+    resources: Any = field(repr=False)
+    travel: Array = field(repr=False)
+    """How far the camera has gone along with the robot, m, shape (positions, 3)."""
+    lookat: Array = field(repr=False)
+    """Where the camera looks at first, m, shape (3,)."""
+    size: float
+    """Radius of a ball around the robot at home, m: the measure of everything that is drawn beside it."""
+    samples: Array = field(repr=False)
+    """Numbers of the positions between which the trace is drawn, shape (count,)."""
+    trace: Array = field(repr=False)
+    """Positions of the tool there, shape (count, 3), m; none where the trace is not shown."""
+
+    def picture(self, number: int) -> NDArray[np.uint8]:
+        """Draw the robot in one of its positions.
+
+        Args:
+            number: of the position.
+
+        Returns:
+            Red, green, blue, from top left, shape (height, width, 3).
+        """
+        mujoco = import_mujoco()
+        model = self.motion.model
+        self.motion.place(self.data, number)
+        self.camera.lookat[:] = self.lookat + self.travel[number]
+        everything = mujoco.mjtCatBit.mjCAT_ALL.value
+        mujoco.mjv_updateScene(model, self.data, mujoco.MjvOption(), None, self.camera, everything, self.scene)
+        complete(self.scene, model)
+        if len(self.trace):
+            past = int(np.searchsorted(self.samples, number))
+            here = self.data.site_xpos[_tool(model)][None, :]
+            add_trace(self.scene, np.concatenate([self.trace[:past], here]), TRACE_RADIUS * self.size)
+        area = mujoco.MjrRect(0, 0, self.look.width, self.look.height)
+        mujoco.mjr_render(area, self.scene, self.resources)
+        pixels = np.empty((self.look.height, self.look.width, 3), dtype=np.uint8)
+        mujoco.mjr_readPixels(pixels, None, area, self.resources)
+        pixels = np.ascontiguousarray(pixels[::-1])
+        if self.look.frames:
+            projection = scene_projection(self.scene, self.look.width, self.look.height)
+            pixels = draw_frames(pixels, self.data, frame_sites(model), projection, self.size)
+        return pixels
+
+
+@contextmanager
+def stage(motion: Motion, look: Look) -> Iterator[Stage]:
+    """Set everything up to draw pictures of a motion without a screen.
+
+    Args:
+        motion: what moves.
+        look: size, camera, and what else is shown.
+
+    Raises:
+        PictureError: nothing can draw here, or the model has no such camera.
+    """
+    mujoco = import_mujoco()
+    model, size = motion.model, float(motion.model.stat.extent)
+    along = goes_along(look.view, motion)
+    points = extreme_points(motion, along=along)
+    widen(model, points, floor=not along)
+    points = np.concatenate([points, foot(model)])
+    camera = make_camera(look.view, model, points, look.width / look.height)
+    dim(model, float(camera.elevation))
+    data = mujoco.MjData(model)
+    samples, trace = np.zeros(0), np.zeros((0, 3))
+    if look.trace and len(motion.time) > 1:
+        samples = np.array(motion.sampled(), dtype=float)
+        trace = np.array([_tool_position(motion, data, int(number)) for number in samples])
+        kept = corners(trace, TRACE_RADIUS / 6 * size)
+        samples, trace = samples[kept], trace[kept]
+    scene = mujoco.MjvScene(model, model.ngeom + len(trace) + 100)
+    # a map of shadows finer than the picture would only take time
+    finest = 2 ** math.ceil(math.log2(4 * max(look.width, look.height)))
+    model.vis.quality.shadowsize = min(int(model.vis.quality.shadowsize), finest)
+    # a floor without end is drawn around where the camera was at the update before
+    motion.place(data, 0)
+    everything = mujoco.mjtCatBit.mjCAT_ALL.value
+    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, camera, everything, scene)
+    with gl_context(model, look.width, look.height) as resources:
+        yield Stage(
+            motion=motion,
+            look=look,
+            data=data,
+            scene=scene,
+            camera=camera,
+            resources=resources,
+            travel=motion.travel if along else np.zeros((len(motion.time), 3)),
+            lookat=np.array(camera.lookat),
+            size=size,
+            samples=samples,
+            trace=trace,
+        )
+
+
+def _tool(model: Any) -> int:
+    return int(model.site("tool0").id)
+
+
+def _tool_position(motion: Motion, data: Any, number: int) -> Array:
+    motion.place(data, number)
+    return np.array(data.site_xpos[_tool(motion.model)])

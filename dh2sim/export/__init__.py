@@ -1,1 +1,0 @@
-"""Files: written whole or not at all, verified before they are put in place."""

@@ -1,0 +1,296 @@
+"""The files that an MJCF is made of, looked through before MuJoCo opens any: it includes files, and repeats parts.
+
+The bytes of an MJCF, or of a file that it includes.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PureWindowsPath
+from typing import Final, NamedTuple
+
+from dh2sim.errors import Dh2simError, ImportedFileError, Problem
+from dh2sim.formats.xml_read import MAX_BYTES, Element, XmlReport, parse_xml
+from dh2sim.messages import shown
+
+
+def read_utf_8(path: Path, name: str, before: int) -> bytes:
+    """Return the content of a file.
+
+    Args:
+        path: The file; a pipe or a device is not read.
+        name: What messages call it.
+        before: Number of bytes of the model that were read before; of all together there is a limit.
+
+    Raises:
+        ImportedFileError: The files are too large, or this one is not in UTF-8.
+        Dh2simError: It cannot be read.
+    """
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise Dh2simError(f"{name}: is not a file that can be read")
+        with path.open("rb") as stream:
+            data = stream.read(max(MAX_BYTES - before, 0) + 1)
+    except (OSError, ValueError) as error:
+        raise Dh2simError(f"{name}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    if before + len(data) > MAX_BYTES:
+        raise refused(
+            name, 1, f"the file is too large: at most {MAX_BYTES} bytes are read, with all that it includes"
+        )
+    _check_utf_8(data, name)
+    return data
+
+
+def _check_utf_8(data: bytes, name: str) -> None:
+    try:
+        data.decode()
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        message = f"not UTF-8: byte 0x{data[error.start]:02x}; MuJoCo reads no other encoding"
+        raise refused(name, line, message) from None
+
+
+def refused(file: str, line: int, message: str) -> ImportedFileError:
+    """Return an error at a line of a file."""
+    return ImportedFileError([Problem(file=file, line=line, column=1, path="", message=message)])
+
+
+MOST_FILES: Final = 200
+MOST_ELEMENTS: Final = 200_000
+"""Once includes, attachments and repetitions are carried out."""
+MOST_NESTED: Final = 510
+"""Elements, through all includes. MuJoCo's own limit in one file is 500."""
+MOST_MODELS: Final = 10
+"""Models that are attached to one another."""
+
+
+class Place(NamedTuple):
+    """Where an element stands."""
+
+    file: str
+    """As messages call it."""
+    line: int
+    column: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MjcfFiles:
+    """An MJCF and all that it includes, found harmless."""
+
+    path: Path
+    """The file itself, absolute."""
+    file: str
+    """What messages call it."""
+    folders: tuple[Path, ...]
+    """Where it and every model that it attaches stand; their meshes are looked for from there."""
+    models: int
+    """Number of models: the file itself and those that are attached."""
+    places: Mapping[tuple[str, str], Place] = field(repr=False)
+    """Where the element of a tag and a name stands."""
+
+    def error(self, message: str, *, path: str = "", element: tuple[str, str] | None = None) -> ImportedFileError:
+        """Return an error at an element, given by tag and name, or at the file's beginning."""
+        return ImportedFileError([self.problem(message, path=path, element=element)])
+
+    def problem(self, message: str, *, path: str = "", element: tuple[str, str] | None = None) -> Problem:
+        """Return a problem at an element, given by tag and name, or at the file's beginning."""
+        place = self.places.get(element, Place(self.file, 1, 1)) if element else Place(self.file, 1, 1)
+        return Problem(file=place.file, line=place.line, column=place.column, path=path, message=message)
+
+
+def look_through(path: Path, *, file: str) -> MjcfFiles:
+    """Read an MJCF and the files that it includes or attaches, without MuJoCo.
+
+    Args:
+        path: The file.
+        file: Its name, for messages.
+
+    Raises:
+        ImportedFileError: No MJCF; a file outside the folder of the model is included; a plugin is asked for; or
+            the whole is larger than the limits above.
+        Dh2simError: A file cannot be read.
+    """
+    main = path.absolute()
+    search = _Search(file)
+    search.model(main, file)
+    return MjcfFiles(
+        path=main,
+        file=file,
+        folders=tuple(search.folders),
+        models=search.models,
+        places=search.places,
+    )
+
+
+class _Search:
+    """What is known of the files of all models so far."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.folders: dict[Path, None] = {}
+        self.places: dict[tuple[str, str], Place] = {}
+        self.trees: dict[Path, Element] = {}
+        self.nested = 0
+        self._bytes = 0
+        self._counts: dict[Path, int] = {}
+        self._open: list[Path] = []
+
+    def model(self, path: Path, name: str) -> int:
+        """Return the number of elements that MuJoCo makes of a model file."""
+        if path in self._counts:
+            return self._counts[path]
+        self.folders.setdefault(path.parent)
+        self._open.append(path)
+        root = self.tree(path, name)
+        if root.tag != "mujoco":
+            what = ": this is a URDF, not an MJCF" if root.tag == "robot" else ""
+            raise XmlReport(name).failure(root, "", f"expected <mujoco>, found <{root.tag[:60]}>{what}")
+        self._counts[path] = _Model(self, path, name).carried_out(root)
+        self._open.pop()
+        return self._counts[path]
+
+    @property
+    def models(self) -> int:
+        """Number of models."""
+        return len(self._counts)
+
+    def may_attach(self, path: Path) -> str | None:
+        """Return why a model must not be attached to those that are being gone through, or None."""
+        if path in self._open:
+            return "a model cannot be attached to itself"
+        return f"models are attached more than {MOST_MODELS} deep" if len(self._open) > MOST_MODELS else None
+
+    def tree(self, path: Path, name: str) -> Element:
+        """Return the root element of a file, and remember where its named elements stand."""
+        if path in self.trees:
+            return self.trees[path]
+        data = read_utf_8(path, name, self._bytes)
+        self._bytes += len(data)
+        root = self.trees[path] = parse_xml(data, file=name)
+        if len(self.trees) > MOST_FILES:
+            raise refused(self.file, 1, f"the model is made of more than {MOST_FILES} files")
+        for element in root.walk():
+            tag, own = element.tag, element.attributes.get("name", "")
+            if own:
+                place = Place(name, element.line, element.column)
+                self.places.setdefault(("joint" if tag == "freejoint" else tag, own), place)
+        return root
+
+
+class _Model:
+    """One model and the files that it includes."""
+
+    def __init__(self, search: _Search, path: Path, name: str) -> None:
+        self._search = search
+        self._path = path
+        self._name = name
+        self._included: list[Path] = []
+        self._attached: dict[str, int] = {}
+        self._here = (path.parent, XmlReport(name))
+
+    def carried_out(self, root: Element) -> int:
+        """Return the number of elements that MuJoCo makes of the model."""
+        self._count(root)  # models may be attached before they are named
+        self._included.clear()
+        return self._count(root)
+
+    def _count(self, element: Element) -> int:
+        self._search.nested += 1
+        if self._search.nested > MOST_NESTED:
+            raise self._failure(element, f"elements are nested more than {MOST_NESTED} deep")
+        total = _own_count(element)
+        match element.tag:
+            case "plugin":
+                message = "<plugin> is refused: no plugin is run. Remove it and what needs it, and import again"
+                raise self._failure(element, message)
+            case "include":
+                total += self._include(element)
+            case "model":
+                total += self._model(element)
+            case "attach":
+                total += self._attached.get(element.attributes.get("model", ""), 0)
+            case "flexcomp" if "file" in element.attributes:
+                self._check_inside(element)  # MuJoCo opens it while it reads the text
+        for child in element.children:
+            total += self._count(child)
+        if element.tag == "replicate":
+            total *= max(1, _whole(element.attributes.get("count", "1")))
+        if total > MOST_ELEMENTS:
+            raise self._failure(element, f"this makes more than {MOST_ELEMENTS} elements once it is carried out")
+        self._search.nested -= 1
+        return total
+
+    def _failure(self, element: Element, message: str, attribute: str = "") -> ImportedFileError:
+        path = f"{element.tag}.{attribute}" if attribute else element.tag
+        return self._here[1].failure(element, path[:60], message)
+
+    def _include(self, element: Element) -> int:
+        path, name = self._found(element)
+        if path == self._path or path in self._included:
+            raise self._failure(element, f"the file {shown(name)} is included already; MuJoCo includes a file once")
+        self._included.append(path)
+        before, self._here = self._here, (path.parent, XmlReport(name))
+        self._search.nested += 1  # a call more than an element in an element
+        total = self._count(self._search.tree(path, name))
+        self._search.nested -= 1
+        self._here = before
+        return total
+
+    def _model(self, element: Element) -> int:
+        path, name = self._found(element)
+        if (why := self._search.may_attach(path)) is not None:
+            raise self._failure(element, f"{shown(name)} is not read: {why}")
+        count = self._search.model(path, name)
+        own = self._search.tree(path, name).attributes.get("model", "")
+        self._attached[element.attributes.get("name", own)] = count
+        return count
+
+    def _found(self, element: Element) -> tuple[Path, str]:
+        """Return the file that an element names, and what messages call it.
+
+        MuJoCo looks in the model's folder first, then in that of the file that the element stands in.
+        """
+        given = self._check_inside(element)
+        for folder in dict.fromkeys((self._path.parent, self._here[0])):
+            path = Path(os.path.normpath(folder / given))
+            if os.path.lexists(path):
+                return path, os.path.join(os.path.dirname(self._name), os.path.relpath(path, self._path.parent))
+        raise self._failure(element, f"there is no file {shown(given)} in {self._path.parent}", "file")
+
+    def _check_inside(self, element: Element) -> str:
+        """Return the file that an element names, which must be in the model's folder."""
+        given = element.attributes.get("file", "")
+        path, windows = os.path.normpath(given.replace("\\", "/")), PureWindowsPath(given)
+        if not given or os.path.isabs(path) or windows.drive or windows.root or path.startswith(".."):
+            message = f"found {shown(given)}; only files in the model's folder and those below it are read"
+            raise self._failure(element, message, "file")
+        return path
+
+
+def _own_count(element: Element) -> int:
+    """What MuJoCo makes of an element itself: soft bodies and made-up meshes consist of many parts."""
+    if element.tag in ("flexcomp", "composite"):
+        return _product(element.attributes.get("count", "1"))
+    if element.tag == "mesh" and "builtin" in element.attributes:
+        return _product(element.attributes.get("params", "1")) // 100 + 1
+    return 1
+
+
+def _product(text: str) -> int:
+    total = 1
+    for word in text.split()[:10]:
+        total = min(total * max(1, _whole(word)), 10**12)
+    return total
+
+
+def _whole(text: str) -> int:
+    """The whole number that a text begins with, as far as it is one; MuJoCo complains of others."""
+    try:
+        value = float(text)
+    except ValueError:
+        return 1
+    return int(min(max(value, 0.0), 1e12)) if math.isfinite(value) else 10**12

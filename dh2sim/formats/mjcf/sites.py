@@ -1,0 +1,64 @@
+"""DH frames in an MJCF: sites, placed so that MuJoCo keeps their poses to the last bit.
+
+MuJoCo compares every site with its body's frame and with the body's principal frame. Where position or quaternion
+differ by less than 1e-6 it takes one for the other, and the site is off by as much: a twist of 1.570796 where pi/2
+was meant is enough. A body that has no mass is placed exactly, so such a site gets one of its own.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+from dh2sim.formats.xml_write import child, numbers
+from dh2sim.kinematics.transforms import identity, quaternion_from_rotation, rotate_tensor
+from dh2sim.model.mass import MassProperties
+from dh2sim.typing import Array
+
+NEAR = 1e-5
+"""Frames that differ by less may be one frame to MuJoCo; m, and components of a rotation matrix."""
+NOISE = 1e-15
+"""Frames that differ by less may as well be one."""
+
+
+def placed(T: Array) -> dict[str, str]:
+    """Attributes of an element with pose ``T``, shape (4, 4), in its body."""
+    return {"pos": numbers(T[:3, 3]), "quat": numbers(quaternion_from_rotation(T[:3, :3]))}
+
+
+def add_site(body: ET.Element, name: str, T: Array, inertial: MassProperties | None) -> None:
+    """Add a site to a body, in a massless body of the same name where it needs one.
+
+    Args:
+        body: the link's element.
+        name: of the site.
+        T: its pose in the link, shape (4, 4).
+        inertial: of the link.
+    """
+    if needs_body(T, inertial):
+        body = child(body, "body", name=name, **placed(T))
+        T = identity()
+    child(body, "site", name=name, **placed(T))
+
+
+def needs_body(T: Array, inertial: MassProperties | None) -> bool:
+    """Whether MuJoCo may take a site with pose ``T`` in a link for another frame that is only near it."""
+    position, R = T[:3, 3], T[:3, :3]
+    turned, moved = _gap(R, identity()[:3, :3]), _gap(position, 0.0)
+    if NOISE < turned < NEAR:
+        return True
+    if turned <= NOISE:
+        return NOISE < moved < NEAR or (inertial is not None and NOISE < _gap(position, inertial.com) < NEAR)
+    return inertial is not None and _along_principal_axes(R, inertial.inertia)
+
+
+def _along_principal_axes(R: Array, tensor: Array) -> bool:
+    """Whether the axes of ``R`` are almost principal ones of a tensor that is not diagonal as it is written."""
+    if tensor[0, 1] == tensor[0, 2] == tensor[1, 2] == 0.0:
+        return False
+    own = rotate_tensor(R.T, tensor)
+    trace = float(tensor[0, 0] + tensor[1, 1] + tensor[2, 2])
+    return max(abs(float(own[i, j])) for i, j in ((0, 1), (0, 2), (1, 2))) < NEAR * trace
+
+
+def _gap(a: Array, b: Array | float) -> float:
+    return float(abs(a - b).max())

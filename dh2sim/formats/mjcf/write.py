@@ -1,0 +1,308 @@
+"""RobotModel -> MJCF, MuJoCo's own format.
+
+What drives a robot in an MJCF, what measures it, and where it starts: actuators, sensors, keyframes.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+
+from dh2sim.errors import ModelError
+from dh2sim.formats.mjcf.sites import add_site, needs_body, placed
+from dh2sim.formats.xml_write import child, document, number, numbers, provenance
+from dh2sim.kinematics.transforms import compose
+from dh2sim.model.mass import MassProperties
+from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
+from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
+from dh2sim.robot.spec import ActuatorType, JointType
+from dh2sim.typing import Array
+
+
+def add_actuators(mujoco: ET.Element, model: RobotModel) -> None:
+    """Add an actuator for every joint that is driven, in the order of the joints."""
+    driven = [joint for joint in model.moving_joints if joint.actuator.type is not ActuatorType.NONE]
+    if not driven:
+        return
+    actuators = child(mujoco, "actuator")
+    for joint in driven:
+        name = f"{joint.name}_{joint.actuator.type.value}"
+        match joint.actuator.type:
+            case ActuatorType.POSITION:
+                gains = {"kp": number(joint.actuator.kp), "kv": number(joint.actuator.kv)}
+            case ActuatorType.VELOCITY:
+                gains = {"kv": number(joint.actuator.kv)}
+            case _:
+                gains = {}
+        element = child(actuators, joint.actuator.type.value, name=name, joint=joint.name, **gains)
+        control = control_range(joint)
+        if control is not None:
+            element.set("ctrlrange", numbers(control))
+        if "effort" not in joint.assumed:
+            element.set("forcerange", numbers([-joint.effort, joint.effort]))
+
+
+def control_range(joint: JointModel) -> tuple[float, float] | None:
+    """Range of a joint's control, from its limits: rad or m, their rate, N·m or N; None where it is unlimited."""
+    match joint.actuator.type:
+        case ActuatorType.POSITION:
+            return None if joint.range is None else (joint.range.lower, joint.range.upper)
+        case ActuatorType.VELOCITY:
+            return -joint.velocity, joint.velocity
+        case ActuatorType.MOTOR:
+            return -joint.effort, joint.effort
+        case ActuatorType.NONE:
+            return None
+
+
+def add_sensors(mujoco: ET.Element, model: RobotModel) -> None:
+    """Add sensors of every joint's position, velocity and actuator force, and of tool0's pose."""
+    sensors = child(mujoco, "sensor")
+    for suffix, tag in (("position", "jointpos"), ("velocity", "jointvel"), ("torque", "jointactuatorfrc")):
+        for joint in model.moving_joints:
+            child(sensors, tag, name=f"{joint.name}_{suffix}", joint=joint.name)
+    child(sensors, "framepos", name="tool0_pos", objtype="site", objname="tool0")
+    child(sensors, "framequat", name="tool0_quat", objtype="site", objname="tool0")
+
+
+def add_keyframes(mujoco: ET.Element, model: RobotModel, *, floating_base: bool = False) -> None:
+    """Add a keyframe for every named configuration, with the controls that hold the robot still in it.
+
+    A base that floats starts at the origin.
+    """
+    if not model.spec.configurations or not model.moving_joints:
+        return
+    keyframe = child(mujoco, "keyframe")
+    for name, q in model.spec.configurations.items():
+        controls = holding_controls(model, name)
+        key = child(keyframe, "key", name=name, qpos=numbers([0, 0, 0, 1, 0, 0, 0, *q] if floating_base else q))
+        if controls:
+            key.set("ctrl", numbers(controls))
+
+
+def holding_controls(model: RobotModel, configuration: str) -> list[float]:
+    """Controls, one an actuator, with which the robot stands still in a named configuration.
+
+    A position actuator is asked for a little more than the joint's position, so that its pull balances gravity.
+    Clipped to the control's range.
+    """
+    controls = []
+    q, loads = model.spec.configurations[configuration], model.holding[configuration]
+    for joint, position, load in zip(model.moving_joints, q, loads, strict=True):
+        match joint.actuator.type:
+            case ActuatorType.POSITION:
+                control = float(position) + (load / joint.actuator.kp if joint.actuator.kp else 0.0)
+            case ActuatorType.VELOCITY:
+                control = 0.0
+            case ActuatorType.MOTOR:
+                control = load
+            case ActuatorType.NONE:
+                continue
+        allowed = control_range(joint)
+        controls.append(control if allowed is None else min(max(control, allowed[0]), allowed[1]))
+    return controls
+
+
+MOST_BODIES = 496
+"""MuJoCo's XML reader refuses a deeper nesting of bodies; base_link is one of them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MjcfOptions:
+    """How a robot is simulated, as far as an MJCF says so."""
+
+    timestep: float = 0.002
+    """s."""
+    integrator: str = "implicitfast"
+    """'Euler', 'RK4', 'implicit' or 'implicitfast'."""
+    energy: bool = False
+    """Whether MuJoCo computes the energy at every step."""
+    sensors: bool = True
+    """Whether it evaluates the sensors, which takes some of the time of a small arm's step."""
+    floating_base: bool = False
+    """Whether base_link floats; it needs mass then, see ``with_base_mass``."""
+
+
+EXPORTED = MjcfOptions()
+"""Of the files that ``dh2sim export`` writes."""
+
+
+def to_mjcf(model: RobotModel, options: MjcfOptions = EXPORTED) -> str:
+    """Write a robot as MJCF.
+
+    Args:
+        model: the robot.
+        options: how it is simulated.
+
+    Returns:
+        The text of the file. Meshes are looked for in ``meshes`` beside it.
+
+    Raises:
+        ModelError: the robot has more bodies than MuJoCo can read back.
+    """
+    nested = 1 + len(model.links) + any(needs_body(T, model.links[-1].inertial) for _, T in _last_frames(model))
+    if nested > MOST_BODIES:
+        raise ModelError(
+            f"{model.name}: {len(model.links)} rows make {nested} nested bodies with base_link; MuJoCo "
+            f"reads at most {MOST_BODIES}. Split the chain, or export it as URDF only (--format urdf)"
+        )
+    mujoco = ET.Element("mujoco", model=model.name)
+    child(mujoco, "compiler", angle="radian", autolimits="true", meshdir="meshes")
+    option = child(
+        mujoco,
+        "option",
+        timestep=number(options.timestep),
+        integrator=options.integrator,
+        gravity=numbers(model.spec.gravity),
+    )
+    flags = {**({"energy": "enable"} if options.energy else {}), **({} if options.sensors else {"sensor": "disable"})}
+    if flags:
+        child(option, "flag", **flags)
+    _defaults(mujoco, model)
+    materials = _assets(mujoco, model)
+    _bodies(mujoco, model, materials, options)
+    _contact(mujoco, model)
+    add_actuators(mujoco, model)
+    add_sensors(mujoco, model)
+    add_keyframes(mujoco, model, floating_base=options.floating_base)
+    return document(mujoco, provenance(model))
+
+
+def _defaults(mujoco: ET.Element, model: RobotModel) -> None:
+    outer = child(child(mujoco, "default"), "default", class_=_class(model))
+    child(outer, "joint", axis=numbers([0, 0, 1]))
+    child(outer, "site", group="4", size=number(0.02 * _site_scale(model)), rgba="0.9 0.9 0.1 1")
+    visual = child(outer, "default", class_=f"{model.name}_visual")
+    child(visual, "geom", type="mesh", group="2", contype="0", conaffinity="0", mass="0")
+    collision = child(outer, "default", class_=f"{model.name}_shape")
+    child(collision, "geom", group="1")
+    hidden = child(outer, "default", class_=f"{model.name}_collision")
+    child(hidden, "geom", group="3")
+
+
+def _class(model: RobotModel) -> str:
+    """Name of the robot's default class; MuJoCo has a class main already."""
+    return "main_robot" if model.name == "main" else model.name
+
+
+def _site_scale(model: RobotModel) -> float:
+    radii = [shape.radius for link in model.all_links for shape in link.shapes]
+    return 10.0 * min(radii)
+
+
+def _assets(mujoco: ET.Element, model: RobotModel) -> dict[Color, str]:
+    asset = child(mujoco, "asset")
+    materials: dict[Color, str] = {}
+    for link in model.all_links:
+        for color in (link.color, link.joint_color):
+            if color not in materials:
+                materials[color] = f"color_{len(materials) + 1}"
+                child(
+                    asset,
+                    "material",
+                    name=materials[color],
+                    rgba=numbers(color),
+                    specular="0.3",
+                    shininess="0.3",
+                )
+        if link.mesh is not None:
+            # a mesh that only shows a link need not be closed: as a shell its volume does not matter
+            scale = numbers([link.mesh.scale] * 3)
+            child(asset, "mesh", name=link.name, file=link.mesh.file_name, scale=scale, inertia="shell")
+    return materials
+
+
+def _bodies(mujoco: ET.Element, model: RobotModel, materials: dict[Color, str], options: MjcfOptions) -> None:
+    body = child(child(mujoco, "worldbody"), "body", name=model.base.name, childclass=_class(model))
+    if options.floating_base:
+        _inertial(body, model.base.inertial)
+        child(body, "freejoint")  # nameless: any name might be that of a joint of the table
+    _geoms(body, model, model.base, model.chain.T_base_link_dh0, materials)
+    add_site(body, "dh_0", model.chain.T_base_link_dh0, model.base.inertial if options.floating_base else None)
+    for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
+        body = child(body, "body", name=link.name, **placed(joint.joint.T_parent_joint))
+        _inertial(body, link.inertial)
+        if joint.joint.type is not JointType.FIXED:
+            _joint(body, joint)
+        _geoms(body, model, link, joint.joint.T_joint_dh, materials)
+        frames = [(f"dh_{i}", joint.joint.T_joint_dh)] if i < len(model.links) else _last_frames(model)
+        for name, T in frames:
+            add_site(body, name, T, link.inertial)
+
+
+def _last_frames(model: RobotModel) -> list[tuple[str, Array]]:
+    """Names of the last DH frame and of tool0, and their poses in the last link."""
+    T = model.joints[-1].joint.T_joint_dh
+    return [(f"dh_{len(model.links)}", T), ("tool0", compose(T, model.chain.T_dhn_tool0))]
+
+
+def _moved(T: Array) -> dict[str, str]:
+    """As ``placed``, without what is the identity."""
+    return {name: text for name, text in placed(T).items() if text not in ("0.0 0.0 0.0", "1.0 0.0 0.0 0.0")}
+
+
+def _inertial(body: ET.Element, properties: MassProperties | None) -> None:
+    if properties is None:  # without this MuJoCo takes the body's place in its parent for its principal frame
+        child(body, "inertial", pos=numbers([0, 0, 0]), mass=number(0), diaginertia=numbers([0, 0, 0]))
+        return
+    I = properties.inertia  # noqa: E741
+    inertial = child(body, "inertial", pos=numbers(properties.com), mass=number(properties.mass))
+    if I[0, 1] == I[0, 2] == I[1, 2] == 0.0:
+        inertial.set("diaginertia", numbers([I[0, 0], I[1, 1], I[2, 2]]))
+    else:
+        inertial.set("fullinertia", numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]))
+
+
+def _joint(body: ET.Element, joint: JointModel) -> None:
+    element = child(body, "joint", name=joint.name, type="hinge" if joint.joint.type.turns else "slide")
+    if joint.joint.sign < 0:
+        element.set("axis", numbers([0, 0, -1]))
+    if joint.range is not None:
+        element.set("range", numbers([joint.range.lower, joint.range.upper]))
+    if "effort" not in joint.assumed:
+        element.set("actuatorfrcrange", numbers([-joint.effort, joint.effort]))
+    dynamics = joint.dynamics
+    for name, value in (
+        ("damping", dynamics.damping),
+        ("frictionloss", dynamics.friction),
+        ("armature", dynamics.armature),
+    ):
+        if value:
+            element.set(name, number(value))
+
+
+def _geoms(
+    body: ET.Element, model: RobotModel, link: LinkModel, T_link_dh: Array, materials: dict[Color, str]
+) -> None:
+    if link.mesh is not None:
+        material = materials[link.color]
+        child(
+            body,
+            "geom",
+            class_=f"{model.name}_visual",
+            mesh=link.name,
+            material=material,
+            **placed(compose(T_link_dh, link.mesh.T_dh_mesh)),  # of the file's frame; MuJoCo sees to its own
+        )
+    kind = "shape" if link.mesh is None else "collision"
+    # a base that does not move needs no mass, and so MuJoCo gives it no principal frame of its own; that of one that
+    # floats is written out
+    weight = {"mass": "0"} if link is model.base else {}
+    for shape in link.shapes:
+        color = link.joint_color if shape.part is ShapePart.JOINT else link.color
+        _geom(body, f"{model.name}_{kind}", shape, materials[color], weight)
+
+
+def _geom(body: ET.Element, class_: str, shape: Shape, material: str, weight: dict[str, str]) -> None:
+    kind = "capsule" if shape.kind is ShapeKind.CAPSULE else "cylinder"
+    size = numbers([shape.radius, 0.5 * shape.length])
+    child(
+        body, "geom", class_=class_, type=kind, size=size, material=material, **weight, **_moved(shape.T_link_shape)
+    )
+
+
+def _contact(mujoco: ET.Element, model: RobotModel) -> None:
+    if model.excluded:
+        contact = child(mujoco, "contact")
+        for pair in model.excluded:
+            child(contact, "exclude", body1=pair.link1, body2=pair.link2)

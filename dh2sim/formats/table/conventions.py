@@ -1,0 +1,150 @@
+"""Which convention a table is in, from what the table and the words around it say; it is never guessed."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from dh2sim.formats.table.grid import PIPES, Findings
+from dh2sim.formats.table.headers import Columns, Quantity
+from dh2sim.messages import shown
+from dh2sim.robot.spec import Convention
+
+_ABOVE: Final = 12
+_BELOW: Final = 4
+"""Lines around a table that are taken for its caption."""
+
+
+def _word(pattern: str) -> re.Pattern[str]:
+    """A whole word; an underscore is no part of one."""
+    return re.compile(rf"(?<![A-Za-z])(?:{pattern})(?![A-Za-z])", re.IGNORECASE)
+
+
+_SUBJECT: Final = _word("m?dh|d-h|d&h|denavit|hartenberg|conventions?|notation")
+_WORDS: Final = {
+    Convention.STANDARD: (
+        _word("distal|stddh|std dh|dhstd"),
+        _word("standard|classic|classical|conventional|paul|spong"),
+    ),
+    Convention.MODIFIED: (_word("proximal|moddh|mod dh|dhmod|mdh|craig|craig's"), _word("modified|khalil")),
+}
+"""Words that decide by themselves, and words that do in a line about DH tables."""
+_HOW: Final = (
+    "add '--convention standard' or '--convention modified'. Headings a_(i-1), alpha_(i-1) would say modified; "
+    "docs/conventions.md tells how to find out"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A convention, and what says so."""
+
+    convention: Convention
+    by: str
+    """Such as ``the heading 'a_(i-1)'``."""
+
+
+def decide(
+    option: Convention | None,
+    printed: Convention | None,
+    columns: Columns,
+    lines: Sequence[str],
+    table: range,
+    findings: Findings,
+) -> Convention | None:
+    """Return the convention of a table's rows, or None where that cannot be told (and ``findings`` says why).
+
+    Args:
+        option: What the user says.
+        printed: What the first line of a toolbox's printout says.
+        columns: The columns; headings of index i - 1 say modified, headings of index i throughout standard.
+        lines: The file.
+        table: Numbers of the table's lines, counted from 1.
+        findings: Takes problems and notes.
+    """
+    first = columns.headings[0].cell
+    said = [] if printed is None else [Said(printed, "the printout's first line")]
+    said += _by_headings(columns, findings)
+    said += [] if printed is not None else _by_words(lines, table)
+    wanted = [Said(option, f"--convention {option}")] if option in (Convention.STANDARD, Convention.MODIFIED) else []
+    for one, other in itertools.pairwise([*wanted, *said]):
+        if one.convention is not other.convention:
+            message = f"{one.by} says {one.convention}, but {other.by} says {other.convention}"
+            findings.wrong(first, "", f"{message}; correct the one that is wrong")
+            return None
+    if wanted or said:
+        return (wanted or said)[0].convention
+    if _indexed_throughout(columns):
+        findings.note(
+            "nothing but the headings' index i says the convention: it was read as standard; for a table after Craig "
+            "add '--convention modified'"
+        )
+        return Convention.STANDARD
+    findings.wrong(first, "", f"nothing says which convention the table is in; {_HOW}")
+    return None
+
+
+def caption(lines: Sequence[str], table: range) -> list[str]:
+    """Return the lines around a table that may speak of it."""
+    return [lines[number - 1] for number in (*_above(lines, table), *_below(lines, table))]
+
+
+def _by_headings(columns: Columns, findings: Findings) -> list[Said]:
+    indices = {
+        quantity: heading.index
+        for quantity in (Quantity.A, Quantity.ALPHA, Quantity.D, Quantity.THETA)
+        if (heading := columns.heading(quantity)) and heading.index is not None
+    }
+    link = [quantity for quantity in (Quantity.A, Quantity.ALPHA) if indices.get(quantity) == -1]
+    if not link:
+        return []
+    heading = columns.heading(link[0])
+    shifted = [quantity for quantity in indices if indices[quantity] == -1 and quantity not in link]
+    straight = [quantity for quantity in (Quantity.A, Quantity.ALPHA) if indices.get(quantity) == 0]
+    if heading is not None and (shifted or straight):
+        message = "a and alpha have index i - 1 in a modified table and i in a standard one, d and theta always i"
+        findings.wrong(heading.cell, "", f"the headings' indices do not go together: {message}")
+    return [] if heading is None else [Said(Convention.MODIFIED, f"the heading {shown(heading.cell.text)}")]
+
+
+def _indexed_throughout(columns: Columns) -> bool:
+    headings = [columns.heading(quantity) for quantity in (Quantity.A, Quantity.ALPHA, Quantity.THETA)]
+    return all(heading is not None and heading.index == 0 for heading in headings)
+
+
+def _by_words(lines: Sequence[str], table: range) -> list[Said]:
+    """Return what the caption says, the words above the table before those below; twice if it contradicts itself."""
+    for numbers in (_above(lines, table), _below(lines, table)):
+        said: dict[Convention, Said] = {}
+        for number in numbers:
+            line = lines[number - 1][:1000]
+            for convention, (strong, weak) in _WORDS.items():
+                found = strong.search(line) or (weak.search(line) if _SUBJECT.search(line) else None)
+                if found:
+                    said.setdefault(convention, Said(convention, f"{shown(found.group())} on line {number}"))
+        if said:
+            return list(said.values())
+    return []
+
+
+def _above(lines: Sequence[str], table: range) -> Iterator[int]:
+    for number in range(table.start - 1, max(0, table.start - 1 - _ABOVE), -1):
+        if _is_table(lines[number - 1]):
+            return
+        yield number
+        if lines[number - 1].lstrip().startswith("#") and not lines[number - 1].lstrip().startswith("# "):
+            return
+
+
+def _below(lines: Sequence[str], table: range) -> Iterator[int]:
+    for number in range(table.stop, min(len(lines) + 1, table.stop + _BELOW)):
+        if _is_table(lines[number - 1]) or lines[number - 1].lstrip().startswith("#"):
+            return
+        yield number
+
+
+def _is_table(line: str) -> bool:
+    return sum(line.count(pipe) for pipe in PIPES) >= 2

@@ -1,0 +1,155 @@
+"""What Corke's Robotics Toolboxes print around a table: name and convention, base and tool, configurations."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from dh2sim.formats.table.grid import Findings, Grid
+from dh2sim.formats.table.notation import plain
+from dh2sim.kinematics.transforms import rpy_from_rotation
+from dh2sim.messages import shown
+from dh2sim.robot.schema import name_problem
+from dh2sim.robot.spec import Convention, JointType, LengthUnit, Pose, Row, Units
+from dh2sim.typing import Array, read_only
+
+_ABOVE: Final = 8
+"""Lines above a table that may be the printout's first."""
+_STARTS: Final = (
+    re.compile(
+        r"DHRobot:\s*(?P<name>.*?)(?:\s*\(by .*?\))?,\s*\d+ joints? \((?P<types>[RP]+)\).*?(?P<dh>std|sta|mod)\w* DH"
+    ),
+    re.compile(r"[%#\s>]*(?P<name>.*?)(?:\s*\[.*\])?\s*::\s*\d+ axis,\s*(?P<types>[RP]+),\s*(?P<dh>std|mod)DH"),
+    re.compile(r"[%#\s>]*(?P<name>.*?)\s*\(\d+ axis,\s*(?P<types>[RP]+),\s*(?P<dh>std|mod)DH"),
+)
+_NUMBER: Final = r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+_POSE: Final = re.compile(
+    rf"(base|tool)\b[\s:│┃|]*t\s*=\s*\(?{_NUMBER},{_NUMBER},{_NUMBER}\)?\s*[;,]\s*"
+    rf"rpy/(xyz|zyx|yxz)\s*=\s*\(?{_NUMBER}°?\s*,{_NUMBER}°?\s*,{_NUMBER}°?\s*\)?",
+    re.IGNORECASE,
+)
+_NO_POSE: Final = re.compile(r"\W*(base|tool)\W*")
+_MATRIX: Final = re.compile(rf"base =((?:{_NUMBER}\s){{4}})\s*tool =(.*)")
+_IDENTITY: Final = tuple(float(i == k) for i in range(4) for k in range(4))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Printout:
+    """The first line of a printout."""
+
+    name: str
+    types: str
+    """R or P for every joint."""
+    convention: Convention
+    in_radians: bool
+    """The MATLAB toolbox prints radians, and no degree signs."""
+
+
+def find_printout(lines: Sequence[str], table: range) -> Printout | None:
+    """Return what the first line of the printout says that a table belongs to, or None where it is none."""
+    for number in range(table.start - 1, max(0, table.start - 1 - _ABOVE), -1):
+        line = lines[number - 1][:1000]
+        for index, pattern in enumerate(_STARTS):
+            if found := pattern.match(line.strip()):
+                convention = Convention.MODIFIED if found["dh"] == "mod" else Convention.STANDARD
+                name = found["name"].strip()
+                return Printout(name=name, types=found["types"], convention=convention, in_radians=index > 0)
+    return None
+
+
+def find_poses(lines: Sequence[str], table: range, length: LengthUnit | None, findings: Findings) -> dict[str, Pose]:
+    """Return the poses of base and tool that a printout shows behind its table, by ``base`` and ``tool``."""
+    units = Units(length=length or LengthUnit.M)
+    poses: dict[str, Pose] = {}
+    for index in range(table.stop - 1, len(lines)):
+        line = lines[index][:1000]
+        if any(pattern.match(line.strip()) for pattern in _STARTS):
+            break
+        if found := _POSE.search(line):
+            poses[found[1].casefold()] = _pose(found, units)
+        elif found := _MATRIX.search(line):
+            poses |= _from_matrices(lines[index : index + 4], units, findings)
+        elif found := _NO_POSE.fullmatch(line):
+            findings.note(f"the printout names a {found[1]} and does not show its pose: it was left out")
+    for name in poses:
+        findings.note(
+            f"the pose of the {name} is as printed, rounded: give it in the robot file if you know it better"
+        )
+    return poses
+
+
+def find_configurations(
+    grids: Sequence[Grid], table: Grid, rows: Sequence[Row], findings: Findings
+) -> Mapping[str, Array]:
+    """Return the named joint vectors of a printout, rad and m, as printed."""
+    moving = [row for row in rows if row.type.moves]
+    expected = ["name", *(f"q{index}" for index in range(len(moving)))]
+    following = (grid for grid in grids if grid.lines.start > table.lines.start)
+    grid = next((g for g in following if [plain(c.text) for c in g.rows[0]] == expected), None)
+    configurations: dict[str, Array] = {}
+    for name, *cells in ([cell.text for cell in row] for row in grid.rows[1:]) if grid else ():
+        try:
+            vector = [_coordinate(text, row) for text, row in zip(cells, moving, strict=True)]
+        except ValueError as error:
+            findings.note(f"the configuration {shown(name)} was left out: {error}")
+            continue
+        if problem := name_problem(name, "the name of a configuration"):
+            findings.note(f"the configuration {shown(name)} was left out: {problem}")
+        else:
+            configurations[name] = read_only(vector)
+    if configurations:
+        findings.note("configurations are as printed, rounded to three digits")
+    return configurations
+
+
+def _coordinate(text: str, row: Row) -> float:
+    angle = text.endswith("°")
+    if angle is not row.type.turns or row.type is JointType.FIXED:
+        raise ValueError(f"{shown(text)} is no coordinate of a {row.type} joint")
+    value = math.radians(float(text[:-1])) if angle else float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{shown(text)} is no finite number")
+    if row.limits.position and not row.limits.position[0] <= value <= row.limits.position[1]:
+        raise ValueError(f"{shown(text)} is outside the limits of {row.name}")
+    return value
+
+
+def _pose(found: re.Match[str], units: Units) -> Pose:
+    """A pose from its printed line; ``rpy/xyz`` is R = Rx(yaw) Ry(pitch) Rz(roll), printed roll first."""
+    xyz = [units.metres(float(found[group])) for group in (2, 3, 4)]
+    roll, pitch, yaw = (math.radians(float(found[group])) for group in (6, 7, 8))
+    if found[5].casefold() == "zyx":
+        return Pose(xyz=read_only(xyz), rpy=read_only([roll, pitch, yaw]))
+    R = read_only(_about("z", roll))
+    for axis, angle in (("y", pitch), ("x", yaw)) if found[5].casefold() == "xyz" else (("x", pitch), ("y", yaw)):
+        R = read_only(_about(axis, angle)) @ R
+    return Pose(xyz=read_only(xyz), rpy=rpy_from_rotation(R))
+
+
+def _about(axis: str, angle: float) -> list[list[float]]:
+    s, c = math.sin(angle), math.cos(angle)
+    match axis:
+        case "x":
+            return [[1, 0, 0], [0, c, -s], [0, s, c]]
+        case "y":
+            return [[c, 0, s], [0, 1, 0], [-s, 0, c]]
+        case _:
+            return [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+
+
+def _from_matrices(lines: Sequence[str], units: Units, findings: Findings) -> dict[str, Pose]:
+    """Base and tool of an older MATLAB toolbox, which prints two 4 x 4 matrices beside each other."""
+    rows = [[float(number) for number in re.findall(_NUMBER, line.rpartition("grav")[2])][-8:] for line in lines]
+    if len(rows) != 4 or any(len(row) != 8 for row in rows):
+        findings.note("base and tool of the printout could not be read: they were left out")
+        return {}
+    poses: dict[str, Pose] = {}
+    for name, start in (("base", 0), ("tool", 4)):
+        matrix = [row[start : start + 4] for row in rows]
+        if tuple(value for row in matrix for value in row) != _IDENTITY:
+            xyz = [units.metres(row[3]) for row in matrix[:3]]
+            poses[name] = Pose(xyz=read_only(xyz), rpy=rpy_from_rotation(read_only([row[:3] for row in matrix[:3]])))
+    return poses

@@ -1,0 +1,312 @@
+"""Denavit-Hartenberg tables to RobotSpecs.
+
+Whether a table is one: its rows are as long as its heading, and its numbers are written in one way.
+
+Values of symbols that the text around a table gives, such as ``L1 = 0.4 m, a2 = 0.4318``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePath
+from types import MappingProxyType
+from typing import Final
+
+from dh2sim.errors import Dh2simError, ImportedFileError, RobotFileError
+from dh2sim.formats.table import conventions, units
+from dh2sim.formats.table.cells import Constant, canonical
+from dh2sim.formats.table.grid import MAX_COLUMNS, MAX_ROWS, Cell, Findings, is_comment
+from dh2sim.formats.table.headers import (
+    ANGLE_WORDS,
+    LENGTH_WORDS,
+    PARAMETERS,
+    UNIT,
+    Columns,
+    Quantity,
+    Table,
+    find_columns,
+    locate,
+    others,
+)
+from dh2sim.formats.table.notation import plain
+from dh2sim.formats.table.printout import find_configurations, find_poses, find_printout
+from dh2sim.formats.table.rows import Body, Resolved, is_hayati, read_body, to_row
+from dh2sim.messages import shown
+from dh2sim.robot.expressions import FUNCTIONS, ExpressionError, evaluate
+from dh2sim.robot.schema import name_problem
+from dh2sim.robot.spec import AngleUnit, BaseSpec, Convention, JointType, LengthUnit, Pose, RobotSpec, Row, Units
+from dh2sim.robot.yaml_tree import Report, decode
+
+_COMMA: Final = re.compile(r"\d,\d")
+_POINT: Final = re.compile(r"\d\.\d")
+_GROUPED: Final = re.compile(r"(?<![\d,])[1-9]\d{0,2},\d{3}(?![\d,])")
+
+
+def check_shape(table: Table, findings: Findings) -> None:
+    """Note in ``findings`` rows of another length than the heading, and tables without rows or with too many."""
+    first = table.header[0]
+    for line, column, message in table.grid.problems:
+        findings.wrong_at(line, column, "", message)
+    if not table.rows:
+        findings.wrong(first, "", "the table has headings and no rows")
+    if len(table.rows) > MAX_ROWS:
+        findings.wrong(first, "", f"the table has {len(table.rows)} rows; at most {MAX_ROWS} are allowed")
+    if len(table.header) > MAX_COLUMNS:
+        findings.wrong(first, "", f"the table has {len(table.header)} columns; at most {MAX_COLUMNS} are allowed")
+    for number, row in enumerate(table.rows[:MAX_ROWS], start=1):
+        if len(row) != len(table.header):
+            cells = "1 cell" if len(row) == 1 else f"{len(row)} cells"
+            findings.wrong(row[0], f"row {number}", f"{cells} in a table of {len(table.header)} columns")
+
+
+def has_decimal_comma(table: Table, columns: Columns, findings: Findings) -> bool:
+    """Return whether the table's numbers are written with a decimal comma.
+
+    They are where some have a comma between digits and none has a point. A table in which every such comma has
+    three digits behind it and no 0 before it cannot be told from one with grouped thousands.
+    """
+    commas = [cell for cell in _numbers(table, columns) if _COMMA.search(cell.text)]
+    if not commas or any(_POINT.search(cell.text) for cell in _numbers(table, columns)):
+        return False
+    if all(_GROUPED.search(plain(cell.text)) for cell in commas):
+        message = (
+            f"the comma in {shown(commas[0].text)} may group thousands or be a decimal comma; write a point, or none"
+        )
+        findings.wrong(commas[0], "", message)
+    return True
+
+
+def _numbers(table: Table, columns: Columns) -> Iterator[Cell]:
+    for row in table.rows:
+        for quantity in (*PARAMETERS, Quantity.OFFSET, Quantity.LOWER, Quantity.UPPER):
+            cell = columns.cell(row, quantity)
+            if cell is not None:
+                yield cell
+
+
+_MOST_LINES_OF_TEXT: Final = 5000
+_NUMBER: Final = r"(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:[eE][-+]?\d+)?"
+_VALUE: Final = rf"[-+]?(?:{_NUMBER}\s*\*?\s*)?(?:{_NUMBER}|pi)(?:\s*/\s*\d+)?"
+_ASSIGNMENT: Final = re.compile(
+    rf"(?<![\w.])([A-Za-z][A-Za-z_]*_?\d+[a-z]?|[A-Za-z])\s*=\s*((?>{_VALUE}))"
+    rf"(?>\s*[\[(]?({UNIT})(?![A-Za-z0-9_])[\])]?)?+(?![\w%°\"']|[.,]\d|\s*[-+*/^(=])",
+)
+_GOES_ON: Final = re.compile(r"\s*(?!(?:and|is|are|for|where|with|which)\b)[A-Za-z]")
+"""A word behind a number without unit that may be a unit of its own."""
+_THOUSANDS: Final = re.compile(r"[1-9]\d{0,2},\d{3}")
+
+
+def find_constants(lines: Sequence[str], table: Container[int]) -> dict[str, Constant]:
+    """Return the symbols that a text gives a value, without the underscores in their names.
+
+    Args:
+        lines: The lines of the file.
+        table: Numbers of lines, from 1, that are the table's own.
+    """
+    found: dict[str, Constant] = {}
+    for number, line in enumerate(lines[:_MOST_LINES_OF_TEXT], start=1):
+        if number in table or "=" not in line:
+            continue
+        for match in _ASSIGNMENT.finditer(plain(line)):
+            if match[3] is None and _GOES_ON.match(match.string, match.end()):
+                continue
+            name, constant = canonical(match[1]), _constant(match, number)
+            if constant is None or name in FUNCTIONS or name == "pi":
+                continue
+            first = found.setdefault(name, constant)
+            if (first.value, first.unit) != (constant.value, constant.unit):
+                problem = f"the symbol '{name}' has two values, on lines {first.line} and {number}; write the number"
+                found[name] = replace(first, problem=problem)
+    return found
+
+
+def _constant(match: re.Match[str], line: int) -> Constant | None:
+    text = match[2]
+    if _THOUSANDS.search(text):
+        return None
+    try:
+        value = evaluate(re.sub(r"(\d)\s*(?=pi)", r"\1*", text.replace(",", ".")), {})
+    except ExpressionError:
+        return None
+    word = (match[3] or ("rad" if "pi" in text else "")).casefold()
+    if angle := ANGLE_WORDS.get(word):
+        return Constant(value=Units(angle=angle).radians(value), unit=type(angle).RAD, line=line)
+    if length := LENGTH_WORDS.get(word):
+        return Constant(value=Units(length=length).metres(value), unit=type(length).M, line=line)
+    return Constant(value=value, unit=None, line=line)
+
+
+_NO_TABLE: Final = (
+    "there is no table of Denavit-Hartenberg parameters here: none has headings such as theta, d, a and alpha. "
+    "Allowed: a Markdown table, CSV, TSV, or a printout of the Robotics Toolbox for Python or MATLAB"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TableImport:
+    """A robot made from a table, and how the table was read."""
+
+    spec: RobotSpec
+    units: Units
+    """Of the numbers that carry no unit of their own."""
+    notes: tuple[str, ...]
+    """What was chosen, taken for granted or left out, a sentence each, for the user to read."""
+
+
+def read_table(
+    data: bytes,
+    *,
+    file: str,
+    name: str,
+    convention: Convention | None = None,
+    angle: AngleUnit | None = None,
+    length: LengthUnit | None = None,
+) -> TableImport:
+    """Return the robot that a table of Denavit-Hartenberg parameters describes.
+
+    The table is the first one in the text that has at least three of the headings theta, d, a, alpha and beta: a
+    Markdown table, values separated by commas, semicolons, tabs or spaces, or what Corke's Robotics Toolbox for
+    Python or MATLAB prints for a robot.
+
+    Args:
+        data: The file's content, UTF-8.
+        file: Its name, for messages; its ending is only a hint.
+        name: What the robot is to be called.
+        convention: The convention, where the text does not say it.
+        angle: The unit of angles that have none of their own; goes before what headings say.
+        length: The unit of lengths that have none of their own; goes before what headings say.
+
+    Raises:
+        ImportedFileError: There is no table, or it is wrong, or something is not said that has to be known; the
+            error holds everything that is wrong.
+        Dh2simError: ``name`` is no name for a robot.
+    """
+    if problem := name_problem(name, "the name of a robot"):
+        raise Dh2simError(problem)
+    findings = Findings(file)
+    try:
+        lines = decode(data, Report(file)).split("\n")
+    except RobotFileError as error:
+        raise ImportedFileError(error.problems) from None
+    table = locate(lines, file)
+    if table is None:
+        findings.wrong_at(1, 1, "", _NO_TABLE)
+        raise findings.error()
+    reader = _Reader(lines, table, findings)
+    return reader.read(name, convention, angle, length)
+
+
+class _Reader:
+    """Reads one table."""
+
+    def __init__(self, lines: Sequence[str], table: Table, findings: Findings) -> None:
+        """Find out what the columns hold.
+
+        Raises:
+            ImportedFileError: That cannot be told, or the rows are not all as long as the heading.
+        """
+        self._lines = lines
+        self._table = table
+        self._findings = findings
+        self._printout = find_printout(lines, table.lines)
+        self._columns = find_columns(table.header[:MAX_COLUMNS], findings)
+        check_shape(table, findings)
+        findings.check()
+
+    def read(
+        self, name: str, convention: Convention | None, angle: AngleUnit | None, length: LengthUnit | None
+    ) -> TableImport:
+        findings, columns = self._findings, self._columns
+        constants = find_constants(self._lines, self._table.lines)
+        comma = has_decimal_comma(self._table, columns, findings)
+        body = read_body(self._table, columns, constants, comma=comma, findings=findings)
+        used, resolved = self._units(body, angle, length)
+        chosen, of_rows = self._conventions(body, convention)
+        rows = tuple(
+            to_row(row.row, row.numbers, row.limits, resolved, name=row.name, convention=own, findings=findings)
+            for row, own in zip(body.rows, of_rows, strict=True)
+        )
+        self._check_printout(rows)
+        findings.check()
+        spec = self._spec(name, rows, chosen, used.length)
+        for symbol in body.constants:
+            findings.note(f"{symbol} was given its value by line {constants[symbol].line}")
+        self._note_unread()
+        return TableImport(spec=spec, units=used, notes=tuple(findings.notes))
+
+    def _units(self, body: Body, angle: AngleUnit | None, length: LengthUnit | None) -> tuple[Units, Resolved]:
+        """Return the units of numbers that have none of their own."""
+        said_angle, said_length = units.said_in(conventions.caption(self._lines, self._table.lines))
+        if self._printout and self._printout.in_radians:
+            said_angle = AngleUnit.RAD
+        kinds = ((units.ANGLES, angle, said_angle), (units.LENGTHS, length, said_length))
+        found = {
+            kind.what: units.decide(kind, body.numbers(kind), option, said, self._findings)
+            for kind, option, said in kinds
+        }
+        used = Units(
+            angle=AngleUnit(found[units.ANGLES.what] or AngleUnit.RAD),
+            length=LengthUnit(found[units.LENGTHS.what] or LengthUnit.M),
+        )
+        return used, Resolved(option={kind.what: option for kind, option, _ in kinds}, default=found)
+
+    def _conventions(self, body: Body, option: Convention | None) -> tuple[Convention, list[Convention]]:
+        """Return the table's convention and each row's; a row with beta is a Hayati row."""
+        hayati = [option is Convention.HAYATI or is_hayati(row.numbers, self._columns) for row in body.rows]
+        if all(hayati):
+            return Convention.HAYATI, [Convention.HAYATI] * len(hayati)
+        printed = self._printout.convention if self._printout else None
+        lines = self._table.lines
+        chosen = conventions.decide(option, printed, self._columns, self._lines, lines, self._findings)
+        chosen = chosen or Convention.STANDARD
+        return chosen, [Convention.HAYATI if own else chosen for own in hayati]
+
+    def _check_printout(self, rows: Sequence[Row]) -> None:
+        """The joints of a printout are those that its first line announces."""
+        if self._printout is None:
+            return
+        types = "".join("P" if row.type is JointType.PRISMATIC else "R" for row in rows if row.type.moves)
+        if types != self._printout.types:
+            message = (
+                f"the printout's first line says {self._printout.types}, but the joints of the table are {types}"
+            )
+            self._findings.wrong(self._table.header[0], "", message)
+        self._findings.note("numbers are as printed, and a printout rounds them: poses are no better than its digits")
+        if self._printout.in_radians:
+            self._findings.note(
+                "the toolbox for MATLAB does not print which joints are flipped, and 1.5708 stays 1.5708: write pi/2 "
+                "for a right angle"
+            )
+
+    def _spec(self, name: str, rows: tuple[Row, ...], convention: Convention, length: LengthUnit) -> RobotSpec:
+        table, printout = self._table, self._printout
+        poses: dict[str, Pose] = {}
+        configurations = {}
+        if printout is not None:
+            poses = find_poses(self._lines, table.lines, length, self._findings)
+            configurations = dict(find_configurations(table.pipes, table.grid, rows, self._findings))
+        return RobotSpec(
+            name=name,
+            rows=rows,
+            description=printout.name if printout else "",
+            source=f"{PurePath(self._findings.file).name}, line {table.header[0].line}",
+            convention=convention,
+            base=BaseSpec(pose=poses.get("base", Pose())),
+            tool=poses.get("tool", Pose()),
+            configurations=MappingProxyType(configurations),
+        )
+
+    def _note_unread(self) -> None:
+        table = self._table
+        for line in others(table):
+            self._findings.note(f"the table on line {line} was not read: only the first of a file is")
+        behind = range(table.lines.stop, len(self._lines) + 1)
+        texts = [self._lines[number - 1] for number in behind]
+        if (
+            table.grid.separator != "|"
+            and self._printout is None
+            and any(t.strip() and not is_comment(t) for t in texts)
+        ):
+            self._findings.note(f"what stands behind the table, from line {behind.start}, was not read as rows")

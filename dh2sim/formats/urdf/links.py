@@ -1,0 +1,315 @@
+"""How the links of a URDF's arm look: one mesh and one colour a link; what else is shown is noted.
+
+What hangs on a link of the arm: the links that are fixed to it, and the branches that move and are left out.
+
+Mass, centre of mass and inertia of the links of a URDF's arm, with those of all links that are fixed to them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import PurePosixPath
+from typing import Final
+
+import numpy as np
+
+from dh2sim.formats.mesh_paths import FindMesh
+from dh2sim.formats.serial_robot import Color, Inertial, Look, SerialMesh
+from dh2sim.formats.urdf.chain import Selection
+from dh2sim.formats.urdf.tree import UrdfJoint, UrdfTree, read_number, read_numbers, read_only_child, read_pose
+from dh2sim.formats.xml_read import Element, XmlReport, place
+from dh2sim.kinematics.transforms import compose, identity, move_point, rotate_tensor
+from dh2sim.messages import Notes, listed, shown
+from dh2sim.model.mass import MassProperties, combine, is_possible
+from dh2sim.robot.schema import MESH_SUFFIXES
+from dh2sim.typing import Array, read_only
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Part:
+    """A link of the file that is fixed to a link of the arm."""
+
+    name: str
+    element: Element = field(repr=False)
+    T_link_part: Array = field(repr=False)
+    """Its pose in the link of the arm, shape (4, 4)."""
+    on_chain: bool
+    """Whether the way from base to tip leads over it."""
+
+    @property
+    def path(self) -> str:
+        """How the path of a problem begins."""
+        return place("link", self.name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Body:
+    """A link of the arm with all that is fixed to it."""
+
+    parts: tuple[Part, ...]
+    """The link itself first."""
+    branches: tuple[UrdfJoint, ...]
+    """Joints on it that move and are not the arm's."""
+
+    @property
+    def name(self) -> str:
+        """Name of the link of the arm."""
+        return self.parts[0].name
+
+
+def read_bodies(tree: UrdfTree, selection: Selection, report: XmlReport, notes: Notes) -> tuple[Body, ...]:
+    """Return the base and the link of every moving joint, in order, with what hangs on them.
+
+    A fixed joint off the arm whose pose cannot be read is noted, and what hangs on it is left out.
+    """
+    arm = frozenset(joint.name for joint in selection.joints)
+    starts = [selection.base, *(joint.child for joint in selection.joints if joint.moves)]
+    return tuple(_body(tree, start, arm, report, notes) for start in starts)
+
+
+def _body(tree: UrdfTree, start: str, arm: frozenset[str], report: XmlReport, notes: Notes) -> Body:
+    parts, branches = [], []
+    waiting = [Part(name=start, element=tree.links[start], T_link_part=identity(), on_chain=True)]
+    while waiting:
+        part = waiting.pop()
+        parts.append(part)
+        fixed = []
+        for joint in tree.below[part.name]:
+            if joint.moves:
+                branches += [] if joint.name in arm else [joint]
+                continue
+            off = XmlReport(report.file)  # the arm's own joints have been read, with the arm's report
+            T = compose(part.T_link_part, read_pose(joint.element, joint.path, off))
+            if off.problems and joint.name not in arm:
+                sentence = "Joints that cannot be read are left out with all that they carry: {}."
+                note_unreadable(off, sentence, joint.name, notes)
+                continue
+            element, on_chain = tree.links[joint.child], joint.name in arm
+            fixed.append(Part(name=joint.child, element=element, T_link_part=T, on_chain=on_chain))
+        waiting += reversed(fixed)
+    return Body(parts=tuple(parts), branches=tuple(branches))
+
+
+def note_unreadable(report: XmlReport, sentence: str, name: str, notes: Notes) -> None:
+    """Note what is wrong where it does not matter to the arm; the sentence has a ``{}`` for all such names."""
+    problem = min(report.problems)
+    notes.group(sentence, name, f"line {problem.line}: {problem.message}")
+
+
+def weight_of(tree: UrdfTree, links: Iterable[str]) -> str:
+    """Return words for some links and their mass, such as ``'finger' (0.1 kg)`` or ``3 links (0.4 kg)``."""
+    names = list(links)
+    mass = sum(_mass(tree.links[name]) for name in names)
+    what = f"link {shown(names[0])}" if len(names) == 1 else f"{len(names)} links from {shown(names[0])} on"
+    return f"{what} ({mass:.6g} kg)" if mass > 0.0 else what
+
+
+def _mass(link: Element) -> float:
+    """The mass that a link off the arm has, as far as it can be read."""
+    inertial = link.first("inertial")
+    mass = None if inertial is None else inertial.first("mass")
+    value = 0.0 if mass is None else read_number(mass, "value", "", XmlReport(""))
+    return value if value > 0.0 else 0.0
+
+
+_POINT_MASS_SHARE: Final = 0.1
+"""Of a body's mass: what lighter parts whose inertia is not known add by themselves is small."""
+
+
+def read_inertial(body: Body, report: XmlReport, notes: Notes) -> Inertial:
+    """Combine the masses of all parts of a body.
+
+    Broken numbers in a part on the way from base to tip are problems; elsewhere they are noted and the part has no
+    mass. An inertia that no body can have is noted and counts as unknown. Parts of unknown inertia count as point
+    masses where they are light; else the inertia of the whole is unknown.
+
+    Args:
+        body: A link of the arm.
+        report: Takes the problems.
+        notes: Takes what was left out.
+    """
+    known = [found for part in body.parts if (found := _read_part(part, report, notes)) is not None]
+    if not known:
+        notes.group("The file gives no mass for links {}.", body.name)
+        return Inertial()
+    whole = known[0][0] if len(known) == 1 else combine(mass for mass, _ in known)
+    unknown = [mass.mass for mass, has_inertia in known if not has_inertia]
+    if not unknown:
+        return _checked(whole, body.name, notes)
+    if math.fsum(unknown) > _POINT_MASS_SHARE * whole.mass:
+        if len(known) > 1:
+            notes.group(
+                "The inertia of a heavy part is not known, and so not that of the whole, for links {}.", body.name
+            )
+        return Inertial(mass=whole.mass, com=whole.com)
+    notes.group("Light parts of unknown inertia were counted as point masses, in links {}.", body.name)
+    return _checked(whole, body.name, notes)
+
+
+def _checked(whole: MassProperties, name: str, notes: Notes) -> Inertial:
+    if is_possible(whole.inertia):
+        return Inertial(mass=whole.mass, com=whole.com, inertia=whole.inertia)
+    notes.group("An inertia that no body has is left out, of links {}.", name)
+    return Inertial(mass=whole.mass, com=whole.com)
+
+
+def _read_part(part: Part, report: XmlReport, notes: Notes) -> tuple[MassProperties, bool] | None:
+    """Return a part's mass properties in the link of the arm and whether its inertia is known; None without mass."""
+    own = report if part.on_chain else XmlReport(report.file)
+    before = len(own.problems)
+    inertial = read_only_child(part.element, "inertial", part.path, own)
+    if inertial is None:
+        return None
+    path = f"{part.path}.inertial"
+    T = compose(part.T_link_part, read_pose(inertial, path, own))
+    mass_element = read_only_child(inertial, "mass", path, own)
+    mass = 0.0 if mass_element is None else read_number(mass_element, "value", f"{path}.mass", own)
+    tensor = _tensor(inertial, path, own)
+    if len(own.problems) > before:
+        if own is not report:
+            note_unreadable(own, "Masses that cannot be read are left out, of links {}.", part.name, notes)
+        return None
+    if mass < 0.0:
+        notes.group("Negative masses are left out, of links {}.", part.name)
+    elif mass == 0.0 and tensor is not None and tensor.any():
+        notes.group("Inertias without a mass are left out, of links {}.", part.name)
+    if mass <= 0.0:
+        return None
+    com = read_only(move_point(T, read_only([0, 0, 0])))
+    if tensor is not None and not is_possible(tensor):
+        notes.group("An inertia that no body has is left out, of links {}.", part.name)
+        tensor = None
+    elif tensor is None:
+        notes.group("The file gives a mass without an inertia for links {}.", part.name)
+    inertia = rotate_tensor(T, read_only(np.zeros((3, 3))) if tensor is None else tensor)
+    return MassProperties(mass=mass, com=com, inertia=inertia), tensor is not None
+
+
+def _tensor(inertial: Element, path: str, report: XmlReport) -> Array | None:
+    """Return the inertia along the axes of the inertial's own frame, or None where there is none."""
+    element = read_only_child(inertial, "inertia", path, report)
+    if element is None:
+        return None
+    path = f"{path}.inertia"
+    xx, yy, zz = (read_number(element, name, path, report) for name in ("ixx", "iyy", "izz"))
+    xy, xz, yz = (
+        read_number(element, name, path, report) if name in element.attributes else 0.0
+        for name in ("ixy", "ixz", "iyz")
+    )
+    return read_only([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+_SAME: Final = 1e-6
+"""By which the three scales of a mesh may differ, relative to the greatest."""
+
+
+def read_materials(robot: Element) -> Mapping[str, Color]:
+    """Return the colours that have a name and can be read; the robot's own win over those that links define."""
+    materials: dict[str, Color] = {}
+    visuals = [visual for link in robot.all("link") for visual in link.all("visual")]
+    for owner in (robot, *visuals):
+        for material in owner.all("material"):
+            color = _color(material, "", XmlReport(""))
+            if color is not None:
+                materials.setdefault(material.attributes.get("name", ""), color)
+    materials.pop("", None)
+    return materials
+
+
+def read_look(
+    body: Body, materials: Mapping[str, Color], find_mesh: FindMesh, report: XmlReport, notes: Notes
+) -> Look:
+    """Choose the mesh and the colour of a body.
+
+    Args:
+        body: A link of the arm.
+        materials: Colours by name.
+        find_mesh: Returns the file of a mesh uri, or None.
+        report: Only for the file's name: nothing about looks is an error.
+        notes: Takes what was left out, links of one reason together.
+
+    Returns:
+        The first mesh that can be used, with its colour; or else the first colour.
+    """
+    mesh = None
+    colors: list[Color | None] = []
+    for part in body.parts:
+        for visual in part.element.all("visual"):
+            own = XmlReport(report.file)
+            found = _mesh(visual, part, find_mesh, mesh is not None, own, notes)
+            color = _material(visual, f"{part.path}.visual", materials, own)
+            if own.problems:
+                note_unreadable(own, "Visuals that cannot be read are left out, of links {}.", part.name, notes)
+            if found is not None:
+                mesh, colors = found, [color]
+            elif mesh is None:
+                colors.append(color)
+    return Look(mesh=mesh, color=next((color for color in colors if color is not None), None))
+
+
+def _mesh(
+    visual: Element, part: Part, find_mesh: FindMesh, has_one: bool, report: XmlReport, notes: Notes
+) -> SerialMesh | None:
+    """Return the mesh of a visual, if it is one that can be used and the first."""
+    path = f"{part.path}.visual"
+    geometry = read_only_child(visual, "geometry", path, report)
+    mesh = None if geometry is None else geometry.first("mesh")
+    if mesh is None:
+        for shape in () if geometry is None else geometry.children:
+            notes.group("Shapes that are no meshes are not carried over: {}.", part.name, shape.tag[:60])
+        return None
+    uri = mesh.attributes.get("filename", "")
+    scale = read_numbers(mesh, "scale", f"{path}.geometry.mesh", report, count=3, default=(1.0, 1.0, 1.0))
+    T = compose(part.T_link_part, read_pose(visual, path, report))
+    if report.problems:
+        return None
+    suffix = PurePosixPath(uri).suffix
+    if has_one:
+        notes.group("A link shows one mesh; further ones are not carried over, of links {}.", part.name)
+    elif suffix.lower() not in MESH_SUFFIXES:
+        sentence = f"Meshes are not carried over that are none of {listed(MESH_SUFFIXES)}: those of links {{}}."
+        notes.group(sentence, part.name, suffix[:20] or "no suffix")
+    elif min(scale) <= 0.0 or max(scale) - min(scale) > _SAME * max(scale):
+        detail = " ".join(f"{value:g}" for value in scale)
+        notes.group("Meshes that are mirrored or scaled unevenly are not carried over: {}.", part.name, detail)
+    elif (file := find_mesh(uri)) is None:
+        notes.group(f"Meshes were not found in {_folder(uri)}, of links {{}}.", part.name)
+    else:
+        return SerialMesh(uri=uri, path=file, scale=scale[0], T_link_mesh=T)
+    return None
+
+
+def _folder(uri: str) -> str:
+    """Words for where a mesh should be: its package, or the folder that the file names."""
+    scheme, between, rest = uri.partition("://")
+    if between:
+        return shown(f"{scheme}://{rest.partition('/')[0]}")
+    folder = str(PurePosixPath(uri).parent)
+    return "the file's folder" if folder == "." else shown(folder)
+
+
+def _material(visual: Element, path: str, materials: Mapping[str, Color], report: XmlReport) -> Color | None:
+    """Return the colour of a visual: its own, or the one that its name stands for."""
+    material = visual.first("material")
+    if material is None:
+        return None
+    color = _color(material, path, report)
+    return materials.get(material.attributes.get("name", "")) if color is None else color
+
+
+def _color(material: Element, path: str, report: XmlReport) -> Color | None:
+    element = material.first("color")
+    if element is None:
+        return None
+    path = f"{path}.material.color"
+    nothing = (-1.0, -1.0, -1.0, -1.0)
+    red, green, blue, alpha = read_numbers(element, "rgba", path, report, count=4, default=nothing)
+    color = (red, green, blue, alpha)
+    if all(0.0 <= value <= 1.0 for value in color):
+        return color
+    if not report.problems:
+        found = shown(element.attributes.get("rgba", ""))
+        report.add(element, f"{path}.rgba", f"expected 4 numbers from 0 to 1, found {found}")
+    return None

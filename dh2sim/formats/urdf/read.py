@@ -1,0 +1,162 @@
+"""URDF text -> SerialRobot: the arm of a robot that somebody else described.
+
+What of a URDF has no place in a serial arm, told in a few sentences.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from dh2sim.formats.mesh_paths import FindMesh
+from dh2sim.formats.serial_robot import SerialLink, SerialRobot
+from dh2sim.formats.urdf.chain import Selection, select_chain
+from dh2sim.formats.urdf.joints import read_joints
+from dh2sim.formats.urdf.links import Body, read_bodies, read_inertial, read_look, read_materials, weight_of
+from dh2sim.formats.urdf.tree import UrdfJoint, UrdfTree, read_pose, read_tree
+from dh2sim.formats.xml_read import XmlReport, parse_xml
+from dh2sim.kinematics.transforms import compose, identity
+from dh2sim.messages import Notes, listed, shown
+from dh2sim.typing import Array, read_only
+
+_MOST_BRANCHES: Final = 20
+"""Branches that are told one by one."""
+
+_CARRIED: Final = {
+    "robot": ("link", "joint", "material", "mujoco"),
+    "link": ("inertial", "visual", "collision"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
+}
+"""Elements that are read or told of elsewhere. ``mujoco`` only tells MuJoCo how to read the file."""
+
+
+def note_leftovers(tree: UrdfTree, selection: Selection, bodies: Sequence[Body], notes: Notes) -> None:
+    """Note what is merged, what is not on the arm, and what no robot file says."""
+    for body in bodies:
+        merged = listed(shown(part.name) for part in body.parts[1:])
+        if len(body.parts) > 1:
+            notes.group(
+                "Links that are fixed to a link of the arm were merged into it: {}.", body.name, f"with {merged}"
+            )
+    _note_branches(tree, selection, bodies, notes)
+    if any(part.element.first("collision") for body in bodies for part in body.parts):
+        notes.add("Collision shapes are not carried over.")
+    _note_elements(tree, notes)
+
+
+def _note_branches(tree: UrdfTree, selection: Selection, bodies: Sequence[Body], notes: Notes) -> None:
+    if selection.base != tree.root:
+        below = set(tree.descendants(selection.base))
+        others = weight_of(tree, [name for name in tree.descendants(tree.root) if name not in below])
+        notes.add(f"What is not below the base {shown(selection.base)} is left out: {others}.")
+    branches = [(body, joint) for body in bodies for joint in body.branches]
+    for _, joint in branches[:_MOST_BRANCHES]:
+        what = weight_of(tree, tree.descendants(joint.child))
+        notes.add(f"Left out with joint {shown(joint.name)} ({_kind(joint)}) on {shown(joint.parent)}: {what}.")
+    if len(branches) > _MOST_BRANCHES:
+        notes.add(f"Left out with {len(branches) - _MOST_BRANCHES} more joints: all that they carry.")
+
+
+def _kind(joint: UrdfJoint) -> str:
+    mimic = joint.element.first("mimic")
+    return joint.type if mimic is None else f"{joint.type}, mimics {shown(mimic.attributes.get('joint', ''))}"
+
+
+def _note_elements(tree: UrdfTree, notes: Notes) -> None:
+    counts: Counter[str] = Counter()
+    for owner in (tree.robot, *tree.robot.all("link"), *tree.robot.all("joint")):
+        counts.update(element.tag for element in owner.children if element.tag not in _CARRIED[owner.tag])
+    if loops := counts.pop("loop_joint", 0):
+        notes.add(f"The file closes loops with {loops} <loop_joint>; the arm is read as if it were open.")
+    if counts:
+        names = (f"{count} <{tag[:60]}>" if count > 1 else f"<{tag[:60]}>" for tag, count in sorted(counts.items()))
+        notes.add(f"Elements that a robot file has no place for are not carried over: {listed(names)}.")
+
+
+def read_urdf(
+    data: bytes, *, file: str, base: str | None = None, tip: str | None = None, find_mesh: FindMesh
+) -> SerialRobot:
+    """Return the serial arm that a URDF describes.
+
+    Fixed joints are merged: poses are multiplied, and masses are combined into the link that carries them. Link
+    frames are those of the URDF. What is not on the arm must have its place in the tree, but its numbers do not
+    matter. Nothing is opened; ``find_mesh`` may look for files.
+
+    Args:
+        data: The file's content.
+        file: Its name, for messages.
+        base: Name of the link that the arm begins at; by default the root.
+        tip: Name of the link that it ends at. By default ``tool0`` where there is one; else where the only way that
+            moves ends, or at a hand: a fork behind three joints or more, into branches of fewer joints.
+        find_mesh: Returns the file of a mesh uri such as ``package://pkg/link.stl``, or None; never raises.
+
+    Raises:
+        ImportedFileError: The file is wrong, or holds no such arm; the error holds everything that is wrong.
+    """
+    report, notes = XmlReport(file), Notes()
+    tree = read_tree(parse_xml(data, file=file), report)
+    selection = select_chain(tree, base, tip, report, notes)
+    joints = read_joints(selection, report, notes)
+    bodies = read_bodies(tree, selection, report, notes)
+    links = _links(tree, bodies, find_mesh, report, notes)
+    report.check()
+    gravity = _gravity(tree, selection, notes)
+    note_leftovers(tree, selection, bodies, notes)
+    name = tree.robot.attributes.get("name", "") or Path(file).name.partition(".")[0]
+    return SerialRobot(
+        name=name,
+        description=f"URDF {Path(file).name}, from {_plain(selection.base)} to {_plain(selection.tip)}",
+        chain=joints.chain,
+        base=links[0],
+        links=links[1:],
+        limits=joints.limits,
+        dynamics=joints.dynamics,
+        gravity=gravity,
+        notes=notes.sentences(),
+    )
+
+
+def _links(
+    tree: UrdfTree, bodies: tuple[Body, ...], find_mesh: FindMesh, report: XmlReport, notes: Notes
+) -> tuple[SerialLink, ...]:
+    """Return the base and the moving links. Nobody uses the base's mass, so that nothing is said of it."""
+    materials = read_materials(tree.robot)
+    links = []
+    for body in bodies:
+        is_base = body is bodies[0]
+        weight = read_inertial(body, XmlReport(report.file) if is_base else report, Notes() if is_base else notes)
+        look = read_look(body, materials, find_mesh, report, notes)
+        links.append(
+            SerialLink(
+                name=body.name,
+                mass=weight.mass,
+                com=weight.com,
+                inertia=weight.inertia,
+                mesh=look.mesh,
+                color=look.color,
+            )
+        )
+    return tuple(links)
+
+
+def _gravity(tree: UrdfTree, selection: Selection, notes: Notes) -> Array:
+    """Return gravity in the base, which may hang on the root at an angle: in a URDF z of the root points up."""
+    T_root_base = identity()
+    unread = XmlReport("")
+    joint = tree.above.get(selection.base)
+    while joint is not None:
+        T_root_base = compose(read_pose(joint.element, joint.path, unread), T_root_base)
+        joint = tree.above.get(joint.parent)
+    gravity = [-9.81 * value + 0.0 for value in T_root_base[2, :3].tolist()]
+    if unread.problems or gravity == [0.0, 0.0, -9.81]:
+        return read_only([0, 0, -9.81])
+    words = ", ".join(f"{value:.6g}" for value in gravity)
+    notes.add(f"Gravity is ({words}) m/s² in the base {shown(selection.base)}, as that hangs on {shown(tree.root)}.")
+    return read_only(gravity)
+
+
+def _plain(name: str) -> str:
+    """A link's name as it is, if that is fit for a line of text."""
+    return name if name.isprintable() and len(name) <= 60 else shown(name)

@@ -1,0 +1,152 @@
+"""RobotModel -> URDF 1.0, with the base_link, base, flange and tool0 of REP-199."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+
+from dh2sim.formats.xml_write import assumptions, child, document, number, numbers, provenance
+from dh2sim.kinematics.transforms import compose, identity, invert, pose_from_rpy, rpy_from_rotation
+from dh2sim.model.mass import MassProperties
+from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
+from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
+from dh2sim.robot.spec import JointType
+from dh2sim.typing import Array, read_only
+
+T_FLANGE_DHN = pose_from_rpy([0, 0, 0], [0, math.pi / 2, 0])
+"""REP-199: x of the flange points out of it, as z of tool0 does; pose of the last DH frame in the flange."""
+T_DHN_FLANGE = invert(T_FLANGE_DHN)
+
+
+def to_urdf(model: RobotModel, *, dh_frames: bool = True) -> str:
+    """Write a robot as URDF.
+
+    Args:
+        model: the robot.
+        dh_frames: whether to add the massless links dh_0 … dh_n, one at every DH frame.
+
+    Returns:
+        The text of the file. Mesh file names are relative to it: ``meshes/link_1.stl``. The ``mujoco`` element, which
+        other readers ignore, makes MuJoCo keep the fixed links as bodies and give no mass to the base.
+    """
+    robot = ET.Element("robot", name=model.name)
+    child(child(robot, "mujoco"), "compiler", fusestatic="false", inertiafromgeom="false")
+    materials = _materials(model)
+    for color, name in materials.items():
+        child(child(robot, "material", name=name), "color", rgba=numbers(color))
+    _link(robot, model.base, model.chain.T_base_link_dh0, materials)
+    _frame(robot, "base", "base_link", identity())
+    if dh_frames:
+        _frame(robot, "dh_0", "base_link", model.chain.T_base_link_dh0)
+    parent = model.base.name
+    for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
+        _joint(robot, joint, parent, link.name)
+        _link(robot, link, joint.joint.T_joint_dh, materials)
+        if dh_frames:
+            _frame(robot, f"dh_{i}", link.name, joint.joint.T_joint_dh)
+        parent = link.name
+    _frame(robot, "flange", parent, compose(model.joints[-1].joint.T_joint_dh, T_DHN_FLANGE))
+    _frame(robot, "tool0", "flange", compose(T_FLANGE_DHN, model.chain.T_dhn_tool0))
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + document(
+        robot, [*provenance(model), *assumptions(model.joints)]
+    )
+
+
+def _materials(model: RobotModel) -> dict[Color, str]:
+    materials: dict[Color, str] = {}
+    for link in model.all_links:
+        for color in (link.color, link.joint_color):
+            materials.setdefault(color, f"color_{len(materials) + 1}")
+    return materials
+
+
+def _frame(robot: ET.Element, name: str, parent: str, T_parent_frame: Array) -> None:
+    child(robot, "link", name=name)
+    joint = child(robot, "joint", name=f"{parent}-{name}", type="fixed")
+    _ends(joint, parent, name, T_parent_frame)
+
+
+def _ends(joint: ET.Element, parent: str, name: str, T_parent_joint: Array) -> None:
+    child(joint, "parent", link=parent)
+    child(joint, "child", link=name)
+    _origin(joint, T_parent_joint)
+
+
+def _origin(element: ET.Element, T: Array) -> None:
+    child(element, "origin", xyz=numbers(T[:3, 3]), rpy=numbers(rpy_from_rotation(T[:3, :3])))
+
+
+def _link(robot: ET.Element, link: LinkModel, T_link_dh: Array, materials: dict[Color, str]) -> None:
+    element = child(robot, "link", name=link.name)
+    if link.inertial is not None:
+        _inertial(element, link.inertial)
+    if link.mesh is not None:
+        visual = child(element, "visual")
+        _origin(visual, compose(T_link_dh, link.mesh.T_dh_mesh))
+        scale = numbers([link.mesh.scale] * 3)
+        child(child(visual, "geometry"), "mesh", filename=f"meshes/{link.mesh.file_name}", scale=scale)
+        child(visual, "material", name=materials[link.color])
+    for shape in link.shapes:
+        for simple in _without_capsules(shape):
+            if link.mesh is None:
+                visual = child(element, "visual")
+                _geometry(visual, simple)
+                color = link.joint_color if shape.part is ShapePart.JOINT else link.color
+                child(visual, "material", name=materials[color])
+    for shape in link.shapes:
+        for simple in _without_capsules(shape):
+            _geometry(child(element, "collision"), simple)
+
+
+def _without_capsules(shape: Shape) -> list[tuple[Array, float, float | None]]:
+    """Pose, radius and length of the cylinder and balls (no length) that make up a shape: URDF 1.0 has no capsule."""
+    simple: list[tuple[Array, float, float | None]] = [(shape.T_link_shape, shape.radius, shape.length)]
+    if shape.kind is ShapeKind.CAPSULE:
+        for end in shape.ends:
+            T = [[1.0 if i == j else 0.0 for j in range(3)] + [float(end[i])] for i in range(3)]
+            simple.append((read_only([*T, [0.0, 0.0, 0.0, 1.0]]), shape.radius, None))
+    return simple
+
+
+def _geometry(element: ET.Element, simple: tuple[Array, float, float | None]) -> None:
+    T, radius, length = simple
+    _origin(element, T)
+    geometry = child(element, "geometry")
+    if length is None:
+        child(geometry, "sphere", radius=number(radius))
+    else:
+        child(geometry, "cylinder", radius=number(radius), length=number(length))
+
+
+def _inertial(element: ET.Element, body: MassProperties) -> None:
+    """Along the link's own axes, without rpy, which some readers apply wrongly."""
+    inertial = child(element, "inertial")
+    child(inertial, "origin", xyz=numbers(body.com), rpy=numbers([0, 0, 0]))
+    child(inertial, "mass", value=number(body.mass))
+    I = body.inertia  # noqa: E741
+    child(
+        inertial,
+        "inertia",
+        ixx=number(I[0, 0]),
+        ixy=number(I[0, 1]),
+        ixz=number(I[0, 2]),
+        iyy=number(I[1, 1]),
+        iyz=number(I[1, 2]),
+        izz=number(I[2, 2]),
+    )
+
+
+def _joint(robot: ET.Element, joint: JointModel, parent: str, name: str) -> None:
+    kind = joint.joint.type
+    element = child(robot, "joint", name=joint.name, type=kind.value)
+    _ends(element, parent, name, joint.joint.T_parent_joint)
+    if kind is JointType.FIXED:
+        return
+    child(element, "axis", xyz=numbers([0, 0, joint.joint.sign]))
+    limit = child(element, "limit")
+    if joint.range is not None:
+        limit.set("lower", number(joint.range.lower))
+        limit.set("upper", number(joint.range.upper))
+    limit.set("effort", number(joint.effort))
+    limit.set("velocity", number(joint.velocity))
+    child(element, "dynamics", damping=number(joint.dynamics.damping), friction=number(joint.dynamics.friction))

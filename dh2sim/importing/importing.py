@@ -1,0 +1,307 @@
+"""Files of other formats to robot files: which reader a file needs, and what it is given.
+
+Tables as people write them to robot files.
+
+Joint axes, as a file of axes gives them, to robot files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from dh2sim.errors import Dh2simError
+from dh2sim.formats.serial_robot import SerialLink, SerialRobot
+from dh2sim.formats.table.read import read_table
+from dh2sim.importing.explain import explanation
+from dh2sim.importing.result import Imported
+from dh2sim.importing.serial import import_serial, robot_name
+from dh2sim.kinematics.frame_assignment.recover import TOLERANCE
+from dh2sim.kinematics.frame_assignment.result import Tolerances
+from dh2sim.kinematics.frame_assignment.rounding import simple_angle, simple_length
+from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
+from dh2sim.kinematics.transforms import pose_from_rpy
+from dh2sim.robot.axes_file import AxesSpec
+from dh2sim.robot.read import parse_robot
+from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
+from dh2sim.robot.write import robot_file_text
+from dh2sim.typing import Array, read_only
+
+
+def import_table(
+    data: bytes,
+    *,
+    file: str,
+    convention: Convention | None = None,
+    angle: AngleUnit | None = None,
+    length: LengthUnit | None = None,
+    name: str | None = None,
+    tolerance: float = TOLERANCE,
+    folder: Path | None = None,
+) -> Imported:
+    """Make a robot file of a Denavit-Hartenberg table in Markdown, CSV, TSV or a toolbox's printout.
+
+    Args:
+        data: The file's content.
+        file: Its name, for messages and for the robot's name; '-' for standard input.
+        convention: That the table is in, where it does not say.
+        angle: Unit of its angles, where it does not say.
+        length: Unit of its lengths, where it does not say.
+        name: Of the robot.
+        tolerance: Where it is greater than the default, numbers within it of a simple one are made simple, rad and m.
+        folder: Where the robot file will stand.
+
+    Raises:
+        ImportedFileError: The table is wrong, or says too little.
+    """
+    own_name = robot_name(Path(file).stem if name is None else name)
+    read = read_table(data, file=file, name=own_name, convention=convention, angle=angle, length=length)
+    spec = read.spec
+    if not spec.source:
+        origin = "standard input" if file == "-" else Path(file).name
+        spec = replace(spec, source=f"The table in {origin}, as dh2sim read it.")
+    notes = [_sentence(note) for note in read.notes]
+    if tolerance > TOLERANCE:
+        spec = _simpler(spec, Tolerances(angle=tolerance, length=tolerance, reach=1.0))
+        notes.append(f"Numbers within {tolerance:g} rad or m of a simple one were made simple.")
+    header = [f"Note: {note}" for note in notes]
+    text = robot_file_text(spec, header=header, folder=folder, angle=read.units.angle, length=read.units.length)
+    return Imported(text=text, spec=parse_robot(text, file="the robot file", directory=folder), notes=tuple(notes))
+
+
+def _sentence(note: str) -> str:
+    return f"{note[0].upper()}{note[1:]}{'' if note.endswith('.') else '.'}"
+
+
+def _simpler(spec: RobotSpec, tolerances: Tolerances) -> RobotSpec:
+    rows = [
+        replace(
+            row,
+            a=simple_length(row.a, tolerances),
+            alpha=simple_angle(row.alpha, tolerances),
+            d=simple_length(row.d, tolerances),
+            theta=simple_angle(row.theta, tolerances),
+        )
+        for row in spec.rows
+    ]
+    return replace(spec, rows=tuple(rows))
+
+
+def import_axes(
+    axes: AxesSpec,
+    *,
+    convention: Convention | None = None,
+    tolerance: float = TOLERANCE,
+    explain: bool = False,
+    folder: Path | None = None,
+) -> Imported:
+    """Assign frames to joint axes and make a robot file of them.
+
+    Args:
+        axes: As read from their file.
+        convention: Of the table; by default the file's, or else standard.
+        tolerance: Greatest residual, rad, and m for a reach of up to 1 m, then of the reach.
+        explain: Whether every step is told at the head of the robot file.
+        folder: Where the robot file will stand.
+
+    Raises:
+        MismatchError: The residual is above the tolerance.
+    """
+
+    def made(*header: str) -> Imported:
+        return import_serial(
+            serial_robot(axes),
+            convention=convention or axes.convention or Convention.STANDARD,
+            tolerance=tolerance,
+            folder=folder,
+            header=header,
+            description=axes.description,
+        )
+
+    imported = made()
+    return made(*explanation(imported)) if explain else imported
+
+
+def serial_robot(axes: AxesSpec) -> SerialRobot:
+    """Return the robot that joint axes describe; every link's frame stands on its axis, turned like base_link.
+
+    A sliding joint without a point stands where the joint before it does.
+    """
+    joints = []
+    place = np.zeros(3)
+    for axis in axes.joints:
+        before, place = place, place if axis.point is None else axis.point
+        joints.append(
+            SerialJoint(
+                name=axis.name,
+                type=axis.type,
+                T_parent_link=_shift(place - before),
+                axis=axis.direction,
+                point=read_only([0, 0, 0]),
+            )
+        )
+    T_link_tip = np.array(pose_from_rpy(axes.tool.xyz, axes.tool.rpy))
+    T_link_tip[:3, 3] -= place
+    return SerialRobot(
+        name=axes.name,
+        description=axes.source or "Joint axes",
+        chain=SerialChain(joints=tuple(joints), T_link_tip=read_only(T_link_tip)),
+        base=SerialLink(name="base_link"),
+        links=tuple(SerialLink(name=f"link_{i}") for i in range(1, len(joints) + 1)),
+        limits=tuple(axis.limits for axis in axes.joints),
+        dynamics=tuple(axis.dynamics for axis in axes.joints),
+        actuators=tuple(axis.actuator for axis in axes.joints),
+        gravity=axes.gravity,
+        configurations=axes.configurations,
+    )
+
+
+def _shift(offset: Array) -> Array:
+    T = np.eye(4)
+    T[:3, 3] = offset
+    return read_only(T)
+
+
+STDIN = "-"
+MOST_BYTES = 50_000_000
+_ROOT = re.compile(rb"<\s*([A-Za-z_][\w:.-]*)")
+_HIDDEN = re.compile(rb"<\?.*?\?>|<!--.*?-->|<![^>]*>", re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImportOptions:
+    """What an import is asked for."""
+
+    base: str | None = None
+    """Link or body that becomes base_link; by default the root."""
+    tip: str | None = None
+    """Link, body or site that becomes tool0; by default where the arm ends."""
+    convention: Convention | None = None
+    """Of the table to make (default standard), or that a table to read is in."""
+    angle: AngleUnit | None = None
+    """Of a table's angles, where the table does not say."""
+    length: LengthUnit | None = None
+    """Of a table's lengths, where the table does not say."""
+    tolerance: float = TOLERANCE
+    """Greatest residual, rad, and m for a reach of up to 1 m, then of the reach."""
+    package_paths: Sequence[Path] = ()
+    """Folders in which ``package://`` is looked for first."""
+    name: str | None = None
+    """Of the robot, instead of the file's."""
+
+
+def import_robot(path: Path, options: ImportOptions = ImportOptions(), *, folder: Path | None = None) -> Imported:
+    """Make a robot file of a URDF, an MJCF or a Denavit-Hartenberg table.
+
+    Args:
+        path: The file; its content says what it is.
+        options: What is asked for.
+        folder: Where the robot file will stand, which paths of meshes are relative to; by default they are absolute.
+
+    Raises:
+        ImportedFileError: The file is wrong, or says too little.
+        MismatchError: The table that was made is not the file's kinematics to within the tolerance.
+        Dh2simError: The file cannot be read, or is of another format.
+    """
+    return import_data(read_file(path), str(path), options, folder=folder)
+
+
+def read_file(path: Path) -> bytes:
+    """Return a file's content.
+
+    Raises:
+        Dh2simError: It cannot be read, or is too large.
+    """
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise Dh2simError(f"{path}: cannot be read: {error.strerror or error}") from error
+    if len(data) > MOST_BYTES:
+        raise Dh2simError(f"{path}: has more than {MOST_BYTES} bytes, the most that is read")
+    return data
+
+
+def import_data(data: bytes, file: str, options: ImportOptions, *, folder: Path | None = None) -> Imported:
+    """As ``import_robot``, for content that was read already; ``file`` is its path, or '-' for standard input."""
+    root = _root_element(data)
+    match root:
+        case "robot":
+            return _serial(_read_urdf(data, file, options), data, options, folder)
+        case "mujoco" | "mujocoinclude":
+            return _serial(_read_mjcf(file, options), data, options, folder)
+        case None:
+            return _table(data, file, options, folder)
+        case _:
+            hint = " Convert it to URDF first." if root == "sdf" else ""
+            raise Dh2simError(
+                f"{file}: a file of <{root}> is not read. Read are URDF (<robot>), MJCF (<mujoco>), and tables in "
+                f"Markdown, CSV or TSV.{hint}"
+            )
+
+
+def _root_element(data: bytes) -> str | None:
+    """Return the name of an XML file's outermost element; None for what is no XML."""
+    text = data.removeprefix(b"\xef\xbb\xbf").lstrip()
+    if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        text = data.decode("utf-16", "replace").encode().lstrip(b"\xef\xbb\xbf \t\r\n")
+    if not text.startswith(b"<"):
+        return None
+    found = _ROOT.search(_HIDDEN.sub(b"", text[:1_000_000]))
+    return found.group(1).decode("ascii", "replace") if found else "robot"
+
+
+def _read_urdf(data: bytes, file: str, options: ImportOptions) -> SerialRobot:
+    from dh2sim.formats.mesh_paths import mesh_finder
+    from dh2sim.formats.urdf.read import read_urdf
+
+    _refuse_units(file, "URDF", options)
+    directory = Path.cwd() if file == STDIN else Path(file).parent
+    find_mesh = mesh_finder(directory, options.package_paths)
+    return read_urdf(data, file=file, base=options.base, tip=options.tip, find_mesh=find_mesh)
+
+
+def _read_mjcf(file: str, options: ImportOptions) -> SerialRobot:
+    if file == STDIN:
+        raise Dh2simError("an MJCF is read from a file, not from standard input: it may include others")
+    from dh2sim.formats.mjcf.read import read_mjcf
+
+    _refuse_units(file, "MJCF", options)
+    return read_mjcf(Path(file), file=file, base=options.base, tip=options.tip)
+
+
+def _refuse_units(file: str, kind: str, options: ImportOptions) -> None:
+    if options.angle is not None or options.length is not None:
+        raise Dh2simError(f"{file}: --angle and --length are for tables; this is {kind}, which has its own units")
+
+
+def _serial(robot: SerialRobot, data: bytes, options: ImportOptions, folder: Path | None) -> Imported:
+    return import_serial(
+        robot,
+        convention=options.convention or Convention.STANDARD,
+        tolerance=options.tolerance,
+        folder=folder,
+        name=options.name,
+        source=f"{robot.description} (SHA-256 {hashlib.sha256(data).hexdigest()[:16]}…).",
+    )
+
+
+def _table(data: bytes, file: str, options: ImportOptions, folder: Path | None) -> Imported:
+
+    if options.base is not None or options.tip is not None:
+        raise Dh2simError(f"{file}: --base and --tip are for URDF and MJCF; this is read as a table, without links")
+    return import_table(
+        data,
+        file=file,
+        convention=options.convention,
+        angle=options.angle,
+        length=options.length,
+        name=options.name,
+        tolerance=options.tolerance,
+        folder=folder,
+    )

@@ -1,1 +1,0 @@
-"""A frame assignment in the words of a textbook."""

@@ -1,0 +1,87 @@
+"""What was chosen, changed or left out, in sentences; things of one kind share a sentence.
+
+Words that error messages share: what was found, and what may have been meant.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import itertools
+from collections.abc import Iterable
+from typing import Final
+
+_LONGEST_SHOWN: Final = 60
+_LONGEST_GUESSED: Final = 60
+_MOST_GUESSED: Final = 100
+"""Names that a guess is made among: the first of a long list."""
+_MOST_LISTED: Final = 40
+
+
+def shown(value: object) -> str:
+    """Return how a message names a value read from a robot file; long text is cut short."""
+    match value:
+        case None:
+            return "nothing"
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return repr(value if len(value) <= _LONGEST_SHOWN else value[: _LONGEST_SHOWN - 3] + "...")
+        case int() if abs(value) >= 10**_LONGEST_SHOWN:
+            return "a number of too many digits"
+        case int() | float():
+            return repr(value)
+        case dict():
+            return "a mapping"
+        case list():
+            return "a list"
+        case _:
+            return str(value)
+
+
+def listed(names: Iterable[str], between: str = ", ") -> str:
+    """Return names with commas between them, or ``none``; a long list is cut short."""
+    first = list(itertools.islice(names, _MOST_LISTED + 1))
+    if len(first) > _MOST_LISTED:
+        first[-1] = "..."
+    return between.join(first) or "none"
+
+
+def closest(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that ``name`` may be a slip of the pen for, or None."""
+    if len(name) > _LONGEST_GUESSED:
+        return None
+    return _closest(name.casefold(), tuple(itertools.islice(known, _MOST_GUESSED)))
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return ``" Did you mean 'x'?"``, to follow a full stop, or the empty string."""
+    match = closest(name, known)
+    return "" if match is None else f" Did you mean '{match}'?"
+
+
+@functools.lru_cache(maxsize=100_000)
+def _closest(name: str, known: tuple[str, ...]) -> str | None:
+    folded = {candidate.casefold(): candidate for candidate in known}
+    matches = difflib.get_close_matches(name, folded, n=1, cutoff=0.6)
+    return folded[matches[0]] if matches else None
+
+
+class Notes:
+    """Collects the notes of one file, in the order in which their kinds first come up."""
+
+    def __init__(self) -> None:
+        """Start with none."""
+        self._names: dict[str, dict[str, None]] = {}
+
+    def add(self, sentence: str) -> None:
+        """Note a sentence of its own."""
+        self._names.setdefault(sentence, {})
+
+    def group(self, sentence: str, name: str, detail: str = "") -> None:
+        """Note one more name for a sentence, which has a ``{}`` where all its names go."""
+        self._names.setdefault(sentence, {})[f"{shown(name)}{detail and f' ({detail})'}"] = None
+
+    def sentences(self) -> tuple[str, ...]:
+        """Return them all."""
+        return tuple(sentence.replace("{}", listed(names), 1) for sentence, names in self._names.items())

@@ -1,0 +1,117 @@
+"""Which pairs of links touch by construction, and so must not collide with each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from dh2sim.kinematics.chain import KinematicChain
+from dh2sim.kinematics.forward import reference_joint_poses
+from dh2sim.kinematics.transforms import move_point
+from dh2sim.model.shapes import Shape
+from dh2sim.typing import Array
+
+
+class Reason(StrEnum):
+    """Why a pair of links does not collide; the words that SRDF files use where they have one."""
+
+    ADJACENT = "Adjacent"
+    """Neighbours on the chain, fixed links counted with the link that carries them."""
+    DEFAULT = "Default"
+    """Their shapes overlap at zero or at home."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExcludedPair:
+    """Two links that do not collide with each other."""
+
+    link1: str
+    link2: str
+    reason: Reason
+
+
+def excluded_pairs(
+    chain: KinematicChain,
+    names: Sequence[str],
+    shapes: Sequence[Sequence[Shape]],
+    configurations: Iterable[Array],
+) -> tuple[ExcludedPair, ...]:
+    """List the pairs of links that touch because they are neighbours, or in one of the configurations.
+
+    Args:
+        chain: the chain, n rows.
+        names: of the n + 1 links, the base link's first.
+        shapes: of the links, each in its link's frame.
+        configurations: joint vectors (rad, m) in which whatever touches does so by construction.
+
+    Returns:
+        The pairs in the order of the links. Shapes are taken as capsules here: a cylinder counts with a rounded end
+        of its own radius, so that what nearly touches is left out too.
+    """
+    group = [0]
+    for joint in chain.joints:
+        group.append(group[-1] + (1 if joint.type.moves else 0))
+    touching = np.zeros((len(names), len(names)), dtype=bool)
+    for q in configurations:
+        touching |= _overlaps(chain, shapes, q)
+    pairs = []
+    for i in range(len(names)):
+        for j in range(i + 1, len(names)):
+            if not shapes[i] or not shapes[j]:
+                continue
+            if group[j] - group[i] <= 1:
+                pairs.append(ExcludedPair(link1=names[i], link2=names[j], reason=Reason.ADJACENT))
+            elif touching[i, j]:
+                pairs.append(ExcludedPair(link1=names[i], link2=names[j], reason=Reason.DEFAULT))
+    return tuple(pairs)
+
+
+def _overlaps(chain: KinematicChain, shapes: Sequence[Sequence[Shape]], q: Array) -> np.ndarray:
+    """Whether each pair of links overlaps at ``q``: booleans, shape (links, links)."""
+    poses = [np.eye(4), *reference_joint_poses(chain, q)]
+    owner, starts, ends, radii = [], [], [], []
+    for index, (T, own) in enumerate(zip(poses, shapes, strict=True)):
+        for shape in own:
+            start, end = shape.ends
+            owner.append(index)
+            starts.append(move_point(T, start))
+            ends.append(move_point(T, end))
+            radii.append(shape.radius)
+    result = np.zeros((len(shapes), len(shapes)), dtype=bool)
+    if not owner:
+        return result
+    a, b, r, link = np.array(starts), np.array(ends), np.array(radii), np.array(owner)
+    for k in range(len(owner)):
+        near = segment_distance(a[k], b[k], a, b) <= 1.001 * (r[k] + r)
+        result[link[k], link[near]] = True
+    return result | result.T
+
+
+def segment_distance(a: Array, b: Array, starts: Array, ends: Array) -> Array:
+    """Distance, m, shape (k,), of the segment from a to b, shape (3,) each, to k segments, shape (k, 3) each.
+
+    Neither may be of zero length; those that are parallel to within 1e-6 rad count as parallel. (Ericson, Real-Time
+    Collision Detection, 5.1.9.)
+    """
+    d1, d2 = b - a, ends - starts
+    between = a - starts
+    length1 = _dots(d1, d1)
+    length2 = _dots(d2, d2)
+    mixed = _dots(d1, d2)
+    c, f = _dots(d1, between), _dots(d2, between)
+    denominator = length1 * length2 - mixed * mixed
+    parallel = denominator <= 1e-12 * length1 * length2
+    s = np.where(parallel, 0.0, np.clip((mixed * f - c * length2) / np.where(parallel, 1.0, denominator), 0.0, 1.0))
+    t = (mixed * s + f) / length2
+    clipped = np.clip(t, 0.0, 1.0)
+    s = np.where(t == clipped, s, np.clip((clipped * mixed - c) / length1, 0.0, 1.0))
+    gap = (a + s[:, None] * d1) - (starts + clipped[:, None] * d2)
+    return np.asarray(np.sqrt(_dots(gap, gap)))
+
+
+def _dots(a: Array, b: Array) -> Array:
+    product = a * b
+    return np.asarray(product[..., 0] + product[..., 1] + product[..., 2])

@@ -1,1 +1,0 @@
-"""Axes files: joint axes to which frames are yet to be assigned."""

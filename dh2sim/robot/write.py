@@ -1,0 +1,501 @@
+"""RobotSpecs to robot files: the text that reads back as the same robot.
+
+Numbers as a robot file writes them: the shortest text that reads back as the same double.
+
+Texts as a robot file writes them: plain where YAML allows it, and always such that they read back the same.
+
+Mappings and lists as lines of YAML: in braces where they fit on a line, a table's numbers below each other.
+
+The parts of a robot file, from what a RobotSpec holds; what is left out is what a reader fills in.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+import os
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final, TypeAlias
+
+from dh2sim.errors import ModelError
+from dh2sim.robot.checks import default_name
+from dh2sim.robot.spec import (
+    ActuatorSpec,
+    AngleUnit,
+    BaseSpec,
+    Convention,
+    Dynamics,
+    JointType,
+    LengthUnit,
+    Limits,
+    LinkSpec,
+    MeshSpec,
+    Pose,
+    RobotSpec,
+    Row,
+    Units,
+)
+from dh2sim.robot.yaml_tree import NOT_PRINTABLE, resolve_plain
+from dh2sim.typing import Array
+
+_NEIGHBOURS = 4
+"""Doubles tried on either side: the way to a unit and back rounds three times, less than an ulp each time."""
+
+
+def number(value: float) -> str:
+    """Return the shortest text of a double, such as ``-90``, ``0.4318`` or ``1e-9``; zero has no sign."""
+    digits, _, exponent = repr(float(value) + 0.0).partition("e")
+    digits = digits.removesuffix(".0")
+    return f"{digits}e{int(exponent)}" if exponent else digits
+
+
+def numbers(values: Iterable[float]) -> list[str]:
+    """Return the texts of several doubles."""
+    return [number(value) for value in values]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnitWriter:
+    """Writes SI values in the units of one file.
+
+    Read back through ``Units``, a text gives the same double in rad and in m. In another unit there may be no
+    double that does: the steps of the two units do not match. Then it gives the next one, an ulp away, which is
+    one that has such a text; what was read once is therefore written and read again without change.
+    """
+
+    units: Units = field(default_factory=Units)
+
+    def angle(self, value: float) -> str:
+        """Return the text of an angle in rad.
+
+        Raises:
+            ModelError: Too large for the file's unit.
+        """
+        if self.units.angle is AngleUnit.RAD:
+            return number(value)
+        return _shortest(value, self.units.radians, math.degrees, "rad", self.units.angle)
+
+    def length(self, value: float) -> str:
+        """Return the text of a length in m.
+
+        Raises:
+            ModelError: Too large for the file's unit.
+        """
+        if self.units.length is LengthUnit.M:
+            return number(value)
+        return _shortest(value, self.units.metres, self._from_metres, "m", self.units.length)
+
+    def coordinate(self, value: float, *, turns: bool) -> str:
+        """Return the text of a joint coordinate, or of its rate, in rad or m.
+
+        Raises:
+            ModelError: Too large for the file's unit.
+        """
+        return self.angle(value) if turns else self.length(value)
+
+    def angles(self, values: Iterable[float]) -> list[str]:
+        """Return the texts of several angles in rad."""
+        return [self.angle(value) for value in values]
+
+    def lengths(self, values: Iterable[float]) -> list[str]:
+        """Return the texts of several lengths in m."""
+        return [self.length(value) for value in values]
+
+    def _from_metres(self, value: float) -> float:
+        """Return a length in the file's unit, an ulp off at most."""
+        match self.units.length:
+            case LengthUnit.M:
+                return value
+            case LengthUnit.MM:
+                return value * 1000
+            case LengthUnit.CM:
+                return value * 100
+            case LengthUnit.IN:
+                return value / 0.0254
+
+
+def _shortest(
+    value: float, to_si: Callable[[float], float], from_si: Callable[[float], float], si: str, unit: str
+) -> str:
+    """Return the shortest text that reads back as ``value``, or as the double nearest to it that has one."""
+    if not math.isfinite(from_si(value)):
+        raise ModelError(f"{value!r} {si} is too large to be written in {unit}")
+    reached = min(map(to_si, _around(from_si(value))), key=lambda si_value: (abs(si_value - value), abs(si_value)))
+    # from the reached value, not from the given one: so both have the same text
+    doubles = [double for double in _around(from_si(reached)) if to_si(double) == reached]
+    return min(map(number, doubles), key=len)
+
+
+def _around(centre: float) -> list[float]:
+    """Return a double and its neighbours, the nearest first."""
+    doubles = [centre]
+    below = above = centre
+    for _ in range(_NEIGHBOURS):
+        below, above = math.nextafter(below, -math.inf), math.nextafter(above, math.inf)
+        doubles += [below, above]
+    return doubles
+
+
+WIDTH: Final = 100
+"""Columns that a line should have at most."""
+_INDENT: Final = "  "
+_WORD: Final = re.compile(r"(?:/|\.\./)*[A-Za-z][A-Za-z0-9_./-]*")
+"""Names and paths in which nothing means anything to YAML, also inside brackets."""
+_OTHERS_BOOL: Final = frozenset({"y", "yes", "n", "no", "on", "off"})
+"""Booleans of YAML 1.1, which other programs may read the file by."""
+_ESCAPES: Final = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+_REPLACEMENT: Final = "\N{REPLACEMENT CHARACTER}"
+
+
+def word(text: str) -> str:
+    """Return a name or a path, in quotes only where it needs them."""
+    return text if _WORD.fullmatch(text) and _is_text(text) else quoted(text)
+
+
+def quoted(text: str) -> str:
+    """Return text in double quotes; what YAML cannot hold becomes the replacement character U+FFFD."""
+    return f'"{"".join(map(_escaped, NOT_PRINTABLE.sub(_REPLACEMENT, text)))}"'
+
+
+def text_lines(key: str, text: str) -> list[str]:
+    """Return the lines of a key at the top of the file whose value is any text.
+
+    Plain on one line where that is possible and short enough; else folded, where folding keeps every character;
+    else in double quotes.
+    """
+    line = f"{key}: {text if _is_plain(text) else quoted(text)}"
+    if (len(line) <= WIDTH and "\n" not in text) or not _can_be_folded(text):
+        return [line]
+    body = text.removesuffix("\n")
+    lines = [f"{key}: {'>-' if body == text else '>'}"]
+    for index, paragraph in enumerate(body.split("\n")):
+        lines += [""] if index else []
+        lines += _wrapped(paragraph, _INDENT)
+    return lines
+
+
+def comment_lines(texts: Iterable[str]) -> list[str]:
+    """Return comments; long lines are wrapped, and what YAML cannot hold becomes U+FFFD."""
+    lines: list[str] = []
+    for text in texts:
+        for line in text.splitlines() or [""]:
+            shown = NOT_PRINTABLE.sub(_REPLACEMENT, line).rstrip()
+            lines += [f"# {shown}"] if 0 < len(shown) <= WIDTH - 2 else _wrapped(shown, "# ") or ["#"]
+    return lines
+
+
+def _is_text(text: str) -> bool:
+    """Whether readers take these characters, without quotes, for a text."""
+    return resolve_plain(text) == text and text.casefold() not in _OTHERS_BOOL
+
+
+def _is_plain(text: str) -> bool:
+    """Whether a text needs no quotes as the value of a key outside of brackets."""
+    if not text[:1].isalpha() or not text.isprintable() or not _is_text(text):
+        return False
+    return ": " not in text and " #" not in text and not text.endswith((":", " "))
+
+
+def _can_be_folded(text: str) -> bool:
+    """Whether single spaces and line feeds are the only white space, with a word at both ends."""
+    lines = text.removesuffix("\n").split("\n")
+    if not lines[0] or not lines[-1]:
+        return False
+    return all(line.isprintable() and line.strip(" ") == line and "  " not in line for line in lines)
+
+
+def _wrapped(text: str, prefix: str) -> list[str]:
+    """Return lines of at most WIDTH columns, where words are not longer than that."""
+    wrapper = textwrap.TextWrapper(
+        width=WIDTH,
+        initial_indent=prefix,
+        subsequent_indent=prefix,
+        break_long_words=prefix != _INDENT,
+        break_on_hyphens=False,
+    )
+    return wrapper.wrap(text)
+
+
+def _escaped(character: str) -> str:
+    if character in _ESCAPES:
+        return _ESCAPES[character]
+    if character.isprintable():
+        return character
+    code = ord(character)
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+Tree: TypeAlias = "str | list[str] | dict[str, Tree]"
+"""Texts as they stand in the file, in lists and mappings."""
+
+_WORDS: Final = ("name", "type")
+_NUMBERS: Final = ("a", "alpha", "beta", "d", "theta")
+
+
+def inline(tree: Tree) -> str:
+    """Return a tree on one line."""
+    match tree:
+        case str():
+            return tree
+        case list():
+            return f"[{', '.join(tree)}]"
+        case dict():
+            return f"{{{', '.join(f'{key}: {inline(value)}' for key, value in tree.items())}}}"
+
+
+def entry_lines(key: str, tree: Tree, indent: int = 0) -> list[str]:
+    """Return the lines of a key: one, unless the value is a mapping that is too long for it."""
+    line = f"{' ' * indent}{key}: {inline(tree)}"
+    if len(line) <= WIDTH or not isinstance(tree, dict):
+        return [line]
+    return [f"{' ' * indent}{key}:", *block_lines(tree, indent + 2)]
+
+
+def block_lines(tree: Mapping[str, Tree], indent: int) -> list[str]:
+    """Return the lines of a mapping's keys."""
+    return [line for key, value in tree.items() for line in entry_lines(key, value, indent)]
+
+
+def table_lines(rows: Sequence[dict[str, Tree]]) -> list[str]:
+    """Return the lines of a list of rows.
+
+    A row takes one line where it fits and says nothing of a link. Such rows have their columns aligned, where
+    they fit then, too.
+    """
+    simple = {index: row for index, row in enumerate(rows) if "link" not in row and len(_line(row)) <= WIDTH}
+    aligned = _aligned(list(simple.values()))
+    if all(len(line) <= WIDTH for line in aligned):
+        lines = dict(zip(simple, aligned, strict=True))
+    else:
+        lines = {index: _line(row) for index, row in simple.items()}
+    return [line for index, row in enumerate(rows) for line in ([lines[index]] if index in lines else _item(row))]
+
+
+def _line(row: dict[str, Tree]) -> str:
+    return f"  - {inline(row)}"
+
+
+def _item(row: Mapping[str, Tree]) -> list[str]:
+    """Return the lines of a row that has a line for each of its keys."""
+    first, *others = block_lines(row, 4)
+    return [f"  - {first[4:]}", *others]
+
+
+def _aligned(rows: Sequence[dict[str, Tree]]) -> list[str]:
+    """Return one line a row; words stand to the left in their columns, numbers to the right.
+
+    The words come first in a row, then the numbers, then what has no columns.
+    """
+    cells = [[(key, inline(value)) for key, value in row.items()] for row in rows]
+    tables = [[cell for cell in row if cell[0] in (*_WORDS, *_NUMBERS)] for row in cells]
+    columns = itertools.zip_longest(*tables, fillvalue=("", ""))
+    widths = [max(len(key) + len(text) for key, text in column) for column in columns]
+    lines = []
+    for row, table in zip(cells, tables, strict=True):
+        parts = [_cell(key, text, width) for (key, text), width in zip(table, widths, strict=False)]
+        parts += [f"{key}: {text}, " for key, text in row[len(table) :]]
+        lines.append(f"  - {{{''.join(parts).rstrip(', ')}}}")
+    return lines
+
+
+def _cell(key: str, text: str, width: int) -> str:
+    """Return a key, its value and a comma; ``width`` is that of the longest key and value of the column."""
+    if key in _NUMBERS:
+        return f"{key}: {text:>{width - len(key)}}, "
+    return f"{key}: {text}, ".ljust(width + len(": , "))
+
+
+class PartWriter:
+    """Knows the units of one file, and its folder."""
+
+    def __init__(self, units: UnitWriter, folder: Path | None) -> None:
+        """``folder`` is where paths in the file start; without it they are absolute."""
+        self._units = units
+        self._folder = folder
+
+    def pose(self, pose: Pose) -> dict[str, Tree]:
+        """Return a pose; empty for the identity."""
+        tree: dict[str, Tree] = {}
+        if pose.xyz.any():
+            tree["xyz"] = self._units.lengths(pose.xyz.tolist())
+        if pose.rpy.any():
+            tree["rpy"] = self._units.angles(pose.rpy.tolist())
+        return tree
+
+    def base(self, base: BaseSpec) -> dict[str, Tree]:
+        """Return what is known of the base link."""
+        return {**self.pose(base.pose), **self._look(base.color, base.mesh)}
+
+    def rows(self, spec: RobotSpec, shared: ActuatorSpec) -> list[dict[str, Tree]]:
+        """Return the table; names are left out where all are the default ones."""
+        named = any(row.name != default_name(index) for index, row in enumerate(spec.rows))
+        return [self._row(row, spec.convention, shared, named=named) for row in spec.rows]
+
+    def configurations(self, configurations: Mapping[str, Array], moving: Sequence[Row]) -> dict[str, Tree]:
+        """Return the named joint vectors."""
+        return {
+            word(name): [
+                self._units.coordinate(value, turns=row.type.turns)
+                for value, row in zip(vector.tolist(), moving, strict=True)
+            ]
+            for name, vector in configurations.items()
+        }
+
+    def _row(self, row: Row, convention: Convention, shared: ActuatorSpec, *, named: bool) -> dict[str, Tree]:
+        tree: dict[str, Tree] = {"name": word(row.name)} if named else {}
+        tree |= {"type": row.type.value, **self._numbers(row)}
+        if row.convention is not convention:
+            tree["convention"] = row.convention.value
+        if row.flip:
+            tree["flip"] = "true"
+        own = row.type.moves and actuator(row.actuator) != actuator(shared)
+        parts: dict[str, Tree] = {
+            "limits": self._limits(row.limits, turns=row.type.turns),
+            "dynamics": _dynamics(row.dynamics),
+            "link": self._link(row.link),
+            "actuator": actuator(row.actuator) if own else {},
+        }
+        return tree | {key: part for key, part in parts.items() if part}
+
+    def _numbers(self, row: Row) -> dict[str, Tree]:
+        """Return the numbers of the table, zeros too, so that it can be read as one."""
+        tree: dict[str, Tree] = {"a": self._units.length(row.a), "alpha": self._units.angle(row.alpha)}
+        hayati = row.convention is Convention.HAYATI
+        if row.beta or hayati:
+            tree["beta"] = self._units.angle(row.beta)
+        if row.d or not hayati or row.type is JointType.PRISMATIC:  # other Hayati rows have none
+            tree["d"] = self._units.length(row.d)
+        return {**tree, "theta": self._units.angle(row.theta)}
+
+    def _limits(self, limits: Limits, *, turns: bool) -> str:
+        tree: dict[str, Tree] = {}
+        if limits.position is not None:
+            tree["position"] = [self._units.coordinate(value, turns=turns) for value in limits.position]
+        if limits.velocity is not None:
+            tree["velocity"] = self._units.coordinate(limits.velocity, turns=turns)
+        if limits.effort is not None:
+            tree["effort"] = number(limits.effort)
+        return _given_line(tree)
+
+    def _link(self, link: LinkSpec) -> dict[str, Tree]:
+        tree: dict[str, Tree] = {}
+        if link.mass is not None:
+            tree["mass"] = number(link.mass)
+        if link.com is not None:
+            tree["com"] = self._units.lengths(link.com.tolist())
+        if link.inertia is not None:
+            tree["inertia"] = _inertia(link.inertia)
+        if link.density is not None:
+            tree["density"] = number(link.density)
+        if link.radius is not None:
+            tree["radius"] = self._units.length(link.radius)
+        return {**tree, **self._look(link.color, link.mesh)}
+
+    def _look(self, color: Sequence[float] | None, mesh: MeshSpec | None) -> dict[str, Tree]:
+        tree: dict[str, Tree] = {}
+        if color is not None:
+            tree["color"] = numbers(color[:3] if color[3] == 1 else color)
+        if mesh is not None:
+            scale: dict[str, Tree] = {} if mesh.scale == 1 else {"scale": number(mesh.scale)}
+            tree["mesh"] = {"file": word(self._path(mesh.file)), **scale, **self.pose(mesh.pose)}
+        return tree
+
+    def _path(self, file: Path) -> str:
+        """Return a path as the file names it; relative to its folder, where they are on one drive."""
+        path = Path(os.path.abspath(file))
+        if self._folder is not None:
+            # links resolved on both sides: the system goes up from where a link leads, not from where it stands
+            path = path.parent.resolve() / path.name
+            with contextlib.suppress(ValueError):
+                path = Path(os.path.relpath(path, self._folder.resolve()))
+        if NOT_PRINTABLE.search(str(path)):
+            raise ModelError(f"a robot file cannot name the mesh file {str(path)!r}; rename it")
+        return path.as_posix()
+
+
+def actuator(actuator: ActuatorSpec) -> dict[str, Tree]:
+    """Return an actuator, with its type."""
+    tree: dict[str, Tree] = {"type": actuator.type.value}
+    if actuator.kp is not None:
+        tree["kp"] = number(actuator.kp)
+    if actuator.kv is not None:
+        tree["kv"] = number(actuator.kv)
+    return tree
+
+
+def _dynamics(dynamics: Dynamics) -> str:
+    values = {"damping": dynamics.damping, "friction": dynamics.friction, "armature": dynamics.armature}
+    return _given_line({key: number(value) for key, value in values.items() if value})
+
+
+def _inertia(matrix: Array) -> str:
+    (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = matrix.tolist()
+    products = {"ixy": ixy, "ixz": ixz, "iyz": iyz}
+    moments = {"ixx": ixx, "iyy": iyy, "izz": izz}
+    return _given_line(
+        {key: number(value) for key, value in {**moments, **products}.items() if value or key in moments}
+    )
+
+
+def _given_line(tree: dict[str, Tree]) -> str:
+    """Return a mapping that is easier to read on one line, however long; nothing where it is empty."""
+    return inline(tree) if tree else ""
+
+
+_GRAVITY = [0.0, 0.0, -9.81]
+
+
+def robot_file_text(
+    spec: RobotSpec,
+    *,
+    header: Sequence[str] = (),
+    folder: Path | None = None,
+    angle: AngleUnit = AngleUnit.DEG,
+    length: LengthUnit = LengthUnit.M,
+) -> str:
+    """Return the text of a robot file that ``parse_robot`` reads as the same robot.
+
+    Numbers read back as the same doubles in rad and m. In other units some have no text that does; those come back
+    an ulp off, and stay the same from then on. Parameters are not written: the numbers that they gave stand in
+    their places. In description and source, characters that YAML cannot hold become U+FFFD. What a robot file
+    does not allow (such as a kp of a velocity actuator) is written as it is, for the reader to complain of.
+
+    Args:
+        spec: The robot.
+        header: Lines of comments to begin with, any text.
+        folder: Where the file will stand: paths of meshes are relative to it; by default they are absolute.
+        angle: Unit of the file's angles.
+        length: Unit of the file's lengths.
+
+    Raises:
+        ModelError: A number is too large for the unit, or a mesh file has a name that YAML cannot hold.
+    """
+    parts = PartWriter(UnitWriter(units=Units(angle=angle, length=length)), folder)
+    shared = _shared_actuator(spec)
+    lines = [*comment_lines(header), f"name: {word(spec.name)}"]
+    for key, text in {"description": spec.description, "source": spec.source}.items():
+        lines += text_lines(key, text) if text else []
+    lines += [f"convention: {spec.convention}", f"units: {{angle: {angle}, length: {length}}}"]
+    before: dict[str, Tree] = {"base": parts.base(spec.base), "tool": parts.pose(spec.tool)}
+    if spec.gravity.tolist() != _GRAVITY:
+        before["gravity"] = numbers(spec.gravity.tolist())
+    lines += [line for key, tree in before.items() if tree for line in entry_lines(key, tree)]
+    lines += ["joints:", *table_lines(parts.rows(spec, shared))]
+    configurations = parts.configurations(spec.configurations, spec.moving_rows)
+    if configurations:
+        lines.append("configurations:")
+        lines += [line for name, vector in configurations.items() for line in entry_lines(name, vector, 2)]
+    if actuator(shared) != actuator(ActuatorSpec()):
+        lines += entry_lines("actuators", actuator(shared))
+    return "\n".join([*lines, ""])
+
+
+def _shared_actuator(spec: RobotSpec) -> ActuatorSpec:
+    """Return the actuator of all moving rows where it is one and the same, else the default."""
+    first, *others = [row.actuator for row in spec.moving_rows] or [ActuatorSpec()]
+    return first if all(actuator(other) == actuator(first) for other in others) else ActuatorSpec()

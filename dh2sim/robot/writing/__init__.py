@@ -1,1 +1,0 @@
-"""RobotSpecs to robot files."""

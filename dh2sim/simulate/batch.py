@@ -1,0 +1,255 @@
+"""A group of rollouts in the engine: its states, which of them still run, and why others do not.
+
+Dynamics as the joints see it: of all degrees of freedom, or with a floating base that nothing holds.
+
+What a controller sees of a group of rollouts, computed when it is first asked for.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch, SimulationError
+from numpy.typing import NDArray
+
+from dh2sim.simulate.dataset_layout import FINISHED, STATUS
+from dh2sim.simulate.mujoco_runtime import VELOCITY_STAGE, forward
+from dh2sim.simulate.plant import Plant
+from dh2sim.simulate.randomization import apply_scales
+from dh2sim.simulate.records import Recorder
+from dh2sim.typing import Array
+
+BASE = 6
+"""Degrees of freedom of a floating base."""
+
+
+class JointSpace:
+    """Turns MuJoCo's mass matrix and forces into those of the equation tau = M a + c of the n joints.
+
+    On a floating base no force acts, so that its acceleration a_b is whatever the joints' one makes of it:
+    M_bb a_b + M_bj a + c_b = 0. Put into the joints' equation this leaves the inertia M_jj - M_jb M_bb⁻¹ M_bj and the
+    force c_j - M_jb M_bb⁻¹ c_b. Source: Y. Umetani, K. Yoshida, Resolved motion rate control of space manipulators
+    with generalized Jacobian matrix (1989), and R. Featherstone, Rigid Body Dynamics Algorithms (2008), section 9.3.
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        """Describe a plant."""
+        self._floating = plant.floating
+        self._index = _dense_index(plant.model)
+
+    def inertia(self, mass: Array) -> Array:
+        """Return the inertia, shape (batch, n, n), from MuJoCo's sparse ``M``, shape (batch, entries)."""
+        M = np.take(mass, self._index, axis=1)
+        if not self._floating:
+            return M
+        follows = np.linalg.solve(_of_base(M), M[:, :BASE, BASE:])
+        reduced = M[:, BASE:, BASE:].copy()
+        for k in range(BASE):  # one by one: the same order of additions for any batch
+            reduced -= M[:, BASE:, k, None] * follows[:, None, k, :]
+        return reduced
+
+    def force(self, mass: Array, force: Array) -> Array:
+        """Return the joints' forces, shape (batch, n), from those of all degrees of freedom, shape (batch, nv)."""
+        if not self._floating:
+            return np.array(force)
+        M = np.take(mass, self._index, axis=1)
+        follows = np.linalg.solve(_of_base(M), force[:, :BASE, None])[:, :, 0]
+        reduced = force[:, BASE:].copy()
+        for k in range(BASE):
+            reduced -= M[:, BASE:, k] * follows[:, k, None]
+        return reduced
+
+
+def _of_base(M: Array) -> Array:
+    """Return the floating base's own inertia, and the identity where a simulation failed before it had any."""
+    own = M[:, :BASE, :BASE].copy()
+    own[~own.any(axis=(1, 2))] = np.eye(BASE)
+    return own
+
+
+def _dense_index(model: mujoco.MjModel) -> NDArray[np.intp]:
+    """Where MuJoCo's sparse lower triangle of the mass matrix holds each entry of the dense one; a chain has all."""
+    index = np.zeros((model.nv, model.nv), dtype=np.intp)
+    for row in range(model.nv):
+        start = model.M_rowadr[row]
+        for k in range(start, start + model.M_rownnz[row]):
+            index[row, model.M_colind[k]] = index[model.M_colind[k], row] = k
+    return index
+
+
+class BatchObservation:
+    """The states of a persistent batch at the present instant; see ``Observation``. Arrays are the caller's own."""
+
+    def __init__(self, plant: Plant, batch: Batch, weights: Weights) -> None:
+        """Observe a batch whose simulations have just been given their start."""
+        self._plant, self._batch, self._weights = plant, batch, weights
+        self._first_q, self._first_v = (7, 6) if plant.floating else (0, 0)
+        self._space = JointSpace(plant)
+        self._gravity: Array | None = None
+        self._fields: dict[str, Array] = {}
+        self.step = 0
+
+    def advance(self) -> None:
+        """The batch has moved on by one step."""
+        self.step += 1
+        self._gravity = None
+
+    @property
+    def time(self) -> float:
+        """Time since the start, s."""
+        return self.step * self._plant.timestep
+
+    @property
+    def q(self) -> Array:
+        """Joint positions, shape (batch, n)."""
+        return np.array(self._batch.bind("qpos")[:, self._first_q :])
+
+    @property
+    def v(self) -> Array:
+        """Joint velocities, shape (batch, n)."""
+        return np.array(self._batch.bind("qvel")[:, self._first_v :])
+
+    @property
+    def mass_matrix(self) -> Array:
+        """Joint-space inertia, shape (batch, n, n); on a floating base, what the joints feel of it."""
+        return self._space.inertia(self._field("M"))
+
+    @property
+    def bias(self) -> Array:
+        """Coriolis, centrifugal and gravity forces, shape (batch, n)."""
+        return self._space.force(self._field("M"), self._field("qfrc_bias"))
+
+    @property
+    def passive(self) -> Array:
+        """Forces of springs and viscous damping, shape (batch, n)."""
+        return np.array(self._field("qfrc_passive")[:, self._first_v :])
+
+    @property
+    def gravity(self) -> Array:
+        """Forces that balance gravity, shape (batch, n)."""
+        if self._gravity is None:
+            self._gravity = self._weights.forces(self._batch.bind("qpos"))
+        return self._gravity.copy()
+
+    def _field(self, name: str) -> Array:
+        if name not in self._fields:  # a field shows what is computed after it was bound
+            self._fields[name] = self._batch.bind(name)
+            forward(self._batch)
+        return self._fields[name]
+
+
+class Weights:
+    """The same models at rest, which tell the forces of gravity alone."""
+
+    def __init__(self, plant: Plant, simulations: int, threads: int, factors: dict[str, Array]) -> None:
+        """Describe the models; nothing is made before it is needed."""
+        self._plant, self._simulations, self._threads, self._factors = plant, simulations, threads, factors
+        self._space = JointSpace(plant)
+        self._batch: Batch | None = None
+
+    def forces(self, qpos: Array) -> Array:
+        """Return the joint forces, N·m or N, that balance gravity at the given positions, shape (batch, n)."""
+        if self._batch is None:
+            self._batch = Batch(self._plant.model, self._simulations, self._threads)
+            apply_scales(self._batch, self._plant, self._factors)
+        mass, force = self._batch.bind("M"), self._batch.bind("qfrc_bias")
+        self._batch.bind("qpos")[:] = qpos
+        forward(self._batch)
+        return self._space.force(mass, force)
+
+
+WARNINGS = {
+    "mjWARN_INERTIA": "warning_inertia",
+    "mjWARN_CONTACTFULL": "warning_contacts_full",
+    "mjWARN_CNSTRFULL": "warning_constraints_full",
+    "mjWARN_BADQPOS": "bad_qpos",
+    "mjWARN_BADQVEL": "bad_qvel",
+    "mjWARN_BADQACC": "bad_qacc",
+    "mjWARN_BADCTRL": "bad_ctrl",
+}
+
+
+class Group:
+    """Simulations that run together; each that MuJoCo warns of or fails on stops alone."""
+
+    def __init__(self, plant: Plant, batch: Batch, recorder: Recorder, steps: int) -> None:
+        """Take over a batch at its start."""
+        self.plant = plant
+        self.batch = batch
+        self.recorder = recorder
+        self.steps = steps
+        self.alive: NDArray[np.bool_] = np.ones(batch.nsim, dtype=bool)
+        self.status = np.full(batch.nsim, FINISHED, dtype=np.int8)
+        self.stop_step = np.full(batch.nsim, -1, dtype=np.int64)
+        self.saturation = np.zeros((batch.nsim, len(plant.actuators)), dtype=np.int64)
+
+    @property
+    def ids(self) -> NDArray[np.int32] | None:
+        """The simulations that still run, or None if all do."""
+        return None if self.alive.all() else np.flatnonzero(self.alive).astype(np.int32)
+
+    @property
+    def rows(self) -> Any:
+        """The same, to index arrays with."""
+        ids = self.ids
+        return slice(None) if ids is None else ids
+
+    def clipped(self, wanted: Array) -> tuple[Array, NDArray[np.bool_] | None]:
+        """Return controls inside their ranges, and where they were not: None if nowhere.
+
+        Args:
+            wanted: shape (batch, …, actuators).
+        """
+        lower, upper = self.plant.control_lower, self.plant.control_upper
+        outside = (wanted < lower) | (wanted > upper)
+        if not outside.any():
+            return wanted, None
+        return np.clip(wanted, lower, upper), outside
+
+    def count(self, outside: NDArray[np.bool_] | None, first: int, count: int) -> None:
+        """Count the controls that were clipped, before the step in which a simulation stopped.
+
+        Args:
+            outside: where they were, shape (batch, count or 1, actuators).
+            first: the time step that they begin with; all of ``count`` steps have been simulated.
+            count: number of time steps that they were for.
+        """
+        if outside is None:
+            return
+        ran = np.where(self.stop_step < 0, count, np.clip(self.stop_step - first, 0, count))
+        if outside.shape[1] == count:
+            meant = np.arange(count) < ran[:, None]
+            self.saturation += np.count_nonzero(outside & meant[:, :, None], axis=1)
+        else:
+            self.saturation += outside[:, 0] * ran[:, None]
+
+    def call(self, function: Any, *args: Any, **kwargs: Any) -> NDArray[np.intp]:
+        """Call a method of the batch; return the simulations that MuJoCo warned of or failed on meanwhile."""
+        failed = np.zeros(self.batch.nsim, dtype=bool)
+        try:
+            function(*args, **kwargs)
+        except SimulationError as error:
+            failed[error.ids] = True
+        if self.batch.warning.any():
+            failed |= self.batch.warning[:, :, 1].any(axis=1)
+        return np.flatnonzero(failed & self.alive)
+
+    def look(self, step: int) -> None:
+        """Compute what MuJoCo derives from the states at the beginning of a time step, or at the end of the run."""
+        if self.alive.any():
+            self.stop(self.call(self.batch.forward, self.ids, stage=VELOCITY_STAGE), step)
+
+    def stop(self, simulations: NDArray[np.intp], step: int) -> None:
+        """Stop simulations that failed in a time step."""
+        for i in simulations:
+            self.alive[i] = False
+            self.stop_step[i] = step
+            self.status[i] = STATUS[self._reason(int(i))]
+
+    def _reason(self, i: int) -> str:
+        for kind, reason in WARNINGS.items():
+            if self.batch.warning[i, int(getattr(mujoco.mjtWarning, kind)), 1]:
+                return reason
+        return "error" if self.batch.status[i] else "other_warning"

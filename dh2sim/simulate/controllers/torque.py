@@ -1,0 +1,181 @@
+"""Motors that do what the robot's dynamics ask for.
+
+Gains that time steps are short enough for.
+
+No actuation at all.
+
+Motors that balance gravity.
+
+Motors as springs and dampers towards a reference.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+import mujoco
+import numpy as np
+
+from dh2sim.robot.spec import ActuatorType
+from dh2sim.simulate.controllers.options import Within
+from dh2sim.simulate.controllers.protocol import Lanes, Observation
+from dh2sim.simulate.controllers.trajectories import Amplitude, Period, SmoothReference
+from dh2sim.simulate.plant import Plant
+from dh2sim.typing import Array
+
+MOST: Final = 0.4
+"""Share of its velocity that damping may take from a joint in one time step; from 2 on the arm would tremble."""
+
+
+def steady_gains(plant: Plant) -> tuple[Array, Array]:
+    """Return the robot's stiffness and damping, softened as much as a torque that is held for a time step requires.
+
+    A position actuator's own damping is integrated implicitly, and may be as strong as one likes; that of a
+    controller is not. With inertia M, damping D and time step h the velocities of the next step are (1 - h M⁻¹ D)
+    times the present ones, so h times the largest eigenvalue of M⁻¹ D is kept below ``MOST``, at home. Stiffness goes
+    with the square, which keeps the damping ratio.
+
+    Returns:
+        Stiffness, N·m/rad or N/m, and damping, N·m·s/rad or N·s/m, each of shape (n,).
+    """
+    if plant.n == 0:
+        return plant.kp, plant.kv
+    model = plant.model
+    data = mujoco.MjData(model)
+    data.qpos[model.nq - plant.n :] = plant.home
+    mujoco.mj_forward(model, data)
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, inertia)
+    joints = slice(model.nv - plant.n, None)
+    root = np.sqrt(plant.kv)
+    quickness = root[:, None] * np.linalg.inv(inertia)[joints, joints] * root
+    taken = plant.timestep * float(np.linalg.eigvalsh(quickness)[-1])
+    share = min(1.0, MOST / taken) if taken > 0.0 else 1.0
+    share = float(f"{share:.3g}")  # the last bits of an eigenvalue are not the same on every machine
+    return plant.kp * share * share, plant.kv * share
+
+
+class Passive:
+    """No actuators: the robot moves as gravity, friction and its start make it."""
+
+    actuation = ActuatorType.NONE
+
+    def __init__(self, lanes: Lanes) -> None:
+        """Note how many rollouts there are."""
+        self._controls = np.zeros((len(lanes.rollouts), 1, 0))
+
+    def controls(self, first: int, count: int) -> Array:  # noqa: ARG002 - the same at every step
+        """Return no controls, shape (batch, 1, 0)."""
+        return self._controls
+
+
+class GravityCompensation:
+    """Motors balance gravity, so that the robot floats where it is put."""
+
+    actuation = ActuatorType.MOTOR
+
+    def __init__(self, lanes: Lanes, *, damping: Annotated[float, Within(at_least=0.0)] = 0.0) -> None:  # noqa: ARG002
+        """Keep the damping.
+
+        Args:
+            lanes: the rollouts.
+            damping: torque against motion per velocity, N·m·s/rad or N·s/m.
+        """
+        self._damping = damping
+
+    def control(self, observation: Observation) -> Array:
+        """Return torques or forces, N·m or N, shape (batch, n)."""
+        if self._damping == 0.0:
+            return observation.gravity
+        return observation.gravity - self._damping * observation.v
+
+
+class PD:
+    """Motors pull as springs and dampers towards smooth random references, gravity balanced."""
+
+    actuation = ActuatorType.MOTOR
+
+    def __init__(
+        self,
+        lanes: Lanes,
+        *,
+        kp: Annotated[float | None, Within(at_least=0.0)] = None,
+        kd: Annotated[float | None, Within(at_least=0.0)] = None,
+        gravity: bool = True,
+        period: Period = 1.0,
+        amplitude: Amplitude = 0.5,
+    ) -> None:
+        """Draw the references.
+
+        Args:
+            lanes: the rollouts.
+            kp: stiffness of every joint, N·m/rad or N/m; None: the robot's own, softened as
+                the time step requires.
+            kd: damping of every joint, N·m·s/rad or N·s/m; None: likewise.
+            gravity: whether gravity is balanced.
+            period: duration of a motion between waypoints, s.
+            amplitude: share of the joints' range that the waypoints are in.
+        """
+        own_kp, own_kd = steady_gains(lanes.plant)
+        self._kp = own_kp if kp is None else np.full(lanes.plant.n, kp)
+        self._kd = own_kd if kd is None else np.full(lanes.plant.n, kd)
+        self._gravity = gravity
+        self._smooth = SmoothReference(lanes, period=period, amplitude=amplitude)
+
+    def control(self, observation: Observation) -> Array:
+        """Return torques or forces, N·m or N, shape (batch, n)."""
+        q, v, _ = self._smooth.at(observation.step)
+        torque = self._kp * (q - observation.q) + self._kd * (v - observation.v)
+        return torque + observation.gravity if self._gravity else torque
+
+    def reference(self, first: int, count: int) -> tuple[Array, Array]:
+        """Return the reference's positions and velocities."""
+        motion = self._smooth.motion(first, count)
+        return motion.q, motion.v
+
+
+class ComputedTorque:
+    """Motors make the torques that the dynamics ask for to follow smooth random references.
+
+    tau = M(q) (a_ref + kd (v_ref - v) + kp (q_ref - q)) + c(q, v) + g(q) - passive forces, which leaves the error
+    e'' + kd e' + kp e = 0; kp = bandwidth², kd = 2 bandwidth damp it critically. Source: M. Spong, S. Hutchinson,
+    M. Vidyasagar, Robot Modeling and Control (2006), section 8.3, inverse dynamics.
+    """
+
+    actuation = ActuatorType.MOTOR
+
+    def __init__(
+        self,
+        lanes: Lanes,
+        *,
+        bandwidth: Annotated[float, Within(above=0.0, unit="rad/s")] = 20.0,
+        period: Period = 1.0,
+        amplitude: Amplitude = 0.5,
+    ) -> None:
+        """Draw the references.
+
+        Args:
+            lanes: the rollouts.
+            bandwidth: how fast errors vanish, rad/s.
+            period: duration of a motion between waypoints, s.
+            amplitude: share of the joints' range that the waypoints are in.
+        """
+        self._kp, self._kd = bandwidth * bandwidth, 2.0 * bandwidth
+        self._smooth = SmoothReference(lanes, period=period, amplitude=amplitude)
+
+    def control(self, observation: Observation) -> Array:
+        """Return torques or forces, N·m or N, shape (batch, n)."""
+        q, v, a = self._smooth.at(observation.step)
+        wanted = a + self._kd * (v - observation.v) + self._kp * (q - observation.q)
+        torque = observation.bias - observation.passive
+        inertia = observation.mass_matrix
+        term = np.empty_like(torque)
+        for j in range(wanted.shape[1]):  # column by column: the same order of additions for any batch
+            np.multiply(inertia[:, :, j], wanted[:, j, None], out=term)
+            torque += term
+        return torque
+
+    def reference(self, first: int, count: int) -> tuple[Array, Array]:
+        """Return the reference's positions and velocities."""
+        motion = self._smooth.motion(first, count)
+        return motion.q, motion.v

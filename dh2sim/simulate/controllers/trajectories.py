@@ -1,0 +1,262 @@
+"""Smooth random references: what controllers with motors follow.
+
+Smooth curves for many rollouts at once, the same bits however the rollouts and the time steps are cut up.
+
+Ranges that setpoints and references are drawn from, inside the limits and near to where a rollout starts.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Final, TypeAlias
+
+import numpy as np
+
+from dh2sim.errors import ControllerError
+from dh2sim.simulate.controllers.options import Within
+from dh2sim.simulate.controllers.protocol import Lanes
+from dh2sim.simulate.plant import Plant
+from dh2sim.typing import Array
+
+MINIMUM_JERK_PEAK: Final = 1.875
+"""Greatest speed of a minimum-jerk motion, at its middle, over distance/duration: 30 · 1/4 · 1/4."""
+_CACHED: Final = 16384
+"""Numbers worked on at a time, of which three arrays stay in the cache."""
+
+
+def weighted_sum(weights: Array, values: Sequence[Array], out: Array | None = None) -> Array:
+    """Return the sum over terms h of ``weights[h, k] * values[h][i, j]``.
+
+    Terms are added in their order, one multiplication and one addition each, and never by a library's product of
+    matrices, whose order of additions depends on sizes.
+
+    Args:
+        weights: what varies with time, shape (terms, count).
+        values: what varies with rollout and joint, each of shape (batch, m); at least one.
+        out: where to put the result.
+
+    Returns:
+        Array of shape (batch, count, m).
+    """
+    batch, m = values[0].shape
+    count = weights.shape[1]
+    out = np.empty((batch, count, m)) if out is None else out
+    if out.size == 0:
+        return out
+    group = min(batch, max(1, _CACHED // (m * count)))
+    total, term = np.empty((2, group, m, count))  # time last: long inner loops
+    for first in range(0, batch, group):
+        last = min(first + group, batch)
+        here, product = total[: last - first], term[: last - first]
+        np.multiply(values[0][first:last, :, None], weights[0], out=here)
+        for weight, value in zip(weights[1:], values[1:], strict=True):
+            np.multiply(value[first:last, :, None], weight, out=product)
+            np.add(here, product, out=here)
+        out[first:last] = here.transpose(0, 2, 1)
+    return out
+
+
+def minimum_jerk(s: Array) -> tuple[Array, Array, Array]:
+    """Return the minimum-jerk motion from 0 to 1 and its first two derivatives.
+
+    10 s³ - 15 s⁴ + 6 s⁵, which starts and ends at rest without acceleration. Source: T. Flash and N. Hogan, The
+    coordination of arm movements, Journal of Neuroscience 5 (1985).
+
+    Args:
+        s: time over duration, from 0 to 1.
+    """
+    rest = 1.0 - s
+    position = s * s * s * (10.0 + s * (6.0 * s - 15.0))
+    return position, 30.0 * s * s * rest * rest, 60.0 * s * rest * (1.0 - 2.0 * s)
+
+
+def cubic_spline_weights(u: Array) -> Array:
+    """Return the weights of four neighbouring points of a uniform cubic B-spline, shape (4, count).
+
+    They are not negative and add up to one, so the curve stays between the least and the greatest point. Source:
+    C. de Boor, A Practical Guide to Splines (1978).
+
+    Args:
+        u: place between the two middle points, from 0 to 1, shape (count,).
+    """
+    rest = 1.0 - u
+    return np.stack(
+        (
+            rest * rest * rest / 6.0,
+            (4.0 + u * u * (3.0 * u - 6.0)) / 6.0,
+            (1.0 + 3.0 * u * (1.0 + u * rest)) / 6.0,
+            u * u * u / 6.0,
+        )
+    )
+
+
+def pieces(first: int, count: int, timestep: float, duration: float, number: int) -> tuple[Array, Array]:
+    """Return in which of ``number`` pieces of equal duration time steps lie, and where in it.
+
+    Args:
+        first: first time step.
+        count: how many.
+        timestep: s.
+        duration: of a piece, s.
+        number: pieces; what comes later is at the end of the last.
+
+    Returns:
+        The pieces, whole numbers from 0, shape (count,); and the time since a piece's beginning as a share of its
+        duration, from 0 to 1.
+    """
+    place = np.arange(first, first + count) * timestep / duration
+    piece = np.minimum(np.floor(place), number - 1.0)
+    return piece, np.clip(place - piece, 0.0, 1.0)
+
+
+def runs_of(piece: Array) -> list[tuple[int, slice]]:
+    """Return each piece that occurs in an array that does not decrease, with the part of the array where it does."""
+    bounds = [*np.flatnonzero(np.diff(piece, prepend=-1.0)).tolist(), piece.size]
+    return [(int(piece[first]), slice(first, end)) for first, end in itertools.pairwise(bounds)]
+
+
+INSIDE: Final = 1.0 - 1e-9
+"""Share of what limits allow that is used, so that rounding never leads out of them."""
+FREE_TURN: Final = math.pi
+"""rad: half the range of a joint that turns without limits."""
+FREE_SLIDE: Final = 1.0
+"""m: half the range of a joint that slides without limits."""
+
+
+def half_ranges(lower: Array, upper: Array, free: Array) -> Array:
+    """Return half of each range, or ``free`` where a range is not limited; all of shape (m,)."""
+    limited = np.isfinite(lower) & np.isfinite(upper)
+    return np.where(limited, 0.5 * np.where(limited, upper, 0.0) - 0.5 * np.where(limited, lower, 0.0), free)
+
+
+def free_ranges(plant: Plant) -> Array:
+    """Return half of the range that joints without limits move in, rad or m, shape (n,)."""
+    return np.where(np.array(plant.turns, dtype=bool), FREE_TURN, FREE_SLIDE)
+
+
+def centers(start: Array, reach: Array, lower: Array, upper: Array) -> Array:
+    """Return the points nearest to ``start`` from which ``reach`` on either side is inside the limits.
+
+    Args:
+        start: shape (batch, m).
+        reach: at most half of the ranges, shape (m,) or (batch, m).
+        lower: shape (m,); -inf where unlimited.
+        upper: shape (m,); inf where unlimited.
+
+    Returns:
+        Array of shape (batch, m).
+    """
+    return np.minimum(np.maximum(start, lower + reach), upper - reach)
+
+
+def follow(start: Array, targets: Iterable[Array], most: Array) -> Array:
+    """Return points that go from ``start`` towards each target in turn, by ``most`` at the most.
+
+    Args:
+        start: shape (batch, m).
+        targets: each of shape (batch, m).
+        most: greatest distance between neighbouring points, shape (m,).
+
+    Returns:
+        The start and the points, shape (1 + targets, batch, m).
+    """
+    points = [start]
+    for target in targets:
+        points.append(points[-1] + np.clip(target - points[-1], -most, most))
+    return np.stack(points)
+
+
+def uniform(generators: Sequence[np.random.Generator], a: int, m: int) -> Array:
+    """Draw numbers from -1 to 1, an array of (a, m) for every rollout; returned as shape (a, batch, m)."""
+    drawn = [generator.uniform(-1.0, 1.0, size=(a, m)) for generator in generators]
+    return np.ascontiguousarray(np.moveaxis(np.stack(drawn), 0, -2))
+
+
+def widened(lanes: Lanes) -> tuple[Array, Array]:
+    """Return the joints' limits, and where a rollout starts outside of them its start, each of shape (batch, n)."""
+    return np.minimum(lanes.plant.lower, lanes.q0), np.maximum(lanes.plant.upper, lanes.q0)
+
+
+Period: TypeAlias = Annotated[float, Within(above=0.0, unit="s")]
+"""Duration of a motion from waypoint to waypoint."""
+Amplitude: TypeAlias = Annotated[float, Within(at_least=0.0, at_most=1.0)]
+"""Share of the joint's range."""
+
+_FEWEST: Final = 10
+"""Time steps of a motion between waypoints."""
+_AHEAD: Final = 64
+"""Time steps that are computed together when they are asked for one by one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """Positions, velocities and accelerations, rad or m and their rates, each of shape (batch, count, n)."""
+
+    q: Array
+    v: Array
+    a: Array
+
+
+class SmoothReference:
+    """Minimum-jerk motions from one random waypoint to the next, at rest in each.
+
+    The first waypoint is where the rollout starts. The others are uniform in a window around it, ``amplitude`` times
+    the joint's range wide, or as near to it as the limits allow. A waypoint that could not be reached within the
+    velocity limit is moved closer. Every motion stays between its two waypoints, so that nothing leaves the limits.
+    """
+
+    def __init__(self, lanes: Lanes, *, period: float, amplitude: float) -> None:
+        """Draw the waypoints.
+
+        Args:
+            lanes: the rollouts.
+            period: duration of a motion from waypoint to waypoint, s.
+            amplitude: width of the window as a share of the joint's range, 0 to 1; of joints without limits, as a
+                share of 2 pi rad or 2 m.
+
+        Raises:
+            ControllerError: a motion would be shorter than ten time steps.
+        """
+        plant = lanes.plant
+        self._timestep = plant.timestep
+        if period < _FEWEST * plant.timestep:
+            raise ControllerError(
+                f"option 'period' is {period} s; a motion needs at least {_FEWEST} time steps, "
+                f"{_FEWEST * plant.timestep:g} s"
+            )
+        self._period = period
+        self._motions = math.floor(lanes.steps * plant.timestep / period) + 1
+        self._lower, self._upper = widened(lanes)
+        reach = INSIDE * amplitude * half_ranges(plant.lower, plant.upper, free_ranges(plant))
+        center = centers(lanes.q0, reach, plant.lower, plant.upper)
+        targets = center + reach * uniform(lanes.generators, self._motions, plant.n)
+        # nobody is quicker than the velocity limit, even where a start outside the limits makes the way longer
+        most = INSIDE * plant.velocity * period / MINIMUM_JERK_PEAK
+        self._waypoints = follow(lanes.q0, targets, most)
+        self._ahead = Motion(q=np.empty((0, 0, 0)), v=np.empty((0, 0, 0)), a=np.empty((0, 0, 0)))
+        self._ahead_first = -1
+
+    def motion(self, first: int, count: int) -> Motion:
+        """Return the motion at the beginning of time steps ``first`` to ``first + count - 1``."""
+        piece, s = pieces(first, count, self._timestep, self._period, self._motions)
+        position, speed, acceleration = minimum_jerk(s)
+        speed, acceleration = speed / self._period, acceleration / (self._period * self._period)
+        weights = np.stack((1.0 - position, position))
+        q, v, a = np.empty((3, self._waypoints.shape[1], count, self._waypoints.shape[2]))
+        for i, part in runs_of(piece):
+            start, end = self._waypoints[i], self._waypoints[i + 1]
+            weighted_sum(weights[:, part], [start, end], q[:, part])
+            weighted_sum(speed[None, part], [end - start], v[:, part])
+            weighted_sum(acceleration[None, part], [end - start], a[:, part])
+        return Motion(q=np.clip(q, self._lower[:, None], self._upper[:, None], out=q), v=v, a=a)
+
+    def at(self, step: int) -> tuple[Array, Array, Array]:
+        """Return position, velocity and acceleration at the beginning of one time step, each of shape (batch, n)."""
+        k = step % _AHEAD
+        if step - k != self._ahead_first:
+            self._ahead_first = step - k
+            self._ahead = self.motion(self._ahead_first, _AHEAD)
+        return self._ahead.q[:, k], self._ahead.v[:, k], self._ahead.a[:, k]

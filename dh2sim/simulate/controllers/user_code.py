@@ -1,0 +1,207 @@
+"""Controllers that are not dh2sim's own: of installed packages, and of a module of the user's.
+
+Failures of code that is not dh2sim's own, told by their text and place, without a traceback.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import inspect
+import os
+import re
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Final, cast
+
+from dh2sim.errors import ControllerError, Dh2simError
+from dh2sim.messages import did_you_mean, listed
+from dh2sim.simulate.controllers.protocol import Controller
+
+_METHODS = ("control", "controls", "reference")
+_DH2SIM = Path(__file__).parents[2]
+_INSTALLED = {"site-packages", "dist-packages"}
+"""Folders of installed libraries."""
+
+
+@contextmanager
+def blamed(name: str) -> Iterator[None]:
+    """Turn what a user's code raises into an error that says what was raised and where.
+
+    Args:
+        name: of the controller, as typed.
+
+    Raises:
+        ControllerError: the code raised an exception that is not dh2sim's.
+    """
+    try:
+        yield
+    except Dh2simError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise ControllerError(f"controller '{name}': {_what(error)}{_where(error)}") from error
+
+
+def guarded(name: str, controller: Controller) -> Controller:
+    """Return a controller that does the same, whose failures are told by ``blamed``."""
+    methods = {}
+    for method in _METHODS:
+        if callable(getattr(controller, method, None)):
+            methods[method] = _guarded(name, getattr(controller, method))
+    return cast("Controller", SimpleNamespace(**methods))
+
+
+def shown_path(path: str | os.PathLike[str]) -> str:
+    """Return how a message names a file: from the current directory on if it is below that."""
+    absolute = Path(path).absolute()
+    return str(absolute.relative_to(Path.cwd()) if absolute.is_relative_to(Path.cwd()) else absolute)
+
+
+def _guarded(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
+    @functools.wraps(method)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        with blamed(name):
+            return method(*args, **kwargs)
+
+    return call
+
+
+def _what(error: BaseException) -> str:
+    text = error.msg if isinstance(error, SyntaxError) else str(error)
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _where(error: BaseException) -> str:
+    """Name the deepest line of the traceback in a file of the user's, or of the library that is not dh2sim's own."""
+    if isinstance(error, SyntaxError) and error.filename is not None:
+        return f" ({shown_path(error.filename)}, line {error.lineno})"
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if not _of_python_or_dh2sim(f.filename)]
+    own = [f for f in frames if not _installed(f.filename)] or [f for f in frames if f.filename == frames[0].filename]
+    return f" ({shown_path(own[-1].filename)}, line {own[-1].lineno})" if own else ""
+
+
+def _installed(file: str) -> bool:
+    return not _INSTALLED.isdisjoint(Path(file).parts)
+
+
+def _of_python_or_dh2sim(file: str) -> bool:
+    of_python = Path(file).is_relative_to(Path(os.__file__).parent) and not _installed(file)
+    return of_python or file.startswith("<") or Path(file).is_relative_to(_DH2SIM)
+
+
+GROUP: Final = "dh2sim.controllers"
+"""Entry points of this group are controller classes."""
+_MODULE: Final = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
+_CLASS: Final = re.compile(r"[^\W\d]\w*")
+
+
+def plugins() -> Mapping[str, tuple[EntryPoint, ...]]:
+    """Return the entry points of installed packages by name; nothing is imported."""
+    found: dict[str, tuple[EntryPoint, ...]] = {}
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: (entry.name, entry.value)):
+        if entry not in found.get(entry.name, ()):
+            found[entry.name] = (*found.get(entry.name, ()), entry)
+    return found
+
+
+def load_plugin(name: str, entries: tuple[EntryPoint, ...]) -> type:
+    """Return the controller class that an installed package offers under a name.
+
+    Raises:
+        ControllerError: more than one package offers it, or it cannot be imported, or is no class.
+    """
+    if len(entries) > 1:
+        ways = listed((f"'{entry.value}'" for entry in entries), " or ")
+        raise ControllerError(f"controller '{name}': more than one installed package has it; choose {ways}")
+    with blamed(name):
+        found = entries[0].load()
+    return _class(name, found, f"'{entries[0].value}'")
+
+
+def module_and_class(text: str) -> tuple[str, str, str] | None:
+    """Take ``module:Class`` or ``module:Class:options`` apart; None if the text is neither."""
+    module, _, rest = text.partition(":")
+    name, _, options = rest.partition(":")
+    if _MODULE.fullmatch(module.strip()) and _CLASS.fullmatch(name.strip()):
+        return module.strip(), name.strip(), options
+    return None
+
+
+def load_class(module_name: str, class_name: str) -> type | None:
+    """Import a controller class; the current directory is looked in first.
+
+    Returns:
+        The class, or None if there is no such module.
+
+    Raises:
+        ControllerError: the module cannot be imported, or has no such class.
+    """
+    name = f"{module_name}:{class_name}"
+    with blamed(name), _from_here():
+        try:
+            module = importlib.import_module(module_name)
+        except ModuleNotFoundError as error:
+            if error.name is not None and (module_name == error.name or module_name.startswith(f"{error.name}.")):
+                return None
+            raise
+    where = f"module '{module_name}'"
+    if getattr(module, "__file__", None):
+        where += f" ({shown_path(str(module.__file__))})"
+    if not hasattr(module, class_name):
+        classes = [key for key, value in vars(module).items() if _is_candidate(value, module_name)]
+        raise ControllerError(
+            f"controller '{name}': {where} has no class '{class_name}'.{did_you_mean(class_name, classes)} "
+            f"It has: {listed(classes)}"
+        )
+    return _class(name, getattr(module, class_name), f"'{class_name}' of {where}")
+
+
+def source_digest(found: type) -> str:
+    """Return the SHA-256 of the file that a class is written in.
+
+    If its bases are in other files, of the SHA-256 of all of them; dh2sim's own and Python's are left out.
+    """
+    sources = set()
+    for base in found.__mro__:
+        if base.__module__.split(".")[0] not in ("dh2sim", "builtins", "typing", "abc"):
+            try:
+                sources.add(inspect.getsourcefile(base))
+            except TypeError:  # made in an interactive session
+                continue
+    digests = [hashlib.sha256(Path(source).read_bytes()) for source in sorted(filter(None, sources))]
+    if len(digests) < 2:
+        return digests[0].hexdigest() if digests else ""
+    return hashlib.sha256(b"".join(digest.digest() for digest in digests)).hexdigest()
+
+
+def _class(name: str, found: object, what: str) -> type:
+    if not isinstance(found, type):
+        raise ControllerError(f"controller '{name}': {what} is not a class")
+    return found
+
+
+def _is_candidate(value: object, module_name: str) -> bool:
+    return isinstance(value, type) and value.__module__ == module_name and not value.__name__.startswith("_")
+
+
+@contextmanager
+def _from_here() -> Iterator[None]:
+    """Look for modules in the current directory: first while the context lasts, last from then on.
+
+    Last, so that code which imports something later finds it, and no file there hides an installed library.
+    """
+    here = os.getcwd()
+    sys.path.insert(0, here)
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path.remove(here)
+        if here not in sys.path and "" not in sys.path:
+            sys.path.append(here)

@@ -1,0 +1,232 @@
+"""The dataset of a run: its dimensions, coordinates and variables, from the robot and the settings.
+
+What a run's dataset holds: dimensions, coordinates, variables; the same on disk and in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dh2sim.simulate.plant import Plant
+from dh2sim.simulate.randomization import links
+from dh2sim.simulate.settings import Settings
+
+FORMAT = 1
+"""Version of the layout, in the attribute ``dh2sim_run``."""
+POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
+NOT_RUN, FINISHED = -1, 0
+STATUS = {
+    "not_run": NOT_RUN,
+    "finished": FINISHED,
+    "warning_inertia": 1,
+    "warning_contacts_full": 2,
+    "warning_constraints_full": 3,
+    "bad_qpos": 4,
+    "bad_qvel": 5,
+    "bad_qacc": 6,
+    "bad_ctrl": 7,
+    "error": 8,
+    "other_warning": 9,
+}
+"""Meaning of the values of ``status``; all but the first two mark a rollout that stopped early."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Coordinate:
+    """Labels along one dimension."""
+
+    name: str
+    dimension: str
+    values: NDArray[Any] | Sequence[str]
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Variable:
+    """One array of a run; its first dimension is ``rollout``."""
+
+    name: str
+    dimensions: tuple[str, ...]
+    dtype: np.dtype[Any]
+    fill: float | int
+    """What stands where nothing was recorded: NaN, or what ``attributes`` explain."""
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layout:
+    """Everything about a run's dataset but the numbers themselves."""
+
+    sizes: Mapping[str, int]
+    """Size of every dimension; ``rollout`` is the number of rollouts."""
+    coordinates: tuple[Coordinate, ...]
+    variables: tuple[Variable, ...]
+    attributes: Mapping[str, Any]
+    """JSON values."""
+    block: int
+    """Rollouts in a block, and in a chunk along ``rollout``."""
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks; the last may be smaller."""
+        return -(-self.sizes["rollout"] // self.block)
+
+    def rollouts(self, block: int) -> range:
+        """Return the rollouts of a block."""
+        return range(block * self.block, min((block + 1) * self.block, self.sizes["rollout"]))
+
+    def shape(self, variable: Variable) -> tuple[int, ...]:
+        """Return the shape of a variable over the whole run."""
+        return tuple(self.sizes[dimension] for dimension in variable.dimensions)
+
+
+ENERGY = ("potential", "kinetic")
+JOINT_UNITS = "rad or m, see joint_unit"
+JOINT_RATES = "rad/s or m/s"
+FORCES = "N*m or N"
+DOUBLE, LONG, INT, BYTE = np.dtype(np.float64), np.dtype(np.int64), np.dtype(np.int32), np.dtype(np.int8)
+
+
+def run_layout(plant: Plant, settings: Settings, attributes: Mapping[str, Any], block: int) -> Layout:
+    """Return the layout of a run's dataset, in blocks of ``block`` rollouts."""
+    return Layout(
+        sizes=run_sizes(plant, settings),
+        coordinates=tuple(_coordinates(plant, settings)),
+        variables=tuple(run_variables(plant, settings)),
+        attributes=attributes,
+        block=block,
+    )
+
+
+def run_sizes(plant: Plant, settings: Settings) -> dict[str, int]:
+    """Return the size of every dimension that the run's variables have."""
+    every = {
+        "rollout": settings.rollouts,
+        "step": settings.records + 1,
+        "interval": settings.records,
+        "joint": plant.n,
+        "actuator": len(plant.actuators),
+        "pose": len(POSE),
+        "energy_kind": len(ENERGY),
+        "twist": len(TWIST),
+        "link": len(links(plant)),
+    }
+    used = {dimension for variable in run_variables(plant, settings) for dimension in variable.dimensions}
+    return {name: size for name, size in every.items() if name in used | {"step", "interval", "joint"}}
+
+
+def run_variables(plant: Plant, settings: Settings) -> Iterator[Variable]:
+    """Yield the variables of a run."""
+    yield from (variable for name in settings.record for variable in _recorded(name, plant, settings))
+    flags = {"flag_values": list(STATUS.values()), "flag_meanings": " ".join(STATUS)}
+    yield _per_rollout("status", (), BYTE, NOT_RUN, "1", "how the rollout ended", **flags)
+    yield _per_rollout("stop_step", (), LONG, -1, "1", "time step in which the rollout stopped early, or -1")
+    yield _per_rollout(
+        "saturation", ("actuator",), LONG, 0, "1", "time steps in which the wanted control was out of range"
+    )
+    dimensions = {"mass": ("link",), "gain": ("actuator",)}
+    for name in settings.randomize:
+        yield _per_rollout(
+            f"{name}_scale", dimensions.get(name, ("joint",)), DOUBLE, np.nan, "1", f"factor of the {name}"
+        )
+
+
+def _per_rollout(
+    name: str, dimensions: tuple[str, ...], dtype: np.dtype[Any], fill: float, units: str, words: str, **more: Any
+) -> Variable:
+    return Variable(
+        name=name,
+        dimensions=("rollout", *dimensions),
+        dtype=dtype,
+        fill=fill,
+        attributes={"units": units, "long_name": words, **more},
+    )
+
+
+def _recorded(name: str, plant: Plant, settings: Settings) -> Iterator[Variable]:
+    match name:
+        case "qpos":
+            yield _per_rollout("qpos", ("step", "joint"), DOUBLE, np.nan, JOINT_UNITS, "joint position")
+            if plant.floating:
+                pose = "m; unit quaternion"
+                yield _per_rollout(
+                    "base_pose", ("step", "pose"), DOUBLE, np.nan, pose, "pose of base_link in the world"
+                )
+        case "qvel":
+            yield _per_rollout("qvel", ("step", "joint"), DOUBLE, np.nan, JOINT_RATES, "joint velocity")
+            if plant.floating:
+                words = "velocity of base_link's origin in the world, angular velocity in base_link"
+                yield _per_rollout("base_twist", ("step", "twist"), DOUBLE, np.nan, "m/s; rad/s", words)
+        case "ctrl":
+            words = "control applied from the beginning of the interval"
+            yield _per_rollout("ctrl", ("interval", "actuator"), DOUBLE, np.nan, "see actuator_unit", words)
+        case "tool_pose":
+            words = "pose of tool0 in the world"
+            yield _per_rollout("tool_pose", ("step", "pose"), DOUBLE, np.nan, "m; unit quaternion", words)
+        case "reference":
+            if settings.controller.follows:
+                dimensions = ("step", "joint")
+                yield _per_rollout("qpos_ref", dimensions, DOUBLE, np.nan, JOINT_UNITS, "reference position")
+                yield _per_rollout("qvel_ref", dimensions, DOUBLE, np.nan, JOINT_RATES, "reference velocity")
+        case "qacc":
+            words = "joint acceleration at the beginning of the interval"
+            yield _per_rollout("qacc", ("interval", "joint"), DOUBLE, np.nan, "rad/s2 or m/s2", words)
+        case "torque":
+            words = "force of the actuators on the joint at the beginning of the interval"
+            yield _per_rollout("torque", ("interval", "joint"), DOUBLE, np.nan, FORCES, words)
+        case "energy":
+            yield _per_rollout("energy", ("step", "energy_kind"), DOUBLE, np.nan, "J", "mechanical energy")
+        case _:
+            words = "contacts at the beginning of the interval; -1 after an early stop"
+            yield _per_rollout("contacts", ("interval",), INT, -1, "1", words)
+
+
+def _coordinates(plant: Plant, settings: Settings) -> Iterator[Coordinate]:
+    sizes = run_sizes(plant, settings)
+    time = plant.timestep * settings.every * np.arange(settings.records + 1)
+    units = ["rad" if turns else "m" for turns in plant.turns]
+    yield Coordinate(name="rollout", dimension="rollout", values=np.arange(settings.rollouts, dtype=np.int64))
+    yield Coordinate(
+        name="time", dimension="step", values=time, attributes={"units": "s", "long_name": "time since the start"}
+    )
+    yield Coordinate(
+        name="interval_time",
+        dimension="interval",
+        values=time[:-1],
+        attributes={"units": "s", "long_name": "time at the beginning of the interval"},
+    )
+    yield Coordinate(name="joint", dimension="joint", values=plant.joints)
+    yield Coordinate(name="joint_unit", dimension="joint", values=units)
+    for name, values, words in (
+        ("joint_lower", plant.lower, "least position"),
+        ("joint_upper", plant.upper, "greatest position"),
+        ("joint_velocity_limit", plant.velocity, "greatest speed that references have"),
+    ):
+        rate = JOINT_RATES if "velocity" in name else JOINT_UNITS
+        yield Coordinate(name=name, dimension="joint", values=values, attributes={"units": rate, "long_name": words})
+    labels: dict[str, tuple[str, ...]] = {
+        "actuator": plant.actuators,
+        "pose": POSE,
+        "energy_kind": ENERGY,
+        "twist": TWIST,
+        "link": tuple(plant.model.body(i).name for i in links(plant)),
+    }
+    for name, texts in labels.items():
+        if name in sizes:
+            yield Coordinate(name=name, dimension=name, values=texts)
+    if "actuator" in sizes:
+        yield Coordinate(name="actuator_unit", dimension="actuator", values=_actuator_units(plant))
+
+
+def _actuator_units(plant: Plant) -> list[str]:
+    units = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "motor": ("N*m", "N")}
+    return [
+        units[name.rsplit("_", 1)[1]][0 if plant.turns[joint] else 1]
+        for name, joint in zip(plant.actuators, plant.driven, strict=True)
+    ]

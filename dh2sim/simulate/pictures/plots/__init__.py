@@ -1,1 +1,0 @@
-"""Plots of a rollout, by matplotlib; nothing here touches its global figures."""

@@ -1,0 +1,148 @@
+"""Links that touch by construction must never make contacts, and nothing may touch where the robot rests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+
+from dh2sim.export import sampling_limits
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.typing import Array
+from dh2sim.validate.motion.free_motion import compile_model
+from dh2sim.validate.report import Check, Quantity, Worst, finding
+
+WAYPOINTS = 16
+"""Random configurations of a tour, joined by straight lines in joint space."""
+POINTS = 40
+"""Configurations on each line."""
+
+Pair = tuple[str, str]
+"""Names of two links, in the order of the chain."""
+
+
+@dataclass(slots=True, kw_only=True)
+class _Offences:
+    """The deepest contact that there must not be."""
+
+    depth: float = 0.0
+    text: str = ""
+    worst: Worst | None = None
+    pairs: set[Pair] = field(default_factory=set)
+
+    def add(self, pair: Pair, depth: float, q: Array, where: str, sample: int | None = None) -> None:
+        self.pairs.add(pair)
+        if self.worst is None or depth > self.depth:
+            self.depth = depth
+            self.text = f"{pair[0]} and {pair[1]} overlap by {depth:.2g} m {where}"
+            self.worst = Worst(where=f"{pair[0]}, {pair[1]}", q=tuple(q.tolist()), sample=sample)
+
+
+def check_self_contact(model: RobotModel, compiled: mujoco.MjModel, *, seed: int = 0) -> Check:
+    """Look for contacts between links that there must not be.
+
+    - In the configurations of the robot file, and at zero where the limits allow it, no links may touch.
+    - Along a random tour of the workspace no links may make a contact that touch by construction: neighbours on the
+      chain (fixed links count as one with the link that carries them), and links whose shapes overlap at home or at
+      zero when all may collide with all.
+    - No links may make a contact all along the tour: they, too, touch by construction.
+
+    Other contacts on the tour are what an arm may do to itself, and are no fault of its model.
+
+    Args:
+        model: the robot.
+        compiled: the robot as it is simulated.
+        seed: of the tour.
+
+    Returns:
+        A check whose error is the deepest overlap of two links that must not make a contact, m; none is allowed.
+    """
+    offences = _Offences()
+    collide = _Collider(compiled)
+    for name, q in _rests(model):
+        for pair, depth in collide.contacts(q).items():
+            offences.add(pair, depth, q, name)
+    apart = by_construction(model)
+    tour = random_tour(model, seed)
+    always: set[Pair] | None = None
+    deepest: dict[Pair, tuple[float, int]] = {}
+    for sample, q in enumerate(tour):
+        found = collide.contacts(q)
+        always = set(found) if always is None else always & set(found)
+        for pair, depth in found.items():
+            deepest[pair] = max(deepest.get(pair, (-1.0, 0)), (depth, sample))
+    for pair, (depth, sample) in deepest.items():
+        if pair in apart:
+            offences.add(pair, depth, tour[sample], "on a tour of the workspace, and touch by construction", sample)
+        elif always and pair in always:
+            offences.add(pair, depth, tour[sample], "and touch all along a tour of the workspace", sample)
+    more = len(offences.pairs) - 1
+    others = f"; so do other links, {more} pair{'s' if more > 1 else ''} more" if more > 0 else ""
+    touching = float(np.nextafter(0.0, 1.0))  # a contact of no depth is one, too
+    return finding(
+        Quantity.SELF_CONTACT,
+        max(offences.depth, touching) if offences.pairs else 0.0,
+        0.0,
+        samples=len(tour),
+        reference="table",
+        failure=f"{offences.text}{others}. Simulated, they would push each other away",
+        worst=offences.worst,
+    )
+
+
+def random_tour(model: RobotModel, seed: int) -> Array:
+    """Configurations along straight lines between random ones inside the limits, shape (N, n)."""
+    lower, upper = sampling_limits(model)
+    waypoints = np.random.default_rng([seed, 6]).uniform(lower, upper, (WAYPOINTS, len(lower)))
+    share = np.linspace(0.0, 1.0, POINTS, endpoint=False)[:, None]
+    lines = [start + share * (end - start) for start, end in pairwise(waypoints)]
+    return np.concatenate([*lines, waypoints[-1:]])
+
+
+def by_construction(model: RobotModel) -> set[Pair]:
+    """Pairs of links that touch by construction; found by MuJoCo, without the model's own list of them."""
+    body = [0]
+    for row in model.spec.rows:
+        body.append(body[-1] + (1 if row.type.moves else 0))
+    names = [link.name for link in model.all_links]
+    pairs = {
+        (names[i], names[j]) for i in range(len(names)) for j in range(i + 1, len(names)) if body[j] - body[i] <= 1
+    }
+    everything = _Collider(compile_model(replace(model, excluded=())))
+    for q in (model.home, np.zeros_like(model.home)):
+        pairs |= set(everything.contacts(q))
+    return pairs
+
+
+def _rests(model: RobotModel) -> Iterator[tuple[str, Array]]:
+    """Configurations in which a robot stands, each with words for it; zero only if it is inside the limits."""
+    lower, upper = sampling_limits(model)
+    zero = np.zeros_like(model.home)
+    if np.all((lower <= zero) & (zero <= upper)):
+        yield "at joint coordinates zero", zero
+    for name, q in {"home": model.home, **model.spec.configurations}.items():
+        yield f"in configuration '{name}'", q
+
+
+class _Collider:
+    """Finds which links of a model make contacts."""
+
+    def __init__(self, compiled: mujoco.MjModel) -> None:
+        self._model = compiled
+        self._data = mujoco.MjData(compiled)
+
+    def contacts(self, q: Array) -> dict[Pair, float]:
+        """Pairs of links that overlap, and how deep, m."""
+        self._data.qpos[:] = q
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_collision(self._model, self._data)
+        found: dict[Pair, float] = {}
+        for contact in self._data.contact:
+            bodies = sorted(int(self._model.geom_bodyid[geom]) for geom in contact.geom)
+            pair = (self._model.body(bodies[0]).name, self._model.body(bodies[1]).name)
+            found[pair] = max(found.get(pair, 0.0), -float(contact.dist))
+        return found

@@ -1,0 +1,230 @@
+"""Computed torque follows its reference as closely as sampled control can.
+
+Inverse dynamics of what was recorded give the forces that were recorded.
+
+An arm whose motors balance gravity stays where it is.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.simulate.run import rollout
+from dh2sim.typing import Array
+from dh2sim.validate.motion.free_motion import frictionless, untouchable, without_dry_friction
+from dh2sim.validate.report import Check, Quantity, Worst, finding, impossible
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+
+CONTROLLERS = ("sine", "computed-torque")
+"""One that looks at no state, with position actuators, and one that does, with motors."""
+INVERSE_ARMS = 2
+INVERSE_STEPS = 200
+INVERSE_TOLERANCE = 1e-9
+"""Of the greatest force that the joint sees."""
+
+
+def recorded_rollouts(model: RobotModel, *, seed: int = 0) -> tuple[xr.Dataset, ...]:
+    """Record accelerations and forces of a robot, once for each of ``CONTROLLERS``; without dry friction."""
+    return tuple(
+        rollout(
+            without_dry_friction(model),
+            rollouts=INVERSE_ARMS,
+            steps=INVERSE_STEPS,
+            controller=controller,
+            start="random",
+            record=("qpos", "qvel", "qacc", "torque"),
+            seed=seed,
+        )
+        for controller in CONTROLLERS
+    )
+
+
+def check_inverse(runs: Sequence[xr.Dataset]) -> Check:
+    """Require ``mj_inverse``, given positions, velocities and accelerations, to return the actuators' forces.
+
+    Instants at which a limit or a contact pushes are left out: there ``mj_inverse`` and the simulation agree as well
+    as MuJoCo's solver has converged, and no better. So are those after a rollout became unstable.
+
+    Args:
+        runs: what ``recorded_rollouts`` returned; the model is the one in their attributes.
+
+    Returns:
+        A check whose error is relative to the greatest force that the joint sees in the run: actuators', inertial, or
+        Coriolis, centrifugal and gravity forces together.
+    """
+    worst, where, count = -1.0, Worst(where="", q=()), 0
+    for run in runs:
+        model = mujoco.MjModel.from_xml_string(run.attrs["mjcf"])
+        K = run.sizes["interval"]
+        state = [run["qpos"].values[:, :K], run["qvel"].values[:, :K], run["qacc"].values]
+        columns = [values.reshape(-1, model.nv) for values in (*state, run["torque"].values)]
+        columns = _finite(columns)
+        free, inverse, forces = _inverse(model, *columns[:3])
+        if not free.any():
+            continue
+        torque = columns[3]
+        size = np.maximum(np.abs(forces), np.abs(torque)).max(axis=0)
+        error = np.abs(inverse - torque)[free] / np.maximum(size, np.finfo(float).tiny)
+        count += len(error)
+        instant, joint = (int(k) for k in np.unravel_index(np.argmax(error), error.shape))
+        if error[instant, joint] > worst:
+            worst = float(error[instant, joint])
+            where = Worst(where=str(run["joint"].values[joint]), q=tuple(columns[0][free][instant].tolist()))
+    if not count:
+        return impossible(Quantity.INVERSE, "limits or contacts push at every recorded instant")
+    return finding(
+        Quantity.INVERSE,
+        worst,
+        INVERSE_TOLERANCE,
+        samples=count,
+        reference="mj_inverse",
+        failure=f"the force recorded of {where.where} differs by {worst:.2g} of its greatest from what the recorded "
+        f"acceleration takes (tolerance {INVERSE_TOLERANCE:g})",
+        worst=where,
+    )
+
+
+def _finite(columns: list[Array]) -> list[Array]:
+    rows = np.logical_and.reduce([np.isfinite(column).all(axis=1) for column in columns])
+    return [column[rows] for column in columns]
+
+
+def _inverse(model: mujoco.MjModel, q: Array, v: Array, a: Array) -> tuple[np.ndarray, Array, Array]:
+    """For N instants: whether no constraint is active, shape (N,), and the inverse dynamics' forces, shape (N, nv).
+
+    The third are the greatest of the forces that add up to the second.
+    """
+    data = mujoco.MjData(model)
+    free = np.empty(len(q), dtype=bool)
+    inverse, greatest = np.empty_like(q), np.empty_like(q)
+    inertial = np.empty(model.nv)
+    for k in range(len(q)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
+        mujoco.mj_inverse(model, data)
+        mujoco.mj_mulM(model, data, inertial, a[k])
+        free[k] = data.nefc == 0
+        inverse[k] = data.qfrc_inverse
+        greatest[k] = np.maximum.reduce([np.abs(inertial), np.abs(data.qfrc_bias), np.abs(data.qfrc_passive)])
+    return free, inverse, greatest
+
+
+POSES = 8
+DURATION = 1.0
+"""s."""
+REST_TOLERANCE = 1e-9
+"""rad or m."""
+
+
+def resting_rollouts(model: RobotModel, *, controller: str = "gravity-compensation", seed: int = 0) -> xr.Dataset:
+    """Let a robot stand in random poses, without friction, which would hide what is not balanced."""
+    return rollout(
+        untouchable(frictionless(model)),
+        rollouts=POSES,
+        duration=DURATION,
+        controller=controller,
+        start="random",
+        record=("qpos",),
+        seed=seed,
+    )
+
+
+def check_rest(run: xr.Dataset) -> Check:
+    """Require an arm to stay where it started.
+
+    Args:
+        run: what ``resting_rollouts`` returned. Rollouts in which a motor is too weak for the weight that it carries
+            are left out.
+
+    Returns:
+        A check whose error is the farthest that any joint moved in a second, rad or m.
+    """
+    held = ~(run["saturation"].values > 0).any(axis=1)
+    if not held.any():
+        return impossible(Quantity.REST, "the motors are too weak to carry the arm in any of its random poses")
+    run = run.isel(rollout=held)
+    q = run["qpos"].values
+    moved = np.abs(q - q[:, :1])
+    moved = np.where(np.isfinite(moved), moved, np.inf).max(axis=1)
+    row, joint = (int(k) for k in np.unravel_index(np.argmax(moved), moved.shape))
+    farthest = float(moved[row, joint])
+    name, unit = str(run["joint"].values[joint]), str(run["joint_unit"].values[joint])
+    return finding(
+        Quantity.REST,
+        farthest,
+        REST_TOLERANCE,
+        samples=len(q),
+        failure=f"{name} moves by {farthest:.2g} {unit} (tolerance {REST_TOLERANCE:g}) "
+        "though its motor balances gravity",
+        worst=Worst(where=name, q=tuple(q[row, 0].tolist()), sample=int(run["rollout"].values[row])),
+    )
+
+
+TRACKING_ARMS = 8
+PERIODS = (1.0, 2.0, 4.0, 8.0, 16.0)
+"""s: durations of a motion from waypoint to waypoint, tried in turn until no motor is too weak for it."""
+TRACKING_STEPS = 250
+"""Time steps of such a motion; there are two of them."""
+BANDWIDTH = 20.0
+"""Of the controller, rad/s, times the duration."""
+TRACKING_TOLERANCE = 0.2
+"""Of the way that a joint makes in a time step at its greatest speed. Theory gives 0.14 whatever the arm: the errors
+of computed torque know nothing of its masses, and only come from controls that are constant during a time step."""
+STANDING = 1e-9
+"""rad or m: way of a joint that stands still, as errors go."""
+
+
+def tracking_rollouts(model: RobotModel, *, controller: str = "computed-torque", seed: int = 0) -> xr.Dataset:
+    """Let a robot follow smooth random references, without friction and contacts, as fast as its motors allow."""
+    for period in PERIODS:
+        run = rollout(
+            untouchable(frictionless(model)),
+            rollouts=TRACKING_ARMS,
+            steps=2 * TRACKING_STEPS,
+            timestep=period / TRACKING_STEPS,
+            controller=f"{controller}:period={period:g},bandwidth={BANDWIDTH / period:g}",
+            start="random",
+            record=("qpos", "qvel", "reference"),
+            seed=seed,
+        )
+        if not run["saturation"].values.any():
+            break
+    return run
+
+
+def check_tracking(run: xr.Dataset) -> Check:
+    """Require every joint to be close to its reference all the time.
+
+    Args:
+        run: what ``tracking_rollouts`` returned. Rollouts in which a motor is too weak are left out.
+
+    Returns:
+        A check whose error is in units of the way that the joint makes in a time step at its greatest speed, so that
+        it means the same for slides and for joints that turn, for small robots and for large ones.
+    """
+    strong = ~(run["saturation"].values > 0).any(axis=1)
+    if not strong.any():
+        return impossible(Quantity.TRACKING, "the motors are too weak for any motion that was tried")
+    run = run.isel(rollout=strong)
+    error = np.abs(run["qpos"].values - run["qpos_ref"].values)
+    error = np.where(np.isfinite(error), error, np.inf).max(axis=1)
+    speed = np.abs(run["qvel_ref"].values).max(axis=(0, 1))
+    relative = error / np.maximum(speed * float(run.attrs["timestep"]), STANDING)
+    row, joint = (int(k) for k in np.unravel_index(np.argmax(relative), relative.shape))
+    name, unit = str(run["joint"].values[joint]), str(run["joint_unit"].values[joint])
+    return finding(
+        Quantity.TRACKING,
+        float(relative[row, joint]),
+        TRACKING_TOLERANCE,
+        samples=len(error),
+        failure=f"{name} is {error[row, joint]:.2g} {unit} off its reference, {relative[row, joint]:.2g} of the way "
+        f"that it makes in a time step (tolerance {TRACKING_TOLERANCE:g})",
+        worst=Worst(where=name, q=tuple(run["qpos"].values[row, 0].tolist()), sample=int(run["rollout"].values[row])),
+    )

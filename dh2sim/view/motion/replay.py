@@ -1,0 +1,151 @@
+"""Recorded motion, to be looked at again: the rollouts of a run, by time."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dh2sim.errors import RunError
+from dh2sim.kinematics.transforms import identity
+from dh2sim.messages import listed
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.simulate.dataset_layout import FINISHED, NOT_RUN
+from dh2sim.typing import Array, read_only
+
+if TYPE_CHECKING:
+    from dh2sim.draw.motion import Motion
+    from dh2sim.draw.rollout_data import RolloutData
+
+KEPT = 8
+"""Rollouts that stay in memory once they were looked at."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Recorded:
+    """One rollout."""
+
+    motion: Motion
+    q: Array
+    """In the order of the table, shape (N, n)."""
+    base: Array | None
+    """Poses of base_link in the world, shape (N, 4, 4); None where it stands still."""
+    stopped: str
+
+
+class Replay:
+    """A run; made by ``open_replay``. A rollout is read when it is first asked for."""
+
+    def __init__(self, path: Path, *, joints: tuple[str, ...], rollouts: tuple[int, ...], note: str) -> None:
+        """Keep what all rollouts share.
+
+        Args:
+            path: of the run.
+            joints: names of the joints in the order that joint vectors are wanted in.
+            rollouts: numbers of those that can be shown.
+            note: what a user should know of the run, a sentence, or empty.
+        """
+        self.path = path
+        self.joints = joints
+        """Names of the joints in the order of a joint vector."""
+        self.rollouts = rollouts
+        """Numbers of the rollouts that have been run."""
+        self.note = note
+        """A sentence where the robot of the run may not be the one that is shown; else empty."""
+        self._recorded = functools.lru_cache(maxsize=KEPT)(self._read)
+
+    def times(self, rollout: int) -> Array:
+        """Return the instants that were recorded until the rollout ended, s, ascending, shape (N,).
+
+        Raises:
+            PictureError: there is no such rollout, it has not been run, or positions were not recorded.
+            RunError: the run cannot be read. All methods raise these errors.
+        """
+        return self._recorded(rollout).motion.time
+
+    def duration(self, rollout: int) -> float:
+        """Return the last of them, s."""
+        return float(self.times(rollout)[-1])
+
+    def q_at(self, rollout: int, t: float) -> Array:
+        """Return the joint positions that were recorded nearest to ``t``, s; rad or m, shape (n,)."""
+        recorded = self._recorded(rollout)
+        return np.asarray(recorded.q[recorded.motion.nearest(t)])
+
+    def base_at(self, rollout: int, t: float) -> Array | None:
+        """Return base_link's pose in the world nearest to ``t``, s, shape (4, 4); None where it does not float."""
+        recorded = self._recorded(rollout)
+        return None if recorded.base is None else np.asarray(recorded.base[recorded.motion.nearest(t)])
+
+    def stopped(self, rollout: int) -> str:
+        """Return why a rollout stopped early, a sentence; empty if it did not."""
+        return self._recorded(rollout).stopped
+
+    def _read(self, rollout: int) -> _Recorded:
+        from dh2sim.draw.motion import motion_of_run
+        from dh2sim.draw.rollout_data import open_rollout
+
+        data = open_rollout(self.path, rollout)
+        data.require("qpos", what="a replay")
+        motion = motion_of_run(data)
+        names = data.names("joint")
+        q = data.values("qpos")[:, [names.index(name) for name in self.joints]]
+        base = _base_poses(motion) if motion.floats else None
+        return _Recorded(motion=motion, q=read_only(q), base=base, stopped=_why(data))
+
+
+def open_replay(path: Path, model: RobotModel | None) -> Replay:
+    """Open a run, finished or not.
+
+    Args:
+        path: of the run.
+        model: the robot that is to be shown in the run's positions; None: whichever it was made with.
+
+    Raises:
+        RunError: there is no run, it is damaged, none of its rollouts has been run, or it is one of another robot.
+    """
+    from dh2sim.simulate.store.reader import open_dataset, reading
+
+    with open_dataset(path) as run:
+        names = tuple(str(name) for name in run["joint"].values)
+        with reading(path):
+            status = np.asarray(run["status"].values) if "status" in run else np.full(run.sizes["rollout"], FINISHED)
+        robot, digest = str(run.attrs.get("robot", "")), run.attrs.get("robot_file_sha256", "")
+    rollouts = tuple(int(number) for number in np.flatnonzero(status != NOT_RUN))
+    if not rollouts:
+        raise RunError(f"'{path}': no rollout has been run yet")
+    if model is None:
+        return Replay(path, joints=names, rollouts=rollouts, note="")
+    joints = tuple(joint.name for joint in model.moving_joints)
+    if set(joints) != set(names):
+        raise RunError(
+            f"'{path}' is a run of {robot} with the joints {listed(names)}; {model.name} has {listed(joints)}"
+        )
+    source = model.spec.source_file
+    same = source is not None and source.sha256 == digest
+    note = "" if same else f"The run was made with another text of {robot}'s file: what is shown may differ from it."
+    return Replay(path, joints=joints, rollouts=rollouts, note=note)
+
+
+def _base_poses(motion: Motion) -> Array:
+    """Return base_link's poses in the world by the run's own model, shape (N, 4, 4)."""
+    import mujoco
+
+    data = mujoco.MjData(motion.model)
+    poses = np.tile(identity(), (len(motion.qpos), 1, 1))
+    link = motion.model.body("base_link").id
+    for pose, qpos in zip(poses, motion.qpos, strict=True):
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(motion.model, data)
+        pose[:3, :3], pose[:3, 3] = data.xmat[link].reshape(3, 3), data.xpos[link]
+    return read_only(poses)
+
+
+def _why(rollout: RolloutData) -> str:
+    """Return why a rollout stopped early, a sentence; empty if it did not."""
+    if not rollout.reason:
+        return ""
+    return f"Rollout {rollout.number} stopped in time step {rollout.stop_step}: {rollout.reason.replace('_', ' ')}."

@@ -1,0 +1,1 @@
+"""What a state looks like: items derived from it, and the painter that sends them to a page."""

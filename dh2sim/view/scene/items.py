@@ -1,0 +1,143 @@
+"""Frames that stand side by side as one item: sent in one message, and drawn in one go.
+
+What a scene is made of: plain values, so that scenes can be compared, and tested without a browser.
+
+An item's name is its place in the scene's tree: ``/robot/link_2/shape_0`` moves with ``/robot/link_2``. Poses
+are in the parent's frame. Numbers are tuples, so that items compare by value.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+Vector: TypeAlias = tuple[float, float, float]
+Quaternion: TypeAlias = tuple[float, float, float, float]
+"""(w, x, y, z)."""
+Color: TypeAlias = tuple[float, float, float]
+"""Red, green, blue, each from 0 to 1."""
+
+STILL: Quaternion = (1.0, 0.0, 0.0, 0.0)
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Placed:
+    """Anything that stands somewhere; by itself an invisible frame that carries others."""
+
+    position: Vector = ORIGIN
+    """m."""
+    orientation: Quaternion = STILL
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Solid(Placed):
+    """A surface: a capsule, cylinder, sphere, box, or one made of triangles."""
+
+    vertices: tuple[Vector, ...] = field(repr=False)
+    """m."""
+    faces: tuple[tuple[int, int, int], ...] = field(repr=False)
+    color: Color
+    opacity: float = 1.0
+    plain: bool = False
+    """Whether it is shaded in a few steps, which is faster where there is no graphics card."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Triad(Placed):
+    """The axes of a frame: x red, y green, z blue."""
+
+    length: float
+    """m."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Triads(Placed):
+    """The axes of many frames, as one item: a browser draws them much faster so."""
+
+    positions: tuple[Vector, ...]
+    """m."""
+    orientations: tuple[Quaternion, ...]
+    length: float
+    """m."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Polyline(Placed):
+    """A line through points; an arc, a trace, a dashed axis."""
+
+    points: tuple[Vector, ...] = field(repr=False)
+    """m."""
+    color: Color
+    width: float = 2.0
+    """Pixels."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lines(Placed):
+    """Lines of their own, each from one point to another."""
+
+    segments: tuple[tuple[Vector, Vector], ...] = field(repr=False)
+    """m."""
+    color: Color
+    width: float = 2.0
+    """Pixels."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arrow(Placed):
+    """An arrow from one point to another."""
+
+    start: Vector
+    end: Vector
+    color: Color
+    thickness: float
+    """Of the shaft, m."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Label(Placed):
+    """A text that always faces the eye."""
+
+    text: str
+    color: Color = (0.1, 0.1, 0.1)
+
+
+Item: TypeAlias = Placed | Solid | Triad | Triads | Polyline | Lines | Arrow | Label
+Scene: TypeAlias = Mapping[str, Item]
+"""Items by name."""
+
+
+def batched(scene: Scene) -> Scene:
+    """Return a scene that looks the same, with all triads of a parent and a length as one item.
+
+    Triads that carry something stay as they are.
+
+    Args:
+        scene: Items by name.
+
+    Returns:
+        Items by name; triads that were below ``/frames`` are ``/frames/axes_0``, with other lengths ``axes_1`` ...
+    """
+    carriers = {_parent(name) for name in scene}
+    rest: dict[str, Item] = {}
+    groups: dict[str, dict[float, list[Triad]]] = defaultdict(lambda: defaultdict(list))
+    for name, item in scene.items():
+        if isinstance(item, Triad) and name not in carriers:
+            groups[_parent(name)][item.length].append(item)
+        else:
+            rest[name] = item
+    for parent, lengths in groups.items():
+        for number, (length, triads) in enumerate(lengths.items()):
+            rest[f"{parent}/axes_{number}"] = Triads(
+                positions=tuple(triad.position for triad in triads),
+                orientations=tuple(triad.orientation for triad in triads),
+                length=length,
+            )
+    return rest
+
+
+def _parent(name: str) -> str:
+    return name.rpartition("/")[0]

@@ -1,0 +1,212 @@
+"""Links as solids made of triangles: one way for the robot, the ghost and the page.
+
+``robot_solids`` gives all of a robot at a configuration, ``link_solids`` what hangs below a link's frame. Triangles
+are made once for every size of a shape and every mesh file and then shared, so that scenes compare quickly, those of
+an edited robot too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import lru_cache
+from itertools import pairwise
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dh2sim.kinematics.transforms import compose, quaternion_from_rotation
+from dh2sim.model.meshes import STL_FACE, STL_HEADER, MeshAsset
+from dh2sim.model.robot_model import LinkModel, RobotModel
+from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
+from dh2sim.typing import Array
+from dh2sim.view.scene.items import Color, Item, Placed, Quaternion, Solid, Vector
+from dh2sim.view.scene.link_poses import stance_of
+
+SIDES = 32
+"""Of a round shape's cross-section; its corners lie on the true surface, and so it is up to 1.5 % too small."""
+RINGS = 8
+"""Between the equator and the pole of a capsule's end."""
+_SHAPES_KEPT = 128
+"""Of up to a seventh of a megabyte each; every edit of a table makes a few new ones."""
+_MESHES_KEPT = 32
+_ROBOTS_KEPT = 6
+"""The robot, seen through or not, and its ghost; of a few pages."""
+
+Triangles: TypeAlias = tuple[tuple[Vector, ...], tuple[tuple[int, int, int], ...]]
+"""Vertices, m, and the three corners of every face, anticlockwise from outside."""
+_Profile: TypeAlias = list[tuple[float, float]]
+"""Radii and heights of rings, from below."""
+
+
+def link_solids(
+    link: LinkModel, T_link_dh: Array, *, color: Color | None = None, opacity: float | None = None
+) -> dict[str, Solid]:
+    """Return what shows a link.
+
+    Args:
+        link: The link.
+        T_link_dh: Pose of the link's DH frame in the link's frame, which carries its mesh: a joint's ``T_joint_dh``,
+            and ``T_base_link_dh0`` for the base link; shape (4, 4).
+        color: Instead of the link's own colours.
+        opacity: Instead of the link's own.
+
+    Returns:
+        ``mesh`` alone, or ``shape_0``, ``shape_1``, …; each placed in the link's frame.
+    """
+    if link.mesh is not None:
+        vertices, faces = mesh_triangles(link.mesh)
+        T_link_mesh = compose(T_link_dh, link.mesh.T_dh_mesh)
+        return {"mesh": _solid(vertices, faces, T_link_mesh, link.color, color, opacity)}
+    solids = {}
+    for number, shape in enumerate(link.shapes):
+        vertices, faces = shape_triangles(shape)
+        own = link.joint_color if shape.part is ShapePart.JOINT else link.color
+        solids[f"shape_{number}"] = _solid(vertices, faces, shape.T_link_shape, own, color, opacity)
+    return solids
+
+
+def robot_solids(
+    model: RobotModel, q: ArrayLike, root: str, *, color: Color | None = None, opacity: float | None = None
+) -> dict[str, Item]:
+    """Return a robot at a configuration.
+
+    Args:
+        model: The robot.
+        q: Joint vector, rad and m, shape (n,).
+        root: Name of the item that carries it, such as ``/robot``.
+        color: Of all links, instead of their own colours.
+        opacity: Likewise.
+
+    Returns:
+        ``root`` in base_link, a frame ``root/link_2`` at every link, and below it what ``link_solids`` gives. Only
+        the frames' poses change with ``q``.
+
+    Raises:
+        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
+    """
+    items: dict[str, Item] = {root: Placed()}
+    for link, T in zip(model.all_links, stance_of(model, q).links, strict=True):
+        items[f"{root}/{link.name}"] = Placed(position=position_of(T), orientation=orientation_of(T))
+    return {**items, **_fixed_solids(model, root, color, opacity)}
+
+
+@lru_cache(maxsize=_ROBOTS_KEPT)
+def _fixed_solids(model: RobotModel, root: str, color: Color | None, opacity: float | None) -> Mapping[str, Solid]:
+    """Return what hangs below the links' frames, which is the same at every configuration."""
+    dh_frames = [model.chain.T_base_link_dh0, *(joint.T_joint_dh for joint in model.chain.joints)]
+    return {
+        f"{root}/{link.name}/{name}": solid
+        for link, T_link_dh in zip(model.all_links, dh_frames, strict=True)
+        for name, solid in link_solids(link, T_link_dh, color=color, opacity=opacity).items()
+    }
+
+
+def shape_triangles(shape: Shape) -> Triangles:
+    """Return a shape as a closed surface, in the shape's own frame; the rim of a cylinder has its points twice."""
+    return _shape_triangles(shape.kind, shape.radius, shape.length)
+
+
+@lru_cache(maxsize=_SHAPES_KEPT)
+def _shape_triangles(kind: ShapeKind, radius: float, length: float) -> Triangles:
+    half = 0.5 * length
+    match kind:
+        case ShapeKind.CYLINDER:
+            # the ends have points of their own: so their rims are drawn sharp
+            below, side, above = (
+                [(0.0, -half), (radius, -half)],
+                [(radius, -half), (radius, half)],
+                [(radius, half), (0.0, half)],
+            )
+            return _joined([_turned(profile) for profile in (below, side, above)])
+        case ShapeKind.CAPSULE:
+            return _turned(_capsule_profile(radius, half))
+
+
+def mesh_triangles(mesh: MeshAsset) -> Triangles:
+    """Return a mesh in its own frame, m; corners that coincide become one."""
+    return _mesh_triangles(mesh.data, mesh.scale)
+
+
+@lru_cache(maxsize=_MESHES_KEPT)
+def _mesh_triangles(data: bytes, scale: float) -> Triangles:
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    count = (len(data) - STL_HEADER) // STL_FACE
+    corners = np.frombuffer(data, dtype=record, count=count, offset=STL_HEADER)["corners"].reshape(-1, 3)
+    points, indices = np.unique(corners, axis=0, return_inverse=True)
+    scaled = points.astype(np.float64) * scale
+    return (
+        tuple((x, y, z) for x, y, z in scaled.tolist()),
+        tuple((a, b, c) for a, b, c in indices.reshape(-1, 3).tolist()),
+    )
+
+
+def position_of(T: Array) -> Vector:
+    """Return where a pose, shape (4, 4), is, m."""
+    x, y, z = (float(component) for component in T[:3, 3])
+    return x, y, z
+
+
+def orientation_of(T: Array) -> Quaternion:
+    """Return how a pose, shape (4, 4), is turned, (w, x, y, z)."""
+    w, x, y, z = (float(component) for component in quaternion_from_rotation(T))
+    return w, x, y, z
+
+
+def _solid(
+    vertices: tuple[Vector, ...],
+    faces: tuple[tuple[int, int, int], ...],
+    T_link_solid: Array,
+    own: tuple[float, float, float, float],
+    color: Color | None,
+    opacity: float | None,
+) -> Solid:
+    return Solid(
+        position=position_of(T_link_solid),
+        orientation=orientation_of(T_link_solid),
+        vertices=vertices,
+        faces=faces,
+        color=own[:3] if color is None else color,
+        opacity=own[3] if opacity is None else opacity,
+    )
+
+
+def _capsule_profile(radius: float, half: float) -> _Profile:
+    below = [
+        (radius * math.cos(angle), -half + radius * math.sin(angle))
+        for angle in (-0.5 * math.pi * (RINGS - k) / RINGS for k in range(1, RINGS + 1))
+    ]
+    above = [(r, -z) for r, z in reversed(below)]
+    return [(0.0, -half - radius), *below, *above, (0.0, half + radius)]
+
+
+def _turned(profile: _Profile) -> Triangles:
+    """Turn a profile about z; a ring of no radius is a single point."""
+    vertices: list[Vector] = []
+    rings = []
+    for radius, z in profile:
+        first = len(vertices)
+        if radius == 0.0:
+            vertices.append((0.0, 0.0, z))
+            rings.append([first] * SIDES)
+        else:
+            turns = (math.tau * k / SIDES for k in range(SIDES))
+            vertices.extend((radius * math.cos(turn), radius * math.sin(turn), z) for turn in turns)
+            rings.append(list(range(first, first + SIDES)))
+    faces: list[tuple[int, int, int]] = []
+    for lower, upper in pairwise(rings):
+        for k in range(SIDES):
+            a, b, c, d = lower[k], lower[(k + 1) % SIDES], upper[(k + 1) % SIDES], upper[k]
+            faces.extend(face for face in ((a, b, c), (a, c, d)) if len(set(face)) == 3)
+    return tuple(vertices), tuple(faces)
+
+
+def _joined(parts: list[Triangles]) -> Triangles:
+    vertices: list[Vector] = []
+    faces: list[tuple[int, int, int]] = []
+    for points, triangles in parts:
+        first = len(vertices)
+        vertices.extend(points)
+        faces.extend((a + first, b + first, c + first) for a, b, c in triangles)
+    return tuple(vertices), tuple(faces)

@@ -1,0 +1,176 @@
+"""Which reader a file needs, and what is asked of it."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dh2sim.errors import Dh2simError, ImportedFileError, MismatchError
+from dh2sim.importing import serial
+from dh2sim.importing.importing import ImportOptions, import_data, import_robot
+from dh2sim.importing.serial import assemble
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.spec import AngleUnit, Convention, RobotSpec
+
+ARM = """\
+<?xml version="1.0"?>
+<!-- a <mujoco> in a comment is none -->
+<robot name="two arm">
+  <link name="ground"/>
+  <link name="upper"><inertial>
+    <origin xyz="0.2 0 0" rpy="0 0 1.5707963267948966"/><mass value="2"/>
+    <inertia ixx="0.01" iyy="0.02" izz="0.025" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="fore"/>
+  <link name="hand"/>
+  <joint name="shoulder" type="revolute">
+    <parent link="ground"/><child link="upper"/><origin xyz="0 0 0.3" rpy="1.5707963267948966 0 0"/>
+    <axis xyz="0 0 1"/><limit lower="-1" upper="2" velocity="3" effort="40"/>
+  </joint>
+  <joint name="fore arm" type="continuous">
+    <parent link="upper"/><child link="fore"/><origin xyz="0.4 0 0"/><axis xyz="0 0 -1"/>
+  </joint>
+  <joint name="wrist" type="fixed"><parent link="fore"/><child link="hand"/><origin xyz="0.2 0 0"/></joint>
+</robot>
+"""
+
+
+def _refused(data: str | bytes, options: ImportOptions = ImportOptions(), file: str = "arm.urdf") -> str:  # noqa: B008
+    raw = data.encode() if isinstance(data, str) else data
+    with pytest.raises(Dh2simError) as caught:
+        import_data(raw, file, options)
+    return str(caught.value)
+
+
+def test_a_urdf_becomes_a_robot_file_that_says_where_it_is_from() -> None:
+    imported = import_data(ARM.encode(), "arm.urdf", ImportOptions())
+    spec, residual = imported.spec, imported.residual
+    assert spec.name == "two_arm"
+    assert [(row.name, row.type.value, row.a) for row in spec.rows] == [
+        ("shoulder", "revolute", 0.4),
+        ("fore_arm", "continuous", 0.2),
+    ]
+    assert residual is not None
+    assert residual.largest < 1e-15
+    assert residual.configurations == 1000
+    assert spec.source == (
+        f"URDF arm.urdf, from ground to hand (SHA-256 {hashlib.sha256(ARM.encode()).hexdigest()[:16]}…). Made by "
+        "dh2sim; at 1000 random configurations all joint axes and the tip differ from the source's by at most "
+        f"{residual.position:.1e} m and {residual.rotation:.1e} rad."
+    )
+    assert "Joint 'fore arm' is named fore_arm here: a robot file does not allow its name." in imported.notes
+    assert "# Note: Joint 'fore arm' is named fore_arm" in imported.text
+
+
+def test_limits_mass_and_inertia_are_those_of_the_file_in_the_dh_frame() -> None:
+    row = import_data(ARM.encode(), "arm.urdf", ImportOptions()).spec.rows[0]
+    assert row.limits.position == pytest.approx((-1.0, 2.0), abs=1e-15)
+    assert row.limits.velocity == pytest.approx(3.0)
+    assert row.limits.effort == 40.0
+    link = row.link
+    assert link.mass == 2.0
+    assert link.com is not None
+    assert link.inertia is not None
+    # DH frame 1 is at the elbow, turned by half a turn about x: the next axis points the other way
+    assert link.com == pytest.approx([-0.2, 0.0, 0.0])
+    assert link.inertia.diagonal() == pytest.approx([0.02, 0.01, 0.025])
+
+
+def test_by_hand_the_tip_is_where_the_file_says() -> None:
+    """At (0, 0) the arm lies along x at a height of 0.3 m."""
+    spec = import_data(ARM.encode(), "arm.urdf", ImportOptions()).spec
+    assert table_tool_pose(spec, [0.0, 0.0])[:3, 3] == pytest.approx([0.6, 0.0, 0.3])
+    assert table_tool_pose(spec, [1.5707963267948966, 0.0])[:3, 3] == pytest.approx([0.0, 0.0, 0.9])
+
+
+def test_base_tip_name_and_convention_are_what_is_asked_for() -> None:
+    options = ImportOptions(base="upper", tip="fore", convention=Convention.MODIFIED, name="elbow")
+    spec = import_data(ARM.encode(), "arm.urdf", options).spec
+    assert (spec.name, spec.convention, len(spec.rows)) == ("elbow", Convention.MODIFIED, 1)
+    assert spec.base.pose.xyz.any() or spec.rows[0].a == 0.4
+
+
+def test_the_content_says_what_a_file_is_not_its_ending(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    assert import_robot(path).spec.name == "two_arm"
+
+
+def test_a_table_is_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "planar.csv"
+    path.write_text("theta,d (m),a (m),alpha (deg)\nq1,0,0.5,0\nq2,0,0.3,90\n")
+    spec = import_robot(path, ImportOptions(convention=Convention.STANDARD)).spec
+    assert (spec.name, [row.a for row in spec.rows]) == ("planar", [0.5, 0.3])
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        (
+            "<sdf version='1.9'/>",
+            "arm.urdf: a file of <sdf> is not read. Read are URDF (<robot>), MJCF (<mujoco>), and tables in "
+            "Markdown, CSV or TSV. Convert it to URDF first.",
+        ),
+        (
+            "<html><body/></html>",
+            "arm.urdf: a file of <html> is not read. Read are URDF (<robot>), MJCF (<mujoco>), and tables in "
+            "Markdown, CSV or TSV.",
+        ),
+    ],
+    ids=["sdf", "html"],
+)
+def test_other_formats_are_refused(data: str, expected: str) -> None:
+    assert _refused(data) == expected
+
+
+def test_what_is_for_tables_is_refused_for_a_urdf_and_the_other_way_round() -> None:
+    assert _refused(ARM, ImportOptions(angle=AngleUnit.DEG)) == (
+        "arm.urdf: --angle and --length are for tables; this is URDF, which has its own units"
+    )
+    assert _refused("theta,d,a,alpha\n", ImportOptions(tip="hand"), "t.csv") == (
+        "t.csv: --base and --tip are for URDF and MJCF; this is read as a table, without links"
+    )
+
+
+def test_an_mjcf_is_not_read_from_standard_input() -> None:
+    assert _refused("<mujoco/>", file="-") == (
+        "an MJCF is read from a file, not from standard input: it may include others"
+    )
+
+
+def test_a_missing_file_and_a_folder_are_told(tmp_path: Path) -> None:
+    for path, why in ((tmp_path / "no.urdf", "No such file or directory"), (tmp_path, "Is a directory")):
+        with pytest.raises(Dh2simError) as caught:
+            import_robot(path)
+        assert str(caught.value) == f"{path}: cannot be read: {why}"
+
+
+def test_an_entity_bomb_is_refused() -> None:
+    bomb = '<?xml version="1.0"?><!DOCTYPE r [<!ENTITY a "x"><!ENTITY b "&a;&a;">]><robot name="&b;"/>'
+    with pytest.raises(ImportedFileError):
+        import_data(bomb.encode(), "bomb.urdf", ImportOptions())
+
+
+def test_a_file_in_another_encoding_is_read_or_refused_as_what_it_is() -> None:
+    utf16 = ARM.replace('version="1.0"', 'version="1.0" encoding="utf-16"').encode("utf-16")
+    try:
+        assert import_data(utf16, "arm.urdf", ImportOptions()).spec.name == "two_arm"
+    except ImportedFileError as error:
+        assert str(error).startswith("arm.urdf:1:1: ")  # noqa: PT017
+
+
+def test_a_residual_above_the_tolerance_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A table that is off by a millimetre: what is compared is the text, so a wrong number anywhere is found."""
+
+    def wrong(*args: Any, **options: Any) -> RobotSpec:
+        spec = assemble(*args, **options)
+        return replace(spec, rows=(replace(spec.rows[0], a=spec.rows[0].a + 0.001), *spec.rows[1:]))
+
+    monkeypatch.setattr(serial, "assemble", wrong)
+    with pytest.raises(MismatchError) as caught:
+        import_data(ARM.encode(), "arm.urdf", ImportOptions())
+    assert str(caught.value).startswith("URDF arm.urdf, from ground to hand: the table is off by 1.0e-03 m and ")
+    assert "at the tip; allowed is 1e-09. Nothing was written." in str(caught.value)

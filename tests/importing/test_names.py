@@ -1,0 +1,53 @@
+"""Names of other formats as names that a robot file allows."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dh2sim.importing.serial import joint_names, robot_name
+from dh2sim.robot.schema import name_problem
+
+
+def test_names_that_are_allowed_stay() -> None:
+    names = ("shoulder_pan_joint", "A-1", "joint_2")
+    assert joint_names(names) == (names, [])
+
+
+@pytest.mark.parametrize(
+    ("name", "changed"),
+    [
+        ("arm/joint.1", "arm_joint_1"),
+        ("2nd joint", "n2nd_joint"),
+        ("関節", "joint_1"),
+        ("link_3-flange", "link_3-flange_"),
+        ("x" * 200, "x" * 92),
+    ],
+)
+def test_a_name_that_is_not_allowed_is_changed_and_told(name: str, changed: str) -> None:
+    names, notes = joint_names([name])
+    assert names == (changed,)
+    assert len(notes) == 1
+    assert notes[0].endswith(f"is named {changed} here: a robot file does not allow its name.")
+
+
+def test_a_changed_name_is_not_one_that_is_taken() -> None:
+    assert joint_names(["a.b", "a_b", "a/b"])[0] == ("a_b_2", "a_b", "a_b_3")
+
+
+def test_a_joint_without_a_name_gets_the_default_one_in_silence() -> None:
+    assert joint_names(["", "shoulder", ""]) == (("joint_1", "shoulder", "joint_3"), [])
+
+
+@given(st.lists(st.text(max_size=8), min_size=1, max_size=8))
+def test_whatever_the_names_they_end_up_allowed_and_different(names: list[str]) -> None:
+    changed, _ = joint_names(names)
+    assert len(set(changed)) == len(names)
+    assert not any(name_problem(name) for name in changed)
+    assert name_problem(robot_name(names[0])) is None
+
+
+def test_a_robot_of_no_usable_name_is_a_robot() -> None:
+    assert robot_name("???") == "robot"
+    assert robot_name("UR5 (v2)") == "UR5_v2"

@@ -1,0 +1,86 @@
+"""Computed torque is as close to its reference as sampled control can be; what spoils that is found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dh2sim.simulate.run import rollout
+from dh2sim.validate.motion.tracking import check_tracking, tracking_rollouts
+from tests.export.robots import ODD
+from tests.robots.samples import NAMES
+from tests.validate.motion.robots import FRICTION, WEAK, built
+
+
+@pytest.mark.parametrize("robot", [*NAMES, ODD, FRICTION], ids=lambda text: text.split("\n")[0])
+def test_a_robot_follows_its_reference(robot: str) -> None:
+    check = check_tracking(tracking_rollouts(built(robot)))
+    assert check.ok
+    assert (check.samples, check.tolerance) == (8, 0.2)
+    assert check.max_error == pytest.approx(0.1413, abs=1e-3)
+
+
+def test_the_error_of_an_arm_is_that_of_a_unit_mass_under_the_same_sampled_control() -> None:
+    run = tracking_rollouts(built("puma560"))
+    assert run.attrs["controller"] == "computed-torque:bandwidth=20,period=1"
+    h, kp, kd = run.attrs["timestep"], 20.0**2, 2 * 20.0
+    reference, rate = run["qpos_ref"].values, run["qvel_ref"].values
+    # the minimum-jerk curve's acceleration, Δ/T² (60 s - 180 s² + 120 s³), from the waypoints that were recorded
+    s = np.arange(500) * h % 1.0
+    way = np.repeat(reference[:, [250, 500]] - reference[:, [0, 250]], 250, axis=1)
+    acceleration = way * (60 * s - 180 * s**2 + 120 * s**3)[None, :, None]
+    q, v = reference[:, 0].copy(), rate[:, 0].copy()
+    for k in range(500):
+        v += h * (acceleration[:, k] + kd * (rate[:, k] - v) + kp * (reference[:, k] - q))
+        q += h * v
+        np.testing.assert_allclose(run["qpos"].values[:, k + 1], q, rtol=0, atol=1e-11)
+
+
+def test_arms_with_weak_motors_follow_slower_references() -> None:
+    run = tracking_rollouts(built("ssrms"))
+    assert run.attrs["controller"] == "computed-torque:bandwidth=5,period=4"
+    assert run.attrs["timestep"] == 4 / 250
+    assert not run["saturation"].values.any()
+
+
+def test_motors_that_are_too_weak_for_any_motion_are_told() -> None:
+    check = check_tracking(tracking_rollouts(built(WEAK)))
+    assert check.ok is None
+    assert check.reason == "tracking: the motors are too weak for any motion that was tried"
+
+
+def test_a_controller_that_forgets_coriolis_forces_is_found_out() -> None:
+    check = check_tracking(tracking_rollouts(built("puma560"), controller=f"{__package__}.careless:Forgetful"))
+    assert check.ok is False
+    assert check.max_error is not None
+    assert check.max_error > 0.3
+
+
+def test_dry_friction_that_a_controller_knows_nothing_of_is_found_out() -> None:
+    run = rollout(
+        built(FRICTION), rollouts=2, steps=200, controller="computed-torque", record=("qpos", "qvel", "reference")
+    )
+    check = check_tracking(run)
+    assert check.ok is False
+    assert check.worst is not None
+    assert check.reason is not None
+    assert check.reason.startswith(f"{check.worst.where} is ")
+    assert check.reason.endswith(" of the way that it makes in a time step (tolerance 0.2)")
+
+
+def test_what_is_not_finite_is_off_its_reference() -> None:
+    run = tracking_rollouts(built("planar_2r"))
+    run["qpos"][3, -1, 1] = np.nan
+    check = check_tracking(run)
+    assert (check.ok, check.max_error) == (False, np.inf)
+
+
+def test_a_joint_that_stands_still_is_close_to_its_reference() -> None:
+    still = """\
+name: still
+convention: standard
+joints:
+  - {type: revolute, a: 0.4, limits: {position: [-2, 2]}}
+  - {type: revolute, a: 0.3, limits: {position: [0.5, 0.500000000000001]}}
+"""
+    assert check_tracking(tracking_rollouts(built(still))).ok
