@@ -62,11 +62,23 @@ def _cut_off() -> None:
 
 
 def interrupt_again(error: sys.UnraisableHookArgs) -> None:
-    """Interrupt once more where an interruption came to nothing, as in a callback of the garbage collector."""
-    if isinstance(error.exc_value, KeyboardInterrupt):
-        threading.Timer(0.01, _thread.interrupt_main).start()
+    """Repeat a signal whose exception came to nothing, as in a callback of the garbage collector."""
+    match error.exc_value:
+        case KeyboardInterrupt():
+            kind = signal.SIGINT
+        case SystemExit():
+            kind = signal.SIGTERM
+        case _:
+            sys.__unraisablehook__(error)
+            return
+    threading.Timer(0.01, _signal_main_thread, [kind]).start()
+
+
+def _signal_main_thread(kind: signal.Signals) -> None:
+    if hasattr(signal, "pthread_kill"):  # wakes the main thread, which may be asleep by now
+        signal.pthread_kill(threading.main_thread().ident or 0, kind)
     else:
-        sys.__unraisablehook__(error)
+        _thread.interrupt_main(kind)
 
 
 def _prepare_imports() -> None:

@@ -35,6 +35,25 @@ from dh2sim.cli.main import main
 main()
 """
 
+SIGNAL_LOST = """
+import signal, sys
+from dh2sim.cli.main import main
+from dh2sim.view.server import Viewer
+
+class Callback:
+    def __del__(self):  # Python drops whatever is raised here
+        signal.raise_signal(int(kind))
+
+def wait_after_the_signal(viewer):
+    callback = Callback()
+    del callback
+    wait(viewer)
+
+kind = sys.argv.pop(1)
+wait, Viewer.wait = Viewer.wait, wait_after_the_signal
+main()
+"""
+
 
 @contextlib.contextmanager
 def serving(*arguments: str | Path, program: Sequence[str] = ("-m", "dh2sim")) -> Iterator[subprocess.Popen[str]]:
@@ -142,6 +161,20 @@ def test_an_interruption_while_it_starts_is_no_traceback() -> None:
         assert process.returncode in (130, -signal.SIGINT)
         if process.returncode == 130:
             assert err == "dh2sim: interrupted\n"
+
+
+@pytest.mark.parametrize(
+    ("kind", "status", "message"),
+    [(signal.SIGINT, 130, "dh2sim: interrupted\n"), (signal.SIGTERM, 143, "")],
+    ids=["SIGINT", "SIGTERM"],
+)
+def test_a_signal_that_a_callback_swallows_still_wakes_and_ends_the_viewer(
+    kind: signal.Signals, status: int, message: str
+) -> None:
+    program = ["-c", SIGNAL_LOST, str(kind.value)]
+    with serving("stanford", "--port", str(unused_port()), program=program) as process:
+        _, err = process.communicate(timeout=TIMEOUT)
+    assert (process.returncode, err) == (status, message)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere 127.0.0.1 alone is this machine's own address")
