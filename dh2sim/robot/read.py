@@ -205,6 +205,7 @@ class _Converter:
             description=entry.description,
             source=entry.source,
             convention=entry.convention,
+            units=self._units,
             parameters=MappingProxyType(dict(entry.parameters)),
             base=BaseSpec(
                 pose=self._pose(entry.base),

@@ -239,6 +239,8 @@ class RobotSpec:
     """Where the numbers come from, in the author's words."""
     convention: Convention = Convention.STANDARD
     """Of rows that name none."""
+    units: Units = field(default_factory=Units)
+    """Units the robot file is written in; the numbers here are in SI units whatever they are."""
     parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     """Named constants, evaluated, in the file's own units."""
     base: BaseSpec = field(default_factory=BaseSpec)
