@@ -84,6 +84,10 @@ class PictureError(Dh2simError):
     """A picture cannot be made: nothing can draw here, or what it should show is not there."""
 
 
+class MissingExtraError(Dh2simError, ImportError):
+    """A library is not installed that comes with an extra of the package."""
+
+
 class RunError(Dh2simError):
     """Something is no run of dh2sim, or a run cannot be read."""
 

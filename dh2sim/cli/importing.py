@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dh2sim.cli.common import choice, hand_over, require_free, tolerance_of
+from dh2sim.errors import MissingExtraError
 
 if TYPE_CHECKING:
     from dh2sim.importing.result import Imported
@@ -148,6 +149,11 @@ def frames(
     drawing = picture
     if drawing is None and explain:
         drawing = (out.parent if out is not None else Path()) / f"{spec.name}-frames.svg"
+        try:
+            _require_picture_ending(drawing)
+        except MissingExtraError as error:
+            drawing = None
+            print(f"dh2sim: no picture is drawn: {error}", file=sys.stderr)
     require_free(drawing, force=force)
     folder = Path.cwd() if out is None else out.resolve().parent
     imported = import_axes(spec, convention=wanted, tolerance=allowed, explain=explain, folder=folder)

@@ -16,6 +16,7 @@ import typer
 
 from dh2sim.cli.common import FELL_SHORT, build_all, complain, make_console, print_whole, progress_bar
 from dh2sim.errors import Dh2simError, OutputError
+from dh2sim.extras import require_extra
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -67,6 +68,8 @@ def validate(
     """
     if not 0.0 < tolerance < 1.0:
         raise typer.BadParameter(f"{tolerance} is not between 0 and 1", param_hint="--tolerance")
+    if dynamics:
+        require_extra("data", "xarray", what="--dynamics")
     models = build_all(robots)
     if folder is not None:
         _require_folders(robots, models, folder)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from dh2sim.draw.rollout_data import RolloutData
 from dh2sim.errors import PictureError
+from dh2sim.extras import require_extra
 from dh2sim.files import written_whole
 from dh2sim.messages import shown
 
@@ -115,13 +116,15 @@ def legend_beside(ax: Any) -> None:
 
 
 def require_plot_ending(out: Path) -> None:
-    """Check that the name of a file says what it shall be.
+    """Check the ending of a file's name, and that matplotlib is installed.
 
     Raises:
-        PictureError: it does not.
+        PictureError: the ending is none of those allowed.
+        MissingExtraError: matplotlib is not installed.
     """
     if out.suffix.lower() not in ENDINGS:
         raise PictureError(f"{shown(out.name)} is no plot that can be written; allowed endings: .png, .svg, .pdf")
+    require_extra("plot", "matplotlib", what="plotting")
 
 
 def save(figure: Any, out: Path, *, dpi: float) -> None:

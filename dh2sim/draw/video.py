@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from dh2sim.draw.motion import Motion
 from dh2sim.draw.renderer import Look, Stage, stage
 from dh2sim.errors import PictureError
+from dh2sim.extras import require_extra
 from dh2sim.files import written_whole
 from dh2sim.messages import shown
 
@@ -238,13 +239,15 @@ def film_positions(motion: Motion, tempo: Tempo) -> list[int]:
 
 
 def require_ending(out: Path) -> None:
-    """Check that the name of a file says what it shall be.
+    """Check the ending of a file's name, and that what writes it is installed.
 
     Raises:
-        PictureError: it does not.
+        PictureError: the ending is none of those allowed.
+        MissingExtraError: Pillow or imageio-ffmpeg is not installed.
     """
     if out.suffix.lower() not in (*FILMS, *STILLS):
         raise PictureError(f"{shown(out.name)} is no picture that can be written; allowed endings: .mp4, .gif, .png")
+    require_extra("video", "PIL", "imageio_ffmpeg", what="rendering")
 
 
 def write_film(

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 import numpy as np
 
 from dh2sim.errors import SettingsError
+from dh2sim.extras import require_extra
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import load_robot
@@ -115,7 +116,9 @@ def rollout(
         RunExistsError: something stands at ``out`` already, and neither ``resume`` nor ``overwrite`` is given.
         RunDiffersError: the run to be resumed has other settings.
         OutputError: the run cannot be written; what was written before is safe.
+        MissingExtraError: xarray is not installed.
     """
+    require_extra("data", "xarray", what="a run as an xarray dataset")
     if not isinstance(model, RobotModel):
         model = build_model(load_robot(model))
     wish = Wish(

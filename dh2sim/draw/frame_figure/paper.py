@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from dh2sim.errors import PictureError
+from dh2sim.extras import require_extra
 from dh2sim.files import written_whole
 from dh2sim.messages import shown
 from dh2sim.typing import Array
@@ -154,15 +155,17 @@ def drawing() -> Iterator[None]:
 
 
 def require_picture_ending(path: Path) -> None:
-    """Check that the name of a file says what it shall be.
+    """Check the ending of a file's name, and that matplotlib is installed.
 
     Raises:
-        PictureError: It does not.
+        PictureError: The ending is none of those allowed.
+        MissingExtraError: matplotlib is not installed.
     """
     if path.suffix.lower() not in ENDINGS:
         raise PictureError(
             f"{shown(path.name)} is no picture that can be drawn; allowed endings: {', '.join(ENDINGS)}"
         )
+    require_extra("plot", "matplotlib", what="a picture of frames")
 
 
 _ANGLES = 24

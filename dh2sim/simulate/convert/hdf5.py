@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dh2sim.errors import Dh2simError
+from dh2sim.extras import require_extra
 from dh2sim.files import new_files, signals_deferred
 from dh2sim.simulate.convert.blocks import StoredRun, attribute_text, open_run, plain, untold
 
@@ -118,11 +118,7 @@ def to_hdf5(
         Dh2simError: h5netcdf or h5py is not installed, there is no run or a damaged one, the file exists already or
             cannot be written.
     """
-    try:
-        import h5netcdf  # noqa: F401
-        import h5py  # noqa: F401
-    except ImportError as error:
-        raise Dh2simError("HDF5 needs h5netcdf and h5py: pip install 'dh2sim[data]'") from error
+    require_extra("data", "xarray", "h5netcdf", "h5py", what="HDF5")
     run = open_run(path)
     with new_files([out], run=path, overwrite=overwrite) as [staged], _opened(staged) as (file, sink):
         with signals_deferred():  # HDF5 calls Python for every write, and is lost if that raises

@@ -17,7 +17,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dh2sim.errors import Dh2simError
+from dh2sim.extras import require_extra
 from dh2sim.files import new_files, refuse_folder
 from dh2sim.simulate.convert.blocks import attribute_text, open_run, plain, untold
 
@@ -64,10 +64,9 @@ def to_parquet(
         Dh2simError: pyarrow is not installed, there is no run or a damaged one, a file exists already or cannot be
             written.
     """
-    try:
-        import pyarrow.parquet as pq
-    except ImportError as error:
-        raise Dh2simError("Parquet needs pyarrow: pip install 'dh2sim[data]'") from error
+    require_extra("data", "xarray", "pyarrow", what="Parquet")
+    import pyarrow.parquet as pq
+
     from dh2sim.simulate.convert.tables import make_tables
 
     refuse_folder(out)

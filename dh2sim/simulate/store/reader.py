@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dh2sim.errors import RunDamagedError, RunError
+from dh2sim.extras import require_extra
 from dh2sim.simulate.store.place import is_run
 from dh2sim.simulate.store.recover import check_format
 from dh2sim.simulate.store.seal import BLOCKS, CHECKSUM, Seal, seals, stored_attributes
@@ -26,7 +27,9 @@ def open_dataset(path: str | PathLike[str]) -> xarray.Dataset:
     Raises:
         RunError: there is no run.
         RunDamagedError: its metadata or coordinates are damaged, or committed chunks are missing.
+        MissingExtraError: xarray is not installed.
     """
+    require_extra("data", "xarray", what="a run as an xarray dataset")
     import xarray
 
     path = Path(path)

@@ -179,9 +179,9 @@ def test_a_folder_that_may_not_be_written_to_is_told(run: Path, tmp_path: Path, 
 @pytest.mark.parametrize(
     ("package", "kind", "message"),
     [
-        ("pyarrow", "parquet", "Parquet needs pyarrow: pip install 'dh2sim[data]'"),
-        ("h5netcdf", "hdf5", "HDF5 needs h5netcdf and h5py: pip install 'dh2sim[data]'"),
-        ("h5py", "hdf5", "HDF5 needs h5netcdf and h5py: pip install 'dh2sim[data]'"),
+        ("pyarrow", "parquet", "Parquet needs the extra 'data': pip install 'dh2sim[data]'"),
+        ("h5netcdf", "hdf5", "HDF5 needs the extra 'data': pip install 'dh2sim[data]'"),
+        ("h5py", "hdf5", "HDF5 needs the extra 'data': pip install 'dh2sim[data]'"),
     ],
 )
 def test_a_library_that_is_missing_is_told_with_how_to_get_it(
