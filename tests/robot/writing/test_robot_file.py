@@ -28,13 +28,15 @@ from dh2sim.robot.spec import (
     MeshSpec,
     RobotSpec,
     Row,
+    Units,
 )
 from dh2sim.robot.write import robot_file_text
 from dh2sim.robot.yaml_tree import NOT_PRINTABLE
 from tests.robot.files import FULL, robot
 from tests.strategies import joint_vectors_for, lengths, names, poses, robot_specs, robots_with_joint_vectors, vectors
 
-NOT_WRITTEN = ("source_file", "parameters", "location")
+NOT_WRITTEN = ("source_file", "parameters", "location", "units")
+"""Units are chosen by who writes."""
 IN_UNITS = (
     "a",
     "alpha",
@@ -163,6 +165,7 @@ def test_any_robot_reads_back_as_the_same_robot(
     spec = data.draw(whole_robots(folder))
     text = robot_file_text(spec, header=[spec.source], folder=folder, angle=angle, length=length)
     back = parse_robot(text, directory=folder)
+    assert back.units == Units(angle=angle, length=length)
     _assert_same(spec, back, ulps=0 if (angle, length) == (AngleUnit.RAD, LengthUnit.M) else 1)
     assert robot_file_text(back, header=[spec.source], folder=folder, angle=angle, length=length) == text
 
