@@ -5,58 +5,26 @@ Names are imported when they are first used, so that ``import dh2sim`` costs nex
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from dh2sim.errors import Dh2simError, RobotFileError
-    from dh2sim.formats.mjcf.scene import to_scene
-    from dh2sim.formats.mjcf.write import to_mjcf
-    from dh2sim.formats.urdf.write import to_urdf
-    from dh2sim.importing.convert import convert_robot
-    from dh2sim.importing.importing import ImportOptions, import_robot
-    from dh2sim.kinematics.chain import KinematicChain, build_chain
-    from dh2sim.kinematics.forward import forward_kinematics, frame_poses, geometric_jacobian
-    from dh2sim.kinematics.frame_assignment.recover import recover_table
-    from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
-    from dh2sim.model.build import build_model
-    from dh2sim.model.robot_model import RobotModel
-    from dh2sim.robot.read import load_robot, parse_robot
-    from dh2sim.robot.spec import RobotSpec
-    from dh2sim.robot.write import robot_file_text
-
-__all__ = [
-    "Dh2simError",
-    "ImportOptions",
-    "KinematicChain",
-    "RobotFileError",
-    "RobotModel",
-    "RobotSpec",
-    "SerialChain",
-    "SerialJoint",
-    "build_chain",
-    "build_model",
-    "convert_robot",
-    "forward_kinematics",
-    "frame_poses",
-    "geometric_jacobian",
-    "import_robot",
-    "load_robot",
-    "parse_robot",
-    "recover_table",
-    "robot_file_text",
-    "to_mjcf",
-    "to_scene",
-    "to_urdf",
-]
-
 _HOMES = {
+    "ActuatorSpec": "robot.spec",
+    "Continuous": "robot_facade",
     "Dh2simError": "errors",
+    "Dynamics": "robot.spec",
+    "Fixed": "robot_facade",
     "ImportOptions": "importing.importing",
     "KinematicChain": "kinematics.chain",
+    "Limits": "robot.spec",
+    "LinkSpec": "robot.spec",
+    "Pose": "robot.spec",
+    "Prismatic": "robot_facade",
+    "Revolute": "robot_facade",
+    "Robot": "robot_facade",
     "RobotFileError": "errors",
     "RobotModel": "model.robot_model",
     "RobotSpec": "robot.spec",
+    "Row": "robot.spec",
     "SerialChain": "kinematics.serial_chain",
     "SerialJoint": "kinematics.serial_chain",
     "build_chain": "kinematics.chain",
@@ -74,15 +42,58 @@ _HOMES = {
     "to_scene": "formats.mjcf.scene",
     "to_urdf": "formats.urdf.write",
 }
+"""The module of every public name; a type checker reads the same below."""
 
+__all__ = [*_HOMES]
 
-def __getattr__(name: str) -> object:
-    """Import a public name from where it is defined."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'dh2sim' has no attribute '{name}'")
-    return getattr(import_module(f"dh2sim.{_HOMES[name]}"), name)
+if TYPE_CHECKING:
+    from dh2sim.errors import Dh2simError as Dh2simError
+    from dh2sim.errors import RobotFileError as RobotFileError
+    from dh2sim.formats.mjcf.scene import to_scene as to_scene
+    from dh2sim.formats.mjcf.write import to_mjcf as to_mjcf
+    from dh2sim.formats.urdf.write import to_urdf as to_urdf
+    from dh2sim.importing.convert import convert_robot as convert_robot
+    from dh2sim.importing.importing import ImportOptions as ImportOptions
+    from dh2sim.importing.importing import import_robot as import_robot
+    from dh2sim.kinematics.chain import KinematicChain as KinematicChain
+    from dh2sim.kinematics.chain import build_chain as build_chain
+    from dh2sim.kinematics.forward import forward_kinematics as forward_kinematics
+    from dh2sim.kinematics.forward import frame_poses as frame_poses
+    from dh2sim.kinematics.forward import geometric_jacobian as geometric_jacobian
+    from dh2sim.kinematics.frame_assignment.recover import recover_table as recover_table
+    from dh2sim.kinematics.serial_chain import SerialChain as SerialChain
+    from dh2sim.kinematics.serial_chain import SerialJoint as SerialJoint
+    from dh2sim.model.build import build_model as build_model
+    from dh2sim.model.robot_model import RobotModel as RobotModel
+    from dh2sim.robot.read import load_robot as load_robot
+    from dh2sim.robot.read import parse_robot as parse_robot
+    from dh2sim.robot.spec import ActuatorSpec as ActuatorSpec
+    from dh2sim.robot.spec import Dynamics as Dynamics
+    from dh2sim.robot.spec import Limits as Limits
+    from dh2sim.robot.spec import LinkSpec as LinkSpec
+    from dh2sim.robot.spec import Pose as Pose
+    from dh2sim.robot.spec import RobotSpec as RobotSpec
+    from dh2sim.robot.spec import Row as Row
+    from dh2sim.robot.write import robot_file_text as robot_file_text
+    from dh2sim.robot_facade import Continuous as Continuous
+    from dh2sim.robot_facade import Fixed as Fixed
+    from dh2sim.robot_facade import Prismatic as Prismatic
+    from dh2sim.robot_facade import Revolute as Revolute
+    from dh2sim.robot_facade import Robot as Robot
 
+    __version__: str
+else:
 
-def __dir__() -> list[str]:
-    """List the public names."""
-    return sorted(__all__)
+    def __getattr__(name: str) -> object:
+        """Import a public name from its module."""
+        from importlib import import_module, metadata
+
+        if name == "__version__":
+            return metadata.version("dh2sim")
+        if name not in _HOMES:
+            raise AttributeError(f"module 'dh2sim' has no attribute '{name}'")
+        return getattr(import_module(f"dh2sim.{_HOMES[name]}"), name)
+
+    def __dir__() -> list[str]:
+        """List the public names."""
+        return [*_HOMES]

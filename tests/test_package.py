@@ -2,39 +2,19 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 import dh2sim
+from dh2sim import simulate
 from tests.program import environment
 
-PUBLIC = {
-    "Dh2simError",
-    "ImportOptions",
-    "KinematicChain",
-    "RobotFileError",
-    "RobotModel",
-    "RobotSpec",
-    "SerialChain",
-    "SerialJoint",
-    "build_chain",
-    "build_model",
-    "convert_robot",
-    "forward_kinematics",
-    "frame_poses",
-    "geometric_jacobian",
-    "import_robot",
-    "load_robot",
-    "parse_robot",
-    "recover_table",
-    "robot_file_text",
-    "to_mjcf",
-    "to_scene",
-    "to_urdf",
-}
 URDF = Path(__file__).resolve().parent.parent / "generated" / "rpr" / "rpr.urdf"
 RUNS = {"zarr", "numcodecs", "google_crc32c"}
 TABLES = {"xarray", "pandas", "pyarrow", "h5netcdf", "h5py"}
@@ -73,24 +53,40 @@ def _imported(code: str) -> set[str]:
     return set(done.stdout.split())
 
 
-def test_the_public_names_are_those_promised() -> None:
-    assert set(dh2sim.__all__) == PUBLIC
-    assert set(dir(dh2sim)) == PUBLIC
-    assert dh2sim.__all__ == sorted(dh2sim.__all__)
+@pytest.mark.parametrize("package", [dh2sim, simulate], ids=lambda package: package.__name__)
+def test_a_type_checker_is_shown_the_names_that_are_imported_lazily(package: ModuleType) -> None:
+    tree = ast.parse(Path(str(package.__file__)).read_text(encoding="utf-8"))
+    [block] = [node for node in tree.body if isinstance(node, ast.If)]
+    shown = {
+        str(alias.asname): str(node.module).removeprefix(f"{package.__name__}.")
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert shown == package._HOMES
+    assert package.__all__ == dir(package) == sorted(shown)
 
 
-@pytest.mark.parametrize("name", sorted(PUBLIC))
-def test_a_public_name_is_documented_and_knows_its_home(name: str) -> None:
-    value = getattr(dh2sim, name)
-    assert value.__name__ == name
-    assert value.__doc__
-    assert value.__module__.startswith("dh2sim.")
+@pytest.mark.parametrize(
+    ("package", "name"), [(package, name) for package in (dh2sim, simulate) for name in package.__all__]
+)
+def test_a_public_name_is_documented_and_knows_its_home(package: ModuleType, name: str) -> None:
+    value = getattr(package, name)
+    if name != "Controller":  # a union
+        assert value.__name__ == name
+        assert value.__doc__
+        assert value.__module__.startswith("dh2sim.")
 
 
-def test_a_name_that_there_is_not_is_an_attribute_error() -> None:
+@pytest.mark.parametrize("package", [dh2sim, simulate], ids=lambda package: package.__name__)
+def test_an_unknown_name_is_an_attribute_error(package: ModuleType) -> None:
     with pytest.raises(AttributeError) as caught:
-        getattr(dh2sim, "to_sdf")  # noqa: B009
-    assert str(caught.value) == "module 'dh2sim' has no attribute 'to_sdf'"
+        getattr(package, "to_sdf")  # noqa: B009
+    assert str(caught.value) == f"module '{package.__name__}' has no attribute 'to_sdf'"
+
+
+def test_the_version_is_that_of_the_distribution() -> None:
+    assert dh2sim.__version__ == version("dh2sim")
 
 
 def test_the_package_is_typed() -> None:

@@ -185,10 +185,10 @@ def frame_pose(chain: KinematicChain, frame: str, q: ArrayLike) -> Array:
     Args:
         chain: The robot.
         frame: One of ``frame_names``; link_i stands at joint i, dh_i is the table's frame i.
-        q: Joint vector, rad and m, shape (n,).
+        q: Joint vectors, rad and m, shape (..., n).
 
     Returns:
-        Shape (4, 4).
+        Shape (..., 4, 4).
 
     Raises:
         UnknownFrameError: There is no such frame.
@@ -206,10 +206,10 @@ def frame_pose(chain: KinematicChain, frame: str, q: ArrayLike) -> Array:
     if frame == "tool0":
         return tool
     if frame == "base_link":
-        return identity()
+        return np.broadcast_to(identity(), tool.shape).copy()
     kind, index = frame.split("_")
     poses, number = (frame_poses(chain, q), int(index)) if kind == "dh" else (joint_poses(chain, q), int(index) - 1)
-    return np.asarray(poses[number])
+    return np.asarray(poses[..., number, :, :])
 
 
 _NOTHING: Column = (0.0, 0.0, 0.0)

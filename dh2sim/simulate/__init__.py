@@ -1,19 +1,11 @@
-"""Does it move: MJCF and controller to rollouts, to a dataset and pictures.
+"""Does it move: MJCF and controller to rollouts, to a dataset.
 
 Names are imported when they are first used.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from dh2sim.simulate.controllers.protocol import ClosedLoop, Controller, Lanes, Observation, OpenLoop
-    from dh2sim.simulate.run import rollout
-    from dh2sim.simulate.store.reader import open_dataset
-
-__all__ = ["ClosedLoop", "Controller", "Lanes", "Observation", "OpenLoop", "open_dataset", "rollout"]
 
 _HOMES = {
     "ClosedLoop": "controllers.protocol",
@@ -24,15 +16,28 @@ _HOMES = {
     "open_dataset": "store.reader",
     "rollout": "run",
 }
+"""The module of every public name; a type checker reads the same below."""
 
+__all__ = [*_HOMES]
 
-def __getattr__(name: str) -> object:
-    """Import a public name from where it is defined."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'dh2sim.simulate' has no attribute '{name}'")
-    return getattr(import_module(f"dh2sim.simulate.{_HOMES[name]}"), name)
+if TYPE_CHECKING:
+    from dh2sim.simulate.controllers.protocol import ClosedLoop as ClosedLoop
+    from dh2sim.simulate.controllers.protocol import Controller as Controller
+    from dh2sim.simulate.controllers.protocol import Lanes as Lanes
+    from dh2sim.simulate.controllers.protocol import Observation as Observation
+    from dh2sim.simulate.controllers.protocol import OpenLoop as OpenLoop
+    from dh2sim.simulate.run import rollout as rollout
+    from dh2sim.simulate.store.reader import open_dataset as open_dataset
+else:
 
+    def __getattr__(name: str) -> object:
+        """Import a public name from its module."""
+        from importlib import import_module
 
-def __dir__() -> list[str]:
-    """List the public names."""
-    return sorted(__all__)
+        if name not in _HOMES:
+            raise AttributeError(f"module 'dh2sim.simulate' has no attribute '{name}'")
+        return getattr(import_module(f"dh2sim.simulate.{_HOMES[name]}"), name)
+
+    def __dir__() -> list[str]:
+        """List the public names."""
+        return [*_HOMES]

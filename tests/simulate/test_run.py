@@ -167,12 +167,3 @@ def test_memory_is_bounded_by_the_block_and_not_by_the_run(tmp_path: Path, monke
     assert open_dataset(tmp_path / "many").nbytes > 40e6
     assert peaks[0] < 15e6
     assert peaks[1] < 15e6
-
-
-def test_public_names_are_those_that_the_package_lists() -> None:
-    assert dir(dh2sim.simulate) == sorted(dh2sim.simulate.__all__)
-    for name in dh2sim.simulate.__all__:
-        assert getattr(dh2sim.simulate, name) is not None
-    with pytest.raises(AttributeError) as caught:
-        _ = dh2sim.simulate.nothing
-    assert str(caught.value) == "module 'dh2sim.simulate' has no attribute 'nothing'"

@@ -1,0 +1,601 @@
+"""A robot with its verbs: ``Robot``, and the rows that one is made of in code.
+
+Every method calls functions that are public themselves, and imports what it needs when it is called.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, ClassVar, Self, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dh2sim.errors import ConfigurationError, Dh2simError, OutputError
+from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.robot.spec import (
+    ActuatorSpec,
+    AngleUnit,
+    BaseSpec,
+    Convention,
+    Dynamics,
+    JointType,
+    LengthUnit,
+    Limits,
+    LinkSpec,
+    Pose,
+    RobotSpec,
+    Row,
+    Units,
+)
+from dh2sim.robot.textbook_table import table_html, table_latex, table_text
+from dh2sim.typing import Array, read_only
+
+if TYPE_CHECKING:
+    import mujoco
+    import xarray as xr
+
+    from dh2sim.export import ExportReport, Format
+    from dh2sim.importing.importing import ImportOptions
+    from dh2sim.kinematics.chain import KinematicChain
+    from dh2sim.model.robot_model import RobotModel
+    from dh2sim.validate.report import RobotReport
+    from dh2sim.view.server import Viewer
+
+Choice = TypeVar("Choice", bound=StrEnum)
+FilePath: TypeAlias = str | os.PathLike[str]
+PoseLike: TypeAlias = Pose | ArrayLike
+"""A pose; or a position, m, shape (3,); or a homogeneous transform, shape (4, 4)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TableRow:
+    """A row of the DH table of a robot made in code: lengths in m, angles in rad, everything else SI."""
+
+    type: ClassVar[JointType]
+
+    name: str | None = None
+    """By default ``joint_<i>``, counted from 1."""
+    a: float = 0.0
+    alpha: float = 0.0
+    d: float = 0.0
+    theta: float = 0.0
+    beta: float = 0.0
+    """Second twist; of a Hayati row alone."""
+    flip: bool = False
+    """True: the joint coordinate subtracts instead."""
+    limits: Sequence[float] | Limits = field(default_factory=Limits)
+    """Lower and upper joint coordinate, rad or m; or :class:`Limits`, which hold velocity and effort too."""
+    dynamics: Dynamics = field(default_factory=Dynamics)
+    link: LinkSpec = field(default_factory=LinkSpec)
+    """Mass, inertia and looks of the link that the joint moves."""
+    actuator: ActuatorSpec | None = None
+    """What drives the joint; by default position control with gains that dh2sim chooses."""
+    convention: Convention | str | None = None
+    """By default the robot's."""
+
+
+class Revolute(TableRow):
+    """A row whose joint coordinate adds to theta."""
+
+    type = JointType.REVOLUTE
+
+
+class Continuous(TableRow):
+    """A row whose joint coordinate adds to theta, without position limits."""
+
+    type = JointType.CONTINUOUS
+
+
+class Prismatic(TableRow):
+    """A row whose joint coordinate adds to d."""
+
+    type = JointType.PRISMATIC
+
+
+class Fixed(TableRow):
+    """A row that does not move."""
+
+    type = JointType.FIXED
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Robot:
+    """A robot, given by its Denavit-Hartenberg table; nothing about it can be changed."""
+
+    spec: RobotSpec
+    """The table, and everything else that a robot file holds, in SI units."""
+    notes: tuple[str, ...]
+    """What an import or a conversion chose, changed or left out, a sentence each."""
+
+    def __init__(
+        self,
+        rows: Iterable[TableRow | Row],
+        *,
+        name: str = "robot",
+        convention: Convention | str = Convention.STANDARD,
+        base: PoseLike = (0.0, 0.0, 0.0),
+        tool: PoseLike = (0.0, 0.0, 0.0),
+        gravity: ArrayLike = (0.0, 0.0, -9.81),
+        configurations: Mapping[str, ArrayLike] = MappingProxyType({}),
+        description: str = "",
+        source: str = "",
+    ) -> None:
+        """Make a robot of the rows of its table.
+
+        Args:
+            rows: The DH table, base first.
+            name: Letters, digits, '_' and '-', starting with a letter; names the exported files.
+            convention: Of rows that name none: 'standard', 'modified' or 'hayati'.
+            base: Pose of DH frame 0 in base_link.
+            tool: Pose of tool0 in DH frame n.
+            gravity: m/s² in base_link, shape (3,).
+            configurations: Named joint vectors, rad and m, each of shape (n,).
+            description: What the robot is.
+            source: Where the numbers come from.
+
+        Raises:
+            Dh2simError: Something of it is wrong; the text says what and where.
+        """
+        default = _member(Convention, convention, "convention")
+        spec = RobotSpec(
+            name=name,
+            rows=tuple(_row(row, i, default) for i, row in enumerate(rows)),
+            description=description,
+            source=source,
+            convention=default,
+            base=BaseSpec(pose=_pose(base)),
+            tool=_pose(tool),
+            gravity=read_only(gravity),
+            configurations=MappingProxyType({key: read_only(q) for key, q in configurations.items()}),
+        )
+        self._set(spec)
+
+    def _set(self, spec: RobotSpec, notes: Iterable[str] = ()) -> None:
+        object.__setattr__(self, "spec", spec)
+        object.__setattr__(self, "notes", tuple(notes))
+
+    @classmethod
+    def from_spec(cls, spec: RobotSpec, *, notes: Iterable[str] = ()) -> Self:
+        """Return the robot that a :class:`RobotSpec` describes."""
+        robot = cls.__new__(cls)
+        robot._set(spec, notes)
+        return robot
+
+    @classmethod
+    def load(cls, path_or_name: FilePath) -> Self:
+        """Read a robot file, or a robot that comes with dh2sim; a path that exists wins.
+
+        Raises:
+            Dh2simError: There is no such robot, or its file is wrong; the text says where.
+        """
+        from dh2sim.robot.read import load_robot
+
+        return cls.from_spec(load_robot(path_or_name))
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: FilePath,
+        *,
+        base: str | None = None,
+        tip: str | None = None,
+        convention: Convention | str = Convention.STANDARD,
+        tolerance: float = 1e-9,
+        package_paths: Iterable[FilePath] = (),
+        name: str | None = None,
+    ) -> Self:
+        """Make the DH table of a URDF, whatever way its axes lie, and compare it with the file's own kinematics.
+
+        Args:
+            path: The file.
+            base: Link that becomes base_link; by default the root.
+            tip: Link that becomes tool0; by default where the arm ends.
+            convention: Of the table: 'standard' or 'modified'.
+            tolerance: Greatest residual, rad, and m for a reach of up to 1 m, then of the reach; numbers within it of
+                a simple one are made simple.
+            package_paths: Folders in which ``package://`` is looked for first.
+            name: Of the robot, instead of the file's.
+
+        Raises:
+            Dh2simError: The file is wrong or holds no serial arm; the text says what and where.
+        """
+        from dh2sim.importing.importing import ImportOptions
+
+        options = ImportOptions(
+            base=base,
+            tip=tip,
+            convention=_member(Convention, convention, "convention"),
+            tolerance=tolerance,
+            package_paths=tuple(Path(folder) for folder in package_paths),
+            name=name,
+        )
+        return cls._imported(path, options)
+
+    @classmethod
+    def from_mjcf(
+        cls,
+        path: FilePath,
+        *,
+        base: str | None = None,
+        tip: str | None = None,
+        convention: Convention | str = Convention.STANDARD,
+        tolerance: float = 1e-9,
+        name: str | None = None,
+    ) -> Self:
+        """Make the DH table of an MJCF, as :meth:`from_urdf` does; ``tip`` may be a body or a site."""
+        return cls.from_urdf(path, base=base, tip=tip, convention=convention, tolerance=tolerance, name=name)
+
+    @classmethod
+    def from_table(
+        cls,
+        path: FilePath,
+        *,
+        convention: Convention | str | None = None,
+        angle: AngleUnit | str | None = None,
+        length: LengthUnit | str | None = None,
+        tolerance: float = 1e-9,
+        name: str | None = None,
+    ) -> Self:
+        """Read a DH table in Markdown, CSV or TSV, or as a robotics toolbox prints it.
+
+        Args:
+            path: The file.
+            convention: Of the table, where it does not say: 'standard' or 'modified'.
+            angle: Unit of its angles, where it does not say: 'deg' or 'rad'.
+            length: Unit of its lengths, where it does not say: 'm', 'mm', 'cm' or 'in'.
+            tolerance: Numbers within it of a simple one are made simple, rad and m, if it is above the default.
+            name: Of the robot, instead of the file's.
+
+        Raises:
+            Dh2simError: The table is wrong or says too little; the text says what and where.
+        """
+        from dh2sim.importing.importing import ImportOptions
+
+        options = ImportOptions(
+            convention=None if convention is None else _member(Convention, convention, "convention"),
+            angle=None if angle is None else _member(AngleUnit, angle, "angle"),
+            length=None if length is None else _member(LengthUnit, length, "length"),
+            tolerance=tolerance,
+            name=name,
+        )
+        return cls._imported(path, options)
+
+    @classmethod
+    def _imported(cls, path: FilePath, options: ImportOptions) -> Self:
+        from dh2sim.importing.importing import import_robot
+
+        imported = import_robot(Path(path), options)
+        return cls.from_spec(imported.spec, notes=imported.notes)
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self.spec.name
+
+    @property
+    def n(self) -> int:
+        """Number of joints that move: the length of a joint vector."""
+        return len(self.spec.moving_rows)
+
+    @cached_property
+    def chain(self) -> KinematicChain:
+        """The table as joint-placed bodies, which the kinematics are computed from."""
+        from dh2sim.kinematics.chain import build_chain
+
+        return build_chain(self.spec)
+
+    @cached_property
+    def model(self) -> RobotModel:
+        """The robot with shapes, masses, limits and actuators; what was estimated or assumed is marked.
+
+        Raises:
+            MeshError: A mesh file cannot be used.
+        """
+        from dh2sim.model.build import build_model
+
+        return build_model(self.spec)
+
+    @cached_property
+    def configurations(self) -> Mapping[str, Array]:
+        """Named joint vectors, rad and m, each of shape (n,): ``zero``, ``home`` and those of the robot file."""
+        home = self.model.home  # 'home' of the file, or zero moved inside the limits
+        return MappingProxyType({"zero": read_only([0.0] * self.n), **self.spec.configurations, "home": home})
+
+    @cached_property
+    def limits(self) -> tuple[Array, Array]:
+        """Lower and upper joint coordinates, rad and m, each of shape (n,); infinite for continuous joints."""
+        ranges = [joint.range for joint in self.model.moving_joints]
+        lower = read_only([-np.inf if range_ is None else range_.lower for range_ in ranges])
+        return lower, read_only([np.inf if range_ is None else range_.upper for range_ in ranges])
+
+    def fk(self, q: ArrayLike, frame: str = "tool0") -> Array:
+        """Return the pose of a frame in base_link.
+
+        Args:
+            q: Joint vectors, rad and m, shape (..., n); or the name of a configuration.
+            frame: tool0, base_link, dh_0 … dh_n or link_1 … link_n.
+
+        Returns:
+            Shape (..., 4, 4).
+
+        Raises:
+            ConfigurationError: ``q`` has the wrong shape, or something in it is not finite.
+            UnknownFrameError: There is no such frame.
+        """
+        from dh2sim.kinematics.forward import frame_pose
+
+        return frame_pose(self.chain, frame, self._vectors(q))
+
+    def jacobian(self, q: ArrayLike) -> Array:
+        """Return the geometric Jacobian of tool0 in base_link.
+
+        Args:
+            q: Joint vectors, rad and m, shape (..., n); or the name of a configuration.
+
+        Returns:
+            Shape (..., 6, n): rows 0-2 linear, rows 3-5 angular.
+
+        Raises:
+            ConfigurationError: ``q`` has the wrong shape, or something in it is not finite.
+        """
+        from dh2sim.kinematics.forward import geometric_jacobian
+
+        return geometric_jacobian(self.chain, self._vectors(q))
+
+    def _vectors(self, q: ArrayLike) -> ArrayLike:
+        if not isinstance(q, str):
+            return q
+        if q not in self.configurations:
+            hint = did_you_mean(q, self.configurations)
+            known = listed(self.configurations)
+            raise ConfigurationError(f"{self.name} has no configuration {shown(q)}.{hint} Configurations: {known}")
+        return self.configurations[q]
+
+    def random_configurations(self, count: int, *, seed: int = 0) -> Array:
+        """Draw joint vectors between the limits, ±π for continuous joints; rad and m, shape (count, n)."""
+        from dh2sim.export import sampling_limits
+        from dh2sim.kinematics.sampling import random_configurations
+
+        return random_configurations(*sampling_limits(self.model), count, seed)
+
+    def urdf(self, *, dh_frames: bool = True) -> str:
+        """Return the URDF; with ``dh_frames`` it has a link for every DH frame. Meshes are written by ``export``."""
+        from dh2sim.formats.urdf.write import to_urdf
+
+        return to_urdf(self.model, dh_frames=dh_frames)
+
+    def mjcf(self) -> str:
+        """Return the MJCF. Meshes are written by ``export``."""
+        from dh2sim.formats.mjcf.write import to_mjcf
+
+        return to_mjcf(self.model)
+
+    def mjmodel(self) -> mujoco.MjModel:
+        """Return the robot compiled by MuJoCo, without floor or light.
+
+        Raises:
+            Dh2simError: MuJoCo cannot hold the robot.
+        """
+        import mujoco
+
+        meshes = {link.mesh.file_name: link.mesh.data for link in self.model.all_links if link.mesh is not None}
+        return mujoco.MjModel.from_xml_string(self.mjcf(), meshes)
+
+    def export(
+        self,
+        out: FilePath = "generated",
+        *,
+        formats: Iterable[Format | str] = ("urdf", "mjcf"),
+        dh_frames: bool = True,
+        verify: bool = True,
+    ) -> ExportReport:
+        """Write URDF, MJCF and meshes to ``out``/<name>/, all of them or none, verified against the table.
+
+        Args:
+            out: The folder that holds a folder for each robot.
+            formats: 'urdf', 'mjcf' or both.
+            dh_frames: Whether the URDF has a link for every DH frame.
+            verify: Whether to compare the written files with the table before they are put in place.
+
+        Returns:
+            What was written, how well it matches, and what the formats cannot carry.
+
+        Raises:
+            Dh2simError: The robot cannot be exported; what was there before is untouched.
+        """
+        from dh2sim.export import Format, export_robot
+
+        wanted = list(dict.fromkeys(_member(Format, format_, "format") for format_ in formats))
+        return export_robot(self.model, Path(out), formats=wanted, dh_frames=dh_frames, verified=verify)
+
+    def validate(self, *, samples: int = 1000, seed: int = 0, tolerance: float = 1e-12) -> RobotReport:
+        """Compare every engine that is installed with the table: poses, Jacobians and dynamics.
+
+        Args:
+            samples: Number of random configurations inside the limits.
+            seed: Of the configurations.
+            tolerance: Allowed angle, rad, and distance as a share of max(1 m, reach).
+
+        Returns:
+            The report; ``ok`` says whether everything matches.
+        """
+        from dh2sim.validate.run import validate_robot
+
+        return validate_robot(self.model, samples=samples, seed=seed, tolerance=tolerance)
+
+    def rollout(
+        self,
+        rollouts: int = 256,
+        *,
+        controller: str = "sine",
+        seed: int = 0,
+        out: FilePath | None = None,
+        steps: int | None = None,
+        duration: float | None = None,
+        timestep: float = 0.002,
+        integrator: str = "implicitfast",
+        start: str = "home",
+        record: Sequence[str] = ("qpos", "qvel", "ctrl", "tool_pose", "reference"),
+        every: int = 1,
+        randomize: Mapping[str, float] = MappingProxyType({}),
+        floating_base: bool = False,
+        threads: int = 0,
+        resume: bool = False,
+        overwrite: bool = False,
+    ) -> xr.Dataset:
+        """Simulate many rollouts with MuJoCo; the arguments are those of :func:`dh2sim.simulate.rollout`.
+
+        Returns:
+            The dataset, as ``docs/dataset.md`` describes it; read lazily from ``out`` if that is given.
+
+        Raises:
+            Dh2simError: The settings cannot be met, or the run cannot be written.
+        """
+        from dh2sim.simulate.run import rollout
+
+        return rollout(
+            self.model,
+            out=None if out is None else Path(out),
+            rollouts=rollouts,
+            steps=steps,
+            duration=duration,
+            timestep=timestep,
+            integrator=integrator,
+            controller=controller,
+            start=start,
+            seed=seed,
+            record=record,
+            every=every,
+            randomize=randomize,
+            floating_base=floating_base,
+            threads=threads,
+            resume=resume,
+            overwrite=overwrite,
+        )
+
+    def convert(self, convention: Convention | str) -> Self:
+        """Return the same arm with its table in another convention, 'standard' or 'modified'.
+
+        Raises:
+            Dh2simError: The poses of tool0 would differ by more than rounding.
+        """
+        from dh2sim.importing.convert import convert_robot
+
+        converted = convert_robot(self.spec, _member(Convention, convention, "convention"))
+        return self.from_spec(converted.spec, notes=converted.notes)
+
+    def save(self, path: FilePath, *, overwrite: bool = False) -> None:
+        """Write a robot file that ``load`` reads as the same robot; parameters become the numbers that they gave.
+
+        It is in the units of the file that the robot was read from, or else in deg and m.
+
+        Raises:
+            OutputError: There is a file already, or it cannot be written.
+        """
+        from dh2sim.files import written_whole
+        from dh2sim.robot.write import robot_file_text
+
+        file = Path(path)
+        if file.exists() and not overwrite:
+            raise OutputError(f"'{file}' exists already; choose another name, or pass overwrite=True")
+        header = [f"Note: {note}" for note in self.notes]
+        units = self.spec.units if self.spec.source_file else Units(angle=AngleUnit.DEG)
+        text = robot_file_text(
+            self.spec, header=header, folder=file.absolute().parent, angle=units.angle, length=units.length
+        )
+        with written_whole(file) as draft:
+            draft.write_text(text, encoding="utf-8")
+
+    def view(self, *, host: str = "127.0.0.1", port: int = 8080, browser: bool = True) -> Viewer:
+        """Show the robot in the browser, and return at once.
+
+        Args:
+            host: Address to listen at; by default only this machine can reach it.
+            port: Port to listen at, or the next that is free.
+            browser: Whether to open the page in a browser.
+
+        Returns:
+            The server: its ``url`` is where the page is, ``wait()`` keeps a script alive, ``stop()`` ends it.
+
+        Raises:
+            Dh2simError: Nobody can listen at this address.
+        """
+        import webbrowser
+
+        from dh2sim.view.initial_state import folder_of, open_state
+        from dh2sim.view.server import Viewer, free_port
+
+        file = self.spec.source_file
+        state = open_state(self.spec, None if file is None else folder_of(file.path))
+        viewer = Viewer(state, host=host, port=free_port(host, port))
+        if browser:
+            webbrowser.open(viewer.url)
+        return viewer
+
+    def __repr__(self) -> str:
+        """Return the name, the joints as letters, and the convention."""
+        joints = "".join(row.type.value[0].upper() for row in self.spec.rows)
+        conventions = " and ".join(dict.fromkeys(row.convention.value for row in self.spec.rows))
+        return f"<Robot '{self.name}': {joints}, {conventions}>"
+
+    def __str__(self) -> str:
+        """Return the table as in a textbook: deg and m, the joint variables starred."""
+        return table_text(self.spec)
+
+    def _repr_html_(self) -> str:
+        return table_html(self.spec)
+
+    def _repr_latex_(self) -> str:
+        return table_latex(self.spec)
+
+
+def _row(row: TableRow | Row, index: int, convention: Convention) -> Row:
+    """Return a row with what its robot fills in."""
+    if isinstance(row, Row):
+        return row
+    own = row.convention
+    return Row(
+        name=f"joint_{index + 1}" if row.name is None else row.name,
+        type=row.type,
+        convention=convention if own is None else _member(Convention, own, f"rows[{index}].convention"),
+        a=row.a,
+        alpha=row.alpha,
+        d=row.d,
+        theta=row.theta,
+        beta=row.beta,
+        flip=row.flip,
+        limits=row.limits if isinstance(row.limits, Limits) else Limits(position=(row.limits[0], row.limits[1])),
+        dynamics=row.dynamics,
+        link=row.link,
+        actuator=row.actuator or ActuatorSpec(),
+    )
+
+
+def _pose(pose: PoseLike) -> Pose:
+    if isinstance(pose, Pose):
+        return pose
+    array = np.asarray(pose, dtype=np.float64)
+    if array.shape == (4, 4):
+        from dh2sim.kinematics.transforms import rpy_from_rotation
+
+        return Pose(xyz=read_only(array[:3, 3]), rpy=read_only(rpy_from_rotation(array[:3, :3])))
+    return Pose(xyz=read_only(array))
+
+
+def _member(kind: type[Choice], value: Choice | str, what: str) -> Choice:
+    """Return the member of an enumeration that a value names.
+
+    Raises:
+        Dh2simError: There is none.
+    """
+    for member in kind:
+        if member == value:
+            return member
+    raise Dh2simError(f"unknown {what} {value!r}.{did_you_mean(str(value), kind)} Allowed: {listed(kind)}")

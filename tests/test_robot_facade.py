@@ -1,0 +1,191 @@
+"""``Robot``: every verb of the library on one noun."""
+
+from __future__ import annotations
+
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dh2sim
+from dh2sim import Continuous, Fixed, Pose, Prismatic, Revolute, Robot
+from dh2sim.errors import ConfigurationError, Dh2simError, OutputError, UnknownFrameError
+from dh2sim.robot.spec import Convention, JointType
+
+GENERATED = Path(__file__).parents[1] / "generated"
+ROBOTS = ["stanford", "puma560", "scara"]
+
+
+@pytest.fixture
+def arm() -> Robot:
+    rows = [Revolute(d=0.4, alpha=-pi / 2), Revolute(d=0.15, alpha=pi / 2), Prismatic(limits=(0.1, 1.2))]
+    return Robot(rows, name="my_arm", configurations={"out": [0.0, 1.0, 1.2]})
+
+
+def test_a_robot_made_in_code_is_the_one_of_a_robot_file(arm: Robot, tmp_path: Path) -> None:
+    text = """
+name: my_arm
+convention: standard
+joints:
+  - {type: revolute, d: 0.4, alpha: -pi/2}
+  - {type: revolute, d: 0.15, alpha: pi/2}
+  - {type: prismatic, limits: {position: [0.1, 1.2]}}
+configurations: {out: [0, 1, 1.2]}
+"""
+    written = Robot.from_spec(dh2sim.parse_robot(text))
+    assert [row.name for row in arm.spec.rows] == ["joint_1", "joint_2", "joint_3"]
+    assert arm.mjcf().splitlines()[5:] == written.mjcf().splitlines()[5:]
+    assert arm.urdf().splitlines()[5:] == written.urdf().splitlines()[5:]
+
+
+def test_a_row_may_be_of_another_convention_and_of_any_type() -> None:
+    robot = Robot(
+        [Continuous(a=0.1), Fixed(d=0.2, name="flange"), Revolute(convention="standard", flip=True)],
+        convention="modified",
+    )
+    assert [row.convention for row in robot.spec.rows] == [Convention.MODIFIED] * 2 + [Convention.STANDARD]
+    assert [row.type for row in robot.spec.rows] == [JointType.CONTINUOUS, JointType.FIXED, JointType.REVOLUTE]
+    assert [row.name for row in robot.spec.rows] == ["joint_1", "flange", "joint_3"]
+    assert robot.n == 2
+
+
+def test_base_and_tool_are_poses_positions_or_transforms() -> None:
+    T = np.array([[0.0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]])
+    for tool in (T, Pose(xyz=T[:3, 3], rpy=np.array([0, 0, pi / 2]))):
+        robot = Robot([Revolute()], base=(0.0, 0.0, 1.0), tool=tool)
+        expected = T + np.array([[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 1], [0, 0, 0, 0]])
+        np.testing.assert_allclose(robot.fk([0.0]), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_kinematics_take_any_batch_and_agree_with_the_functions(name: str) -> None:
+    robot = Robot.load(name)
+    q = robot.random_configurations(6, seed=3).reshape(2, 3, robot.n)
+    assert np.array_equal(robot.fk(q), dh2sim.forward_kinematics(robot.chain, q))
+    assert np.array_equal(robot.jacobian(q), dh2sim.geometric_jacobian(robot.chain, q))
+    for i, frame in enumerate(["dh_0", "dh_1", "dh_2"]):
+        assert np.array_equal(robot.fk(q, frame=frame), dh2sim.frame_poses(robot.chain, q)[..., i, :, :])
+    assert np.array_equal(robot.fk(q, frame="base_link"), np.broadcast_to(np.eye(4), (2, 3, 4, 4)))
+    assert robot.fk(q[0, 0], frame="link_2").shape == (4, 4)
+
+
+def test_a_configuration_is_given_by_its_name(arm: Robot) -> None:
+    assert list(arm.configurations) == ["zero", "out", "home"]
+    assert np.array_equal(arm.fk("out"), arm.fk([0.0, 1.0, 1.2]))
+    assert np.array_equal(arm.fk("home"), arm.fk([0.0, 0.0, 0.1]))
+    with pytest.raises(ConfigurationError) as caught:
+        arm.jacobian("hme")
+    assert str(caught.value) == (
+        "my_arm has no configuration 'hme'. Did you mean 'home'? Configurations: zero, out, home"
+    )
+
+
+def test_an_unknown_frame_and_a_wrong_joint_vector_are_named(arm: Robot) -> None:
+    with pytest.raises(UnknownFrameError, match="there is no frame 'dh_4'"):
+        arm.fk([0.0, 0.0, 0.2], frame="dh_4")
+    with pytest.raises(ConfigurationError, match="expected 3 joint coordinates"):
+        arm.fk([0.0, 0.0])
+
+
+def test_limits_are_those_of_the_table_or_assumed(arm: Robot) -> None:
+    lower, upper = arm.limits
+    assert lower.tolist() == [-pi, -pi, 0.1]
+    assert upper.tolist() == [pi, pi, 1.2]
+    lower, upper = Robot([Continuous()]).limits
+    assert (lower.tolist(), upper.tolist()) == ([-np.inf], [np.inf])
+
+
+def test_an_export_is_verified_and_reports_what_was_written(arm: Robot, tmp_path: Path) -> None:
+    report = arm.export(tmp_path)
+    assert [file.path.relative_to(tmp_path).as_posix() for file in report.files] == [
+        "my_arm/my_arm.urdf",
+        "my_arm/my_arm.xml",
+        "my_arm/scene.xml",
+    ]
+    assert all(check.position_error < 1e-14 for check in report.verified)
+    assert any(loss.startswith("URDF: configurations (out)") for loss in report.losses)
+    assert (tmp_path / "my_arm" / "my_arm.xml").read_text() == arm.mjcf()
+    assert arm.export(tmp_path, formats=["urdf"], verify=False).verified == ()
+
+
+def test_the_compiled_model_is_that_of_the_exported_file(arm: Robot) -> None:
+    model = arm.mjmodel()
+    assert (model.nq, model.nbody) == (3, 5)
+    assert [model.joint(i).name for i in range(3)] == ["joint_1", "joint_2", "joint_3"]
+
+
+def test_validation_rollouts_and_conversion_work_on_a_robot_made_in_code(arm: Robot, tmp_path: Path) -> None:
+    assert arm.validate(samples=10).ok
+    run = arm.rollout(3, controller="hold", seed=7, steps=5, out=tmp_path / "run.zarr")
+    assert run.sizes["rollout"] == 3
+    modified = arm.convert("modified")
+    assert {row.convention for row in modified.spec.rows} == {Convention.MODIFIED}
+    q = arm.random_configurations(10)
+    np.testing.assert_allclose(modified.fk(q), arm.fk(q), atol=1e-14)
+
+
+def test_a_saved_robot_is_loaded_as_the_same(arm: Robot, tmp_path: Path) -> None:
+    path = tmp_path / "arm.yaml"
+    arm.convert("modified").save(path)
+    q = arm.random_configurations(10)
+    np.testing.assert_allclose(Robot.load(path).fk(q), arm.fk(q), atol=1e-14)
+    with pytest.raises(OutputError) as caught:
+        arm.save(path)
+    assert str(caught.value) == f"'{path}' exists already; choose another name, or pass overwrite=True"
+    arm.save(str(path), overwrite=True)
+    assert Robot.load(path).mjcf().splitlines()[5:] == arm.mjcf().splitlines()[5:]
+
+
+def test_a_conversion_keeps_its_notes(tmp_path: Path) -> None:
+    robot = Robot.load("stanford").convert("modified")
+    assert robot.notes[-1] == "Parameters are written as the numbers that they gave."
+    robot.save(tmp_path / "stanford.yaml")
+    assert robot.notes[-1] in (tmp_path / "stanford.yaml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_robot_is_made_of_a_urdf_and_of_an_mjcf(name: str) -> None:
+    original = Robot.load(name)
+    q = original.random_configurations(20, seed=5)
+    for robot in (
+        Robot.from_urdf(GENERATED / name / f"{name}.urdf"),
+        Robot.from_mjcf(str(GENERATED / name / f"{name}.xml"), convention="modified"),
+    ):
+        np.testing.assert_allclose(robot.fk(q), original.fk(q), atol=1e-9)
+
+
+def test_a_robot_is_made_of_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "arm.md"
+    path.write_text("| a | alpha | d | theta |\n|---|---|---|---|\n| 0 | -90 | 0.4 | q1 |\n| 0.2 | 0 | 0 | q2 |\n")
+    robot = Robot.from_table(path, convention="standard", angle="deg", length="m", name="planar")
+    assert (robot.name, robot.n) == ("planar", 2)
+    assert robot.spec.rows[0].alpha == -pi / 2
+
+
+def test_an_unknown_word_is_named_with_those_that_are_allowed(arm: Robot) -> None:
+    with pytest.raises(Dh2simError) as caught:
+        arm.convert("modfied")
+    assert str(caught.value) == (
+        "unknown convention 'modfied'. Did you mean 'modified'? Allowed: standard, modified, hayati"
+    )
+    with pytest.raises(Dh2simError, match="unknown format 'sdf'"):
+        arm.export("build", formats=["sdf"])
+
+
+def test_a_robot_cannot_be_changed(arm: Robot) -> None:
+    with pytest.raises(AttributeError):
+        arm.spec = Robot.load("stanford").spec  # type: ignore[misc]
+
+
+def test_a_robot_prints_its_table(arm: Robot) -> None:
+    assert repr(arm) == "<Robot 'my_arm': RRP, standard>"
+    assert str(arm).splitlines() == [
+        "my_arm: DH table, standard convention",
+        "i  joint    type       a_i  alpha_i   d_i  theta_i       limits",
+        "                         m      deg     m      deg",
+        "─  ───────  ─────────  ───  ───────  ────  ───────  ───────────",
+        "1  joint_1  revolute     0      -90   0.4      θ1*",
+        "2  joint_2  revolute     0       90  0.15      θ2*",
+        "3  joint_3  prismatic    0        0   d3*        0  0.1 … 1.2 m",
+    ]
