@@ -1,18 +1,12 @@
-"""Files: written whole or not at all, verified before they are put in place.
+"""Exporting a robot: render its files, verify them with MuJoCo, put them in place all at once; or compare with them.
 
-RobotModel -> the files of its export, as bytes.
-
-What a format cannot carry of what a robot file says: told at every export, so that nothing is lost in silence.
-
-Do the files that were written hold the table? Asked of MuJoCo, which reads both formats.
-
-Exporting one robot: render, stage, verify, put in place; or compare with what stands on disk.
+Every export reports what its formats cannot hold of the robot file, so that nothing is lost in silence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from pathlib import Path
 
@@ -22,13 +16,13 @@ from dh2sim.errors import EngineError, MismatchError, ModelError
 from dh2sim.files import put_in_place, staged
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
+from dh2sim.formats.urdf.write import DYNAMICS as URDF_DYNAMICS
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType
-from dh2sim.typing import Array
+from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Dynamics
 
 
 class Format(StrEnum):
@@ -71,49 +65,92 @@ def render(model: RobotModel, formats: Collection[Format], *, dh_frames: bool = 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 
 
-def losses(model: RobotModel, formats: Collection[Format]) -> list[str]:
-    """List what the robot file says and the formats leave out, a line each, beginning with the format's name."""
-    lines = []
+class Lost(StrEnum):
+    """What a format may be unable to hold."""
+
+    ACTUATORS = "actuators and their gains"
+    DYNAMICS = "dynamics"
+    CONFIGURATIONS = "configurations"
+    GRAVITY = "gravity"
+    EXCLUSIONS = "pairs of links that do not collide"
+    VELOCITY = "velocity limits"
+    APPEARANCE = "colours and textures of meshes"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loss:
+    """Something that the robot file says and an export leaves out."""
+
+    what: Lost
+    format: Format | None
+    """None where no format can hold it."""
+    where: tuple[str, ...] = ()
+    """Names of the joints, links or configurations; ``a-b`` for a pair of links."""
+    detail: str = ""
+    """The key of a joint's dynamics, or the suffix of a mesh file."""
+
+    def __str__(self) -> str:
+        """Return it in words, such as ``URDF: armature of joint_1``."""
+        names = ", ".join(self.where)
+        words: str = self.what
+        match self.what:
+            case Lost.DYNAMICS:
+                words = f"{self.detail} of {names}"
+            case Lost.VELOCITY:
+                words = f"{self.what} of {names}"
+            case Lost.CONFIGURATIONS:
+                words = f"{self.what} ({names})"
+            case Lost.EXCLUSIONS:
+                pairs = "1 pair" if len(self.where) == 1 else f"{len(self.where)} pairs"
+                words = f"{pairs} of links that do not collide ('dh2sim info' lists them, as in an SRDF)"
+            case Lost.APPEARANCE:
+                words = (
+                    f"mesh of {names}: converted from {self.detail} to binary STL, which has no colours or textures"
+                )
+        return words if self.format is None else f"{self.format.upper()}: {words}"
+
+
+def losses(model: RobotModel, formats: Collection[Format]) -> list[Loss]:
+    """List what the robot file says and the formats cannot hold."""
+    found: list[Loss] = []
     if Format.URDF in formats:
-        lines += [f"URDF: {loss}" for loss in _urdf(model)]
+        found += _lost_in_urdf(model)
     if Format.MJCF in formats:
-        lines += [f"MJCF: {loss}" for loss in _mjcf(model)]
+        found += _lost_in_mjcf(model)
     for link in model.all_links:
         if link.mesh is not None and link.mesh.converted_from is not None:
-            lines.append(
-                f"mesh of {link.name}: converted from {link.mesh.converted_from} to binary STL, "
-                "which has no colours or textures"
-            )
-    return lines
+            suffix = link.mesh.converted_from
+            found.append(Loss(what=Lost.APPEARANCE, format=None, where=(link.name,), detail=suffix))
+    return found
 
 
-def _urdf(model: RobotModel) -> Iterable[str]:
-    if any(_said(row.actuator) for row in model.spec.moving_rows):
-        yield "actuators and their gains"
-    armature = [row.name for row in model.spec.rows if row.dynamics.armature]
-    if armature:
-        yield f"armature of {', '.join(armature)}"
-    if model.spec.configurations:
-        yield f"configurations ({', '.join(model.spec.configurations)})"
-    if tuple(float(g) for g in model.spec.gravity) != STANDARD_GRAVITY:
-        yield "gravity"
+def _lost_in_urdf(model: RobotModel) -> Iterator[Loss]:
+    spec, urdf = model.spec, Format.URDF
+    if any(_drives(row.actuator) for row in spec.moving_rows):
+        yield Loss(what=Lost.ACTUATORS, format=urdf)
+    for key in (field.name for field in fields(Dynamics) if field.name not in URDF_DYNAMICS):
+        if names := tuple(row.name for row in spec.rows if getattr(row.dynamics, key)):
+            yield Loss(what=Lost.DYNAMICS, format=urdf, where=names, detail=key)
+    if spec.configurations:
+        yield Loss(what=Lost.CONFIGURATIONS, format=urdf, where=tuple(spec.configurations))
+    if tuple(float(g) for g in spec.gravity) != STANDARD_GRAVITY:
+        yield Loss(what=Lost.GRAVITY, format=urdf)
     if model.excluded:
-        count = len(model.excluded)
-        pairs = "1 pair" if count == 1 else f"{count} pairs"
-        yield f"{pairs} of links that do not collide ('dh2sim info' lists them, as in an SRDF)"
+        pairs = tuple(f"{pair.link1}-{pair.link2}" for pair in model.excluded)
+        yield Loss(what=Lost.EXCLUSIONS, format=urdf, where=pairs)
 
 
-def _mjcf(model: RobotModel) -> Iterable[str]:
-    velocity = [
+def _lost_in_mjcf(model: RobotModel) -> Iterator[Loss]:
+    names = tuple(
         row.name
         for row in model.spec.rows
         if row.limits.velocity is not None and row.actuator.type is not ActuatorType.VELOCITY
-    ]
-    if velocity:
-        yield f"velocity limits of {', '.join(velocity)}"
+    )
+    if names:
+        yield Loss(what=Lost.VELOCITY, format=Format.MJCF, where=names)
 
 
-def _said(actuator: ActuatorSpec) -> bool:
+def _drives(actuator: ActuatorSpec) -> bool:
     """Whether the robot file drives the joint in a way of its own; 'none' is what a URDF has anyway."""
     of_its_own = actuator.type in (ActuatorType.VELOCITY, ActuatorType.MOTOR)
     return of_its_own or actuator.kp is not None or actuator.kv is not None
@@ -135,14 +172,6 @@ class Verified:
     """Greatest angle, rad."""
 
 
-def sampling_limits(model: RobotModel) -> tuple[Array, Array]:
-    """Lower and upper joint coordinates to sample between, rad and m, shape (n,) each; ±π for continuous joints."""
-    ranges = [joint.range for joint in model.moving_joints]
-    lower = [-np.pi if r is None else r.lower for r in ranges]
-    upper = [np.pi if r is None else r.upper for r in ranges]
-    return np.array(lower, dtype=np.float64), np.array(upper, dtype=np.float64)
-
-
 def verify(model: RobotModel, folder: Path, formats: Collection[Format]) -> list[Verified]:
     """Compare all frames of the files in ``folder`` with the table at scattered configurations.
 
@@ -152,8 +181,7 @@ def verify(model: RobotModel, folder: Path, formats: Collection[Format]) -> list
     """
     from dh2sim.engines.mujoco_engine import MujocoEngine
 
-    lower, upper = sampling_limits(model)
-    q = scattered_configurations(lower, upper, SAMPLES)
+    q = scattered_configurations(*model.travel, SAMPLES)
     table = np.concatenate([table_frame_poses(model.spec, q), table_tool_pose(model.spec, q)[:, None]], axis=1)
     names = [joint.name for joint in model.moving_joints]
     results = []
@@ -162,8 +190,8 @@ def verify(model: RobotModel, folder: Path, formats: Collection[Format]) -> list
         try:
             engine = MujocoEngine(path, names, len(model.joints))
         except EngineError as error:
-            told = str(error).replace(str(path), path.name)  # the temporary folder is nobody's business
-            raise EngineError(f"{model.name}: {told}; nothing was written") from error
+            reason = str(error).replace(str(path), path.name)  # without the temporary folder
+            raise EngineError(f"{model.name}: {reason}; nothing was written") from error
         reference = table if len(engine.frames) > 1 else table[:, -1:]
         position, rotation = pose_errors(engine.frame_poses(q), reference)
         result = Verified(
@@ -191,7 +219,7 @@ class ExportedFile:
     size: int
     """Bytes."""
     changed: bool
-    """Whether it differs from what stood there before."""
+    """Whether it differs from the file that was there before."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,8 +229,9 @@ class ExportReport:
     name: str
     files: tuple[ExportedFile, ...]
     verified: tuple[Verified, ...]
-    """Empty where verification was left out."""
-    losses: tuple[str, ...]
+    """Empty without verification."""
+    losses: tuple[Loss, ...]
+    """What the robot file says and the formats cannot hold."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -232,13 +261,13 @@ def export_robot(
         verified: whether to compare the written files with the table before they are put in place.
 
     Returns:
-        What was written, how well it matches, and what the formats cannot carry.
+        What was written, how well it matches, and what the formats cannot hold.
 
     Raises:
         ModelError: a format cannot hold the robot.
         EngineError: MuJoCo refuses a file.
         MismatchError: a file's poses differ from the table's.
-        OutputError: the files cannot be written. In each case what stood there before stands untouched.
+        OutputError: the files cannot be written. In each case the files that were there before are untouched.
     """
     files = render(model, formats, dh_frames=dh_frames)
     target = out / model.name

@@ -118,23 +118,11 @@ def _tell(report: ExportReport, out: Path, model: RobotModel) -> None:
     print(f"{report.name}: {folder}")
     for name, size, told, state in lines:
         print(f"  {name:{widths[0]}}  {size:>{widths[1]}}  {told:{widths[2]}}  {state}".rstrip())
-    _list("not carried over", report.losses)
-    _list("estimated from the shapes", _estimated(model))
-    _list("assumed", _assumed(model))
+    _list("not carried over", map(str, report.losses))
+    _list("estimated from the shapes", (f"{entry}." for entry in model.estimates))
+    _list("assumed", (f"{entry}." for entry in model.assumptions))
 
 
 def _list(title: str, lines: Iterable[str]) -> None:
     for line in lines:
         print(textwrap.fill(f"{title}: {line}", 80, initial_indent="  ", subsequent_indent="    "))
-
-
-def _estimated(model: RobotModel) -> list[str]:
-    from dh2sim.formats.xml_write import estimates
-
-    return [line.removeprefix("Estimated from the shapes, not measured: ") for line in estimates(model.links)]
-
-
-def _assumed(model: RobotModel) -> list[str]:
-    from dh2sim.formats.xml_write import assumptions
-
-    return [line.removeprefix("Assumed, not given: ") for line in assumptions(model.joints)]

@@ -81,7 +81,7 @@ def _row_dict(row: Row, joint: JointModel) -> dict[str, Any]:
         "limits": None
         if not row.type.moves
         else {
-            "position": None if joint.range is None else [joint.range.lower, joint.range.upper],
+            "position": None if joint.position_range is None else list(joint.position_range),
             "velocity": joint.velocity,
             "effort": joint.effort,
             "assumed": list(joint.assumed),
@@ -161,11 +161,12 @@ def _variable(name: str, offset: float, row: Row) -> str:
 def _limits(row: Row, joint: JointModel) -> str:
     if not row.type.moves:
         return ""
-    if joint.range is None:
+    if joint.position_range is None:
         return "none"
     unit, scale = ("°", 180 / math.pi) if row.type.turns else (" m", 1.0)
-    text = f"{_short(joint.range.lower * scale)} … {_short(joint.range.upper * scale)}{unit}"
-    return f"({text})" if joint.range.assumed else text
+    lower, upper = joint.position_range
+    text = f"{_short(lower * scale)} … {_short(upper * scale)}{unit}"
+    return f"({text})" if "position" in joint.assumed else text
 
 
 def _frame_table(model: RobotModel) -> Any:
@@ -191,10 +192,8 @@ def _frame_table(model: RobotModel) -> Any:
 
 
 def _remarks(model: RobotModel) -> list[str]:
-    from dh2sim.formats.xml_write import assumptions, estimates
-
-    lines = [*estimates(model.links), *assumptions(model.joints)]
-    if any(joint.range is not None and joint.range.assumed for joint in model.moving_joints):
+    lines = [entry.sentence for entry in (*model.estimates, *model.assumptions)]
+    if any("position" in joint.assumed for joint in model.moving_joints):
         lines.append("Limits in parentheses are assumed.")
     if model.excluded:
         lines.append("Pairs of links that do not collide, as in an SRDF:")

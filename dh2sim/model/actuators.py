@@ -1,21 +1,18 @@
-"""Actuators: gains that the robot file leaves open.
+"""Actuators: gains that the robot file leaves open, and the loads and inertias that they are chosen for.
 
-What gravity asks of the joints and how much inertia they see, in one configuration.
-
-Used to choose actuator gains and to let keyframes stand still; plain double arithmetic in a fixed order, so that
-every machine writes the same bytes.
+Plain double arithmetic in a fixed order, so that every machine writes the same bytes.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import reference_joint_poses
 from dh2sim.model.link_shapes import neat
 from dh2sim.model.mass import MassProperties, in_frame, shift_inertia
-from dh2sim.model.robot_model import ActuatorModel
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType
 from dh2sim.typing import Array
 
@@ -23,7 +20,7 @@ from dh2sim.typing import Array
 def gravity_loads(
     chain: KinematicChain, bodies: Sequence[MassProperties | None], q: Array, gravity: Array
 ) -> tuple[float, ...]:
-    """Generalised force that each joint must exert to hold the robot still.
+    """Return the generalised force that each joint must exert to hold the robot still.
 
     Args:
         chain: the chain, n rows of which m move.
@@ -57,7 +54,7 @@ def gravity_loads(
 
 
 def seen_inertias(chain: KinematicChain, bodies: Sequence[MassProperties | None], q: Array) -> tuple[float, ...]:
-    """Inertia or mass that each joint sees with all others locked: the diagonal of the mass matrix.
+    """Return the inertia or mass that each joint sees with all others locked: the diagonal of the mass matrix.
 
     Args:
         chain: as for ``gravity_loads``.
@@ -104,8 +101,21 @@ ASSUMED_BANDWIDTH = 100.0
 """rad/s: natural frequency that assumed gains give each joint, critically damped, in the home configuration."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ActuatorModel:
+    """What drives a joint, with gains."""
+
+    type: ActuatorType
+    kp: float
+    """N·m/rad or N/m; 0 where the type has none."""
+    kv: float
+    """N·m·s/rad or N·s/m; 0 where the type has none."""
+    assumed: bool
+    """Whether a gain was chosen by dh2sim because the robot file gives none."""
+
+
 def actuator_model(actuator: ActuatorSpec, inertia: float) -> ActuatorModel:
-    """Fill in gains: a joint becomes a critically damped oscillator, kp = I w² and kv = 2 I w.
+    """Fill in gains that make a joint a critically damped oscillator, kp = I w² and kv = 2 I w.
 
     Args:
         actuator: what the robot file says.

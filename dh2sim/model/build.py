@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from types import MappingProxyType
 
 from dh2sim.kinematics.chain import Joint, KinematicChain, build_chain
-from dh2sim.model.actuators import actuator_model, gravity_loads, seen_inertias
+from dh2sim.model.actuators import actuator_model, seen_inertias
 from dh2sim.model.collision_exclusions import excluded_pairs
-from dh2sim.model.limits import ASSUMED_SLIDE_RATE, ASSUMED_TURN_RATE, PositionRange, position_range, reach_bound
+from dh2sim.model.limits import Range, clamped, filled_limits, load_bound, position_ranges, reach_bound
 from dh2sim.model.link_shapes import lay_out, link_scale, neat
 from dh2sim.model.mass import link_inertial
 from dh2sim.model.meshes import load_mesh
@@ -18,8 +16,6 @@ from dh2sim.model.shapes import Shape
 from dh2sim.robot.spec import JointType, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 
-ASSUMED_ACCELERATION = 10.0
-"""rad/s² or m/s²: an assumed effort limit lifts twice the arm's weight, stretched, at this acceleration."""
 SLENDERNESS = 0.16
 """Radius of the base's shapes as a share of the mean segment."""
 TAPER = 0.45
@@ -46,7 +42,7 @@ def build_model(spec: RobotSpec) -> RobotModel:
         MeshError: a mesh file cannot be used.
     """
     chain = build_chain(spec)
-    ranges = [position_range(row, chain, spec.rows) for row in spec.rows]
+    ranges = position_ranges(chain, spec.rows)
     shapes = _shapes(spec, chain, ranges)
     links = tuple(
         _link(row, joint, own, i)
@@ -65,42 +61,36 @@ def build_model(spec: RobotSpec) -> RobotModel:
     home = _home(spec, ranges)
     zero = read_only([0.0] * chain.n)
     seen = iter(seen_inertias(chain, bodies, home))
-    reach = reach_bound(chain, spec.rows)
-    joints = tuple(
-        _joint(row, joint, limit, next(seen) if row.type.moves else 0.0, _load_bound(i, chain, links, ranges, spec))
-        for i, (row, joint, limit) in enumerate(zip(spec.rows, chain.joints, ranges, strict=True))
-    )
+    joints = []
+    for i, (row, joint, position) in enumerate(zip(spec.rows, chain.joints, ranges, strict=True)):
+        inertia = next(seen) if row.type.moves else 0.0
+        limits, assumed = filled_limits(row, position, load_bound(i, chain, ranges, bodies, spec.gravity), inertia)
+        actuator = actuator_model(row.actuator, inertia + row.dynamics.armature)
+        joints.append(
+            JointModel(joint=joint, limits=limits, assumed=assumed, dynamics=row.dynamics, actuator=actuator)
+        )
     return RobotModel(
         spec=spec,
         chain=chain,
         base=base,
         links=links,
-        joints=joints,
+        joints=tuple(joints),
         excluded=excluded_pairs(chain, [base.name, *(link.name for link in links)], shapes, (zero, home)),
-        reach=reach,
+        reach=reach_bound(chain, spec.rows),
         home=home,
-        holding=MappingProxyType(
-            {name: gravity_loads(chain, bodies, q, spec.gravity) for name, q in spec.configurations.items()}
-        ),
     )
 
 
-def _home(spec: RobotSpec, ranges: Sequence[PositionRange | None]) -> Array:
+def _home(spec: RobotSpec, ranges: Sequence[Range | None]) -> Array:
     if "home" in spec.configurations:
         return spec.configurations["home"]
-    inside = []
-    for row, limit in zip(spec.rows, ranges, strict=True):
-        if row.type.moves:
-            inside.append(0.0 if limit is None else min(max(0.0, limit.lower), limit.upper))
-    return read_only(inside)
+    return read_only([clamped(0.0, span) for row, span in zip(spec.rows, ranges, strict=True) if row.type.moves])
 
 
-def _shapes(
-    spec: RobotSpec, chain: KinematicChain, ranges: Sequence[PositionRange | None]
-) -> tuple[tuple[Shape, ...], ...]:
+def _shapes(spec: RobotSpec, chain: KinematicChain, ranges: Sequence[Range | None]) -> tuple[tuple[Shape, ...], ...]:
     travels = [
-        _travel(joint, limit) if joint.type is JointType.PRISMATIC and limit is not None else (0.0, 0.0)
-        for joint, limit in zip(chain.joints, ranges, strict=True)
+        _travel(joint, span) if joint.type is JointType.PRISMATIC and span is not None else (0.0, 0.0)
+        for joint, span in zip(chain.joints, ranges, strict=True)
     ]
     scale = link_scale(chain, travels)
     n = len(spec.rows)
@@ -110,9 +100,9 @@ def _shapes(
     return lay_out(chain, travels, radii, scale)
 
 
-def _travel(joint: Joint, limit: PositionRange) -> tuple[float, float]:
-    """Lowest and highest displacement along the joint frame's +z, m."""
-    ends = (joint.sign * limit.lower, joint.sign * limit.upper)
+def _travel(joint: Joint, span: Range) -> Range:
+    """Return the lowest and highest displacement along the joint frame's +z, m."""
+    ends = (joint.sign * span[0], joint.sign * span[1])
     return min(ends), max(ends)
 
 
@@ -128,59 +118,3 @@ def _link(row: Row, joint: Joint, shapes: tuple[Shape, ...], i: int) -> LinkMode
         inertial=inertial,
         estimated=estimated,
     )
-
-
-def _joint(row: Row, joint: Joint, limit: PositionRange | None, seen: float, load_bound: float) -> JointModel:
-    assumed = []
-    velocity, effort = row.limits.velocity, row.limits.effort
-    if limit is not None and limit.assumed:
-        assumed.append("position")
-    if velocity is None:
-        velocity = ASSUMED_TURN_RATE if row.type.turns else ASSUMED_SLIDE_RATE
-        assumed.append("velocity")
-    if effort is None:
-        effort = _round_up(2 * (load_bound + seen * ASSUMED_ACCELERATION)) or 1.0
-        assumed.append("effort")
-    return JointModel(
-        joint=joint,
-        range=limit,
-        velocity=velocity,
-        effort=effort,
-        assumed=tuple(assumed) if row.type.moves else (),
-        dynamics=row.dynamics,
-        actuator=actuator_model(row.actuator, seen + row.dynamics.armature),
-    )
-
-
-def _load_bound(
-    i: int,
-    chain: KinematicChain,
-    links: Sequence[LinkModel],
-    ranges: Sequence[PositionRange | None],
-    spec: RobotSpec,
-) -> float:
-    """Upper bound of what gravity asks of joint ``i`` in any pose, N·m or N."""
-    g = math.sqrt(math.fsum(float(x) * float(x) for x in spec.gravity)) or 9.81
-    terms, distance = [], 0.0
-    for joint, limit, link in zip(chain.joints[i:], ranges[i:], links[i:], strict=True):
-        if joint is not chain.joints[i]:
-            distance += _length(joint.T_parent_joint[:3, 3])
-            if joint.type is JointType.PRISMATIC and limit is not None:
-                distance += max(abs(limit.lower), abs(limit.upper))
-        if link.inertial is not None:
-            arm = distance + _length(link.inertial.com) if spec.rows[i].type.turns else 1.0
-            terms.append(link.inertial.mass * g * arm)
-    return math.fsum(terms)
-
-
-def _length(vector: Array) -> float:
-    x, y, z = (float(component) for component in vector)
-    return math.sqrt(x * x + y * y + z * z)
-
-
-def _round_up(value: float) -> float:
-    """Up to two significant digits."""
-    if value == 0.0:
-        return 0.0
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return float(f"{math.ceil(value / unit - 1e-9) * unit:.6g}")

@@ -1,15 +1,13 @@
-"""Mass, centre of mass and inertia of solid primitives in closed form, and of what is built from them.
+"""Mass, centre of mass and inertia: of solid primitives in closed form, of what is built from them, and of links.
 
 Everything is done in plain double arithmetic in a fixed order, so that every machine writes the same bytes.
-
-Mass properties of a link, from what its robot file says and from its shapes.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +20,12 @@ from dh2sim.typing import Array, read_only
 ROUNDING = (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """By which shares of its trace an inertia may be mended: numbers in robot files are rounded."""
 _TRIANGLE_TOLERANCE = 1e-9
+ASSUMED_DENSITY = 1000.0
+"""kg/m³: what a hollow arm with its motors weighs is nearer to water than to aluminium."""
+LEAST_MASS = 1e-9
+"""kg: estimates are no smaller."""
+LEAST_INERTIA = 1e-14
+"""kg·m²: estimates are no smaller. MuJoCo refuses moving bodies of less than 1e-15."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,7 +41,7 @@ class MassProperties:
 
 
 def of_shape(shape: Shape, density: float) -> MassProperties:
-    """Mass properties of a solid shape in its link's frame; ``density`` in kg/m³.
+    """Return the mass properties of a solid shape in its link's frame; ``density`` in kg/m³.
 
     Cylinder: I_z = m r²/2, I_x = m (3 r² + l²)/12. The capsule adds two half balls of mass m_b = 2/3 π r³ ρ, whose
     centres of mass lie 3/8 r beyond the cylinder's ends: I_z += 2 · 2/5 m_b r²,
@@ -58,7 +62,7 @@ def of_shape(shape: Shape, density: float) -> MassProperties:
 
 
 def combine(parts: Iterable[MassProperties]) -> MassProperties:
-    """Mass properties of rigid bodies fixed to each other, all in one frame (parallel-axis theorem)."""
+    """Combine rigid bodies that are fixed to each other, all given in one frame (parallel-axis theorem)."""
     parts = tuple(parts)
     mass = math.fsum(part.mass for part in parts)
     com = [math.fsum(part.mass * float(part.com[i]) for part in parts) / mass for i in range(3)]
@@ -70,7 +74,7 @@ def combine(parts: Iterable[MassProperties]) -> MassProperties:
 
 
 def shift_inertia(inertia: Array, mass: float, offset: list[float]) -> Array:
-    """Inertia, shape (3, 3), about a point ``offset`` (m) away from the centre of mass: I + m (o·o E - o oᵀ)."""
+    """Return the inertia, shape (3, 3), about a point ``offset`` (m) from the centre: I + m (o·o E - o oᵀ)."""
     square = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]
     return read_only(
         [
@@ -93,7 +97,7 @@ def is_possible(inertia: Array) -> bool:
 
 
 def made_possible(inertia: Array) -> Array:
-    """The inertia, shape (3, 3), of a body of which no two principal moments make less than the third.
+    """Return the inertia, shape (3, 3), mended so that no two principal moments make less than the third.
 
     A flat body has A + B = C, which is A + B < C after rounding, and then MuJoCo refuses the file. The second moments
     of mass, tr(I)/2 E - I, are what must be positive; a multiple of E is added where they are not, no greater than
@@ -113,14 +117,14 @@ def made_possible(inertia: Array) -> Array:
 
 
 def at_least(inertia: Array, least: float) -> Array:
-    """The inertia, shape (3, 3), or where a principal moment may be below ``least``, that much more of all three."""
+    """Return the inertia, shape (3, 3); where a principal moment may be below ``least``, all are greater by that."""
     if min(_pivots(inertia.tolist())) >= least:
         return inertia
     return read_only([[float(inertia[i, j]) + (least if i == j else 0.0) for j in range(3)] for i in range(3)])
 
 
 def _pivots(A: list[list[float]]) -> list[float]:
-    """Pivots of a symmetric matrix, up to the first that is not positive; all are where it is positive definite."""
+    """Return the pivots of a symmetric matrix, up to the first not positive; all are if it is positive definite."""
     first = A[0][0]
     if first <= 0.0:
         return [first]
@@ -129,25 +133,16 @@ def _pivots(A: list[list[float]]) -> list[float]:
 
 
 def in_frame(T: Array, body: MassProperties) -> MassProperties:
-    """``body``, given in frame b, in the frame a in which b has pose ``T`` (T_a_b, shape (4, 4))."""
+    """Return ``body``, given in frame b, in the frame a in which b has pose ``T`` (T_a_b, shape (4, 4))."""
     return MassProperties(
         mass=body.mass, com=read_only(move_point(T, body.com)), inertia=rotate_tensor(T, body.inertia)
     )
 
 
-ASSUMED_DENSITY = 1000.0
-"""kg/m³: what a hollow arm with its motors weighs is nearer to water than to aluminium."""
-
-LEAST_MASS = 1e-9
-"""kg, and"""
-LEAST_INERTIA = 1e-14
-"""kg·m²: estimates are no smaller. MuJoCo refuses moving bodies of less than 1e-15."""
-
-
 def link_inertial(
     link: LinkSpec, joint: Joint, shapes: tuple[Shape, ...]
 ) -> tuple[MassProperties | None, tuple[str, ...]]:
-    """Mass properties of a link, what the robot file gives winning over what the shapes tell.
+    """Return the mass properties of a link; what the robot file gives wins over estimates from the shapes.
 
     Args:
         link: what the file says; centre of mass and inertia in DH frame i.
@@ -162,8 +157,8 @@ def link_inertial(
     if not shapes and all(value is None for value in given.values()):
         return None, ()
     estimate = _estimate(link, shapes)
-    mass = max(estimate.mass, LEAST_MASS) if link.mass is None else link.mass
-    com, inertia = estimate.com, at_least(read_only(estimate.inertia * (mass / estimate.mass)), LEAST_INERTIA)
+    estimate = _of_mass(estimate, max(estimate.mass, LEAST_MASS) if link.mass is None else link.mass)
+    mass, com, inertia = estimate.mass, estimate.com, estimate.inertia
     in_dh = in_frame(
         joint.T_joint_dh,
         MassProperties(
@@ -180,8 +175,20 @@ def link_inertial(
     return body, tuple(k for k, v in given.items() if v is None)
 
 
+def of_shapes(shapes: Iterable[Shape], density: float) -> MassProperties:
+    """Return the mass properties of a link of solid shapes, none too small for MuJoCo; ``density`` in kg/m³."""
+    whole = combine(of_shape(shape, density) for shape in shapes)
+    whole = _of_mass(whole, max(whole.mass, LEAST_MASS))
+    return replace(whole, inertia=made_possible(whole.inertia))
+
+
+def _of_mass(body: MassProperties, mass: float) -> MassProperties:
+    """Return a body of the same shape and another mass, kg; its inertia is not too small for MuJoCo."""
+    return replace(body, mass=mass, inertia=at_least(read_only(body.inertia * (mass / body.mass)), LEAST_INERTIA))
+
+
 def _estimate(link: LinkSpec, shapes: tuple[Shape, ...]) -> MassProperties:
-    """From the shapes; a fixed link without any, but with a mass, counts as a small ball at its joint."""
+    """Estimate from the shapes; a fixed link without any, but with a mass, counts as a small ball at its joint."""
     if shapes:
         return combine(of_shape(shape, link.density or ASSUMED_DENSITY) for shape in shapes)
     mass, r = link.mass or 1.0, link.radius or 0.01

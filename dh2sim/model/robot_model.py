@@ -2,20 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import StrEnum
 
 from dh2sim.kinematics.chain import Joint, KinematicChain
+from dh2sim.model.actuators import ActuatorModel, gravity_loads
 from dh2sim.model.collision_exclusions import ExcludedPair
-from dh2sim.model.limits import PositionRange
+from dh2sim.model.limits import Range, clamped
 from dh2sim.model.mass import MassProperties
 from dh2sim.model.meshes import MeshAsset
 from dh2sim.model.shapes import Shape
-from dh2sim.robot.spec import ActuatorType, Dynamics, RobotSpec
-from dh2sim.typing import Array
+from dh2sim.robot.spec import ActuatorType, Dynamics, Limits, RobotSpec
+from dh2sim.typing import Array, read_only
 
 Color = tuple[float, float, float, float]
 """Red, green, blue, alpha, each from 0 to 1."""
+
+
+class FilledInHow(StrEnum):
+    """How dh2sim came by a number that the robot file does not give."""
+
+    ESTIMATED = "Estimated from the shapes, not measured"
+    ASSUMED = "Assumed, not given"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilledIn:
+    """Properties that the robot file leaves open, filled in for some links or joints."""
+
+    how: FilledInHow
+    what: tuple[str, ...]
+    """Such as 'mass' and 'com', or 'velocity' and 'effort'."""
+    where: tuple[str, ...]
+    """Names of the links or joints."""
+    everywhere: bool = False
+    """Whether these are all moving joints."""
+
+    def __str__(self) -> str:
+        """Return ``mass, com, inertia of link_1 to link_6``, or ``velocity, effort limits of all joints``."""
+        what = ", ".join(self.what)
+        if self.how is FilledInHow.ESTIMATED:
+            return f"{what} of {_spans(self.where)}"
+        return f"{what} limits of {'all joints' if self.everywhere else ', '.join(self.where)}"
+
+    @property
+    def sentence(self) -> str:
+        """The same as a whole sentence."""
+        return f"{self.how}: {self}."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,31 +72,14 @@ class LinkModel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ActuatorModel:
-    """What drives a joint, with gains."""
-
-    type: ActuatorType
-    kp: float
-    """N·m/rad or N/m; 0 where the type has none."""
-    kv: float
-    """N·m·s/rad or N·s/m; 0 where the type has none."""
-    assumed: bool
-    """Whether a gain was chosen by dh2sim because the robot file gives none."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointModel:
     """A joint with its limits, dynamics and actuator."""
 
     joint: Joint
-    range: PositionRange | None
-    """None for continuous and fixed joints."""
-    velocity: float
-    """Velocity limit, rad/s or m/s."""
-    effort: float
-    """Effort limit, N·m or N."""
+    limits: Limits
+    """The robot file's, with what it leaves open filled in; continuous and fixed joints have no position limits."""
     assumed: tuple[str, ...]
-    """Which of 'position', 'velocity' and 'effort' limits were assumed."""
+    """Which of the limits 'position', 'velocity' and 'effort' were assumed."""
     dynamics: Dynamics
     actuator: ActuatorModel
 
@@ -69,6 +87,43 @@ class JointModel:
     def name(self) -> str:
         """The joint's name."""
         return self.joint.name
+
+    @property
+    def position_range(self) -> Range | None:
+        """Lowest and highest coordinate, rad or m; None for continuous and fixed joints."""
+        return self.limits.position
+
+    @property
+    def travel(self) -> Range:
+        """Coordinates to sample or to show, rad or m: the position range, or one turn for a continuous joint."""
+        return (-math.pi, math.pi) if self.position_range is None else self.position_range
+
+    @property
+    def velocity(self) -> float:
+        """Velocity limit, rad/s or m/s; infinite without one."""
+        return math.inf if self.limits.velocity is None else self.limits.velocity
+
+    @property
+    def effort(self) -> float:
+        """Effort limit, N·m or N; infinite without one."""
+        return math.inf if self.limits.effort is None else self.limits.effort
+
+    @property
+    def control_range(self) -> Range | None:
+        """Range of the actuator's control, from the limits: rad or m, their rate, N·m or N; None if unlimited."""
+        match self.actuator.type:
+            case ActuatorType.POSITION:
+                return self.position_range
+            case ActuatorType.VELOCITY:
+                return -self.velocity, self.velocity
+            case ActuatorType.MOTOR:
+                return -self.effort, self.effort
+            case ActuatorType.NONE:
+                return None
+
+    def clamped(self, position: float) -> float:
+        """Return a coordinate, rad or m, moved inside the position range."""
+        return clamped(position, self.position_range)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,8 +144,6 @@ class RobotModel:
     """Upper bound of the distance from base_link's origin to any frame, m."""
     home: Array
     """The configuration 'home', or zero moved inside the limits; rad or m, shape (m,)."""
-    holding: Mapping[str, tuple[float, ...]]
-    """For every named configuration the generalised forces that hold the robot still in it, N·m or N."""
 
     @property
     def name(self) -> str:
@@ -108,6 +161,77 @@ class RobotModel:
         return tuple(joint for joint in self.joints if joint.joint.type.moves)
 
     @property
+    def bodies(self) -> tuple[MassProperties | None, ...]:
+        """Mass properties of link_1 … link_n, each in its joint frame."""
+        return tuple(link.inertial for link in self.links)
+
+    @property
     def mass(self) -> float:
         """Mass of all links that move, kg."""
-        return sum(link.inertial.mass for link in self.links if link.inertial is not None)
+        return sum(body.mass for body in self.bodies if body is not None)
+
+    @property
+    def travel(self) -> tuple[Array, Array]:
+        """Lower and upper joint coordinates to sample between, rad and m, shape (m,) each; see ``JointModel``."""
+        travels = [joint.travel for joint in self.moving_joints]
+        return read_only([lower for lower, _ in travels]), read_only([upper for _, upper in travels])
+
+    def gravity_loads(self, q: Array) -> tuple[float, ...]:
+        """Return the generalised forces, N·m or N, that hold the robot still at ``q`` (rad or m, shape (m,))."""
+        return gravity_loads(self.chain, self.bodies, q, self.spec.gravity)
+
+    def holding_controls(self, q: Array) -> list[float]:
+        """Return the controls, one an actuator, with which the robot stands still at ``q`` (rad or m, shape (m,)).
+
+        A position actuator is asked for a little more than the joint's position, so that its pull balances gravity.
+        Clipped to the control's range.
+        """
+        controls = []
+        for joint, position, load in zip(self.moving_joints, q, self.gravity_loads(q), strict=True):
+            match joint.actuator.type:
+                case ActuatorType.POSITION:
+                    control = float(position) + (load / joint.actuator.kp if joint.actuator.kp else 0.0)
+                case ActuatorType.VELOCITY:
+                    control = 0.0
+                case ActuatorType.MOTOR:
+                    control = load
+                case ActuatorType.NONE:
+                    continue
+            controls.append(clamped(control, joint.control_range))
+        return controls
+
+    @property
+    def estimates(self) -> tuple[FilledIn, ...]:
+        """What was estimated from the shapes; links of which the same was estimated together."""
+        found = ((link.name, link.estimated) for link in self.links)
+        return tuple(FilledIn(how=FilledInHow.ESTIMATED, what=what, where=names) for what, names in _grouped(found))
+
+    @property
+    def assumptions(self) -> tuple[FilledIn, ...]:
+        """Which limits were assumed; joints of which the same were assumed together."""
+        found = _grouped((joint.name, joint.assumed) for joint in self.moving_joints)
+        n = self.chain.n
+        return tuple(
+            FilledIn(how=FilledInHow.ASSUMED, what=what, where=names, everywhere=len(names) == n)
+            for what, names in found
+        )
+
+
+def _grouped(entries: Iterable[tuple[str, tuple[str, ...]]]) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """Names by the properties that were filled in for them, in the order in which these first occur."""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for name, what in entries:
+        if what:
+            groups.setdefault(what, []).append(name)
+    return [(what, tuple(names)) for what, names in groups.items()]
+
+
+def _spans(names: Iterable[str]) -> str:
+    """Return ``link_1 to link_3, link_5`` for link_1, link_2, link_3, link_5."""
+    runs: list[list[str]] = []
+    for name in names:
+        if runs and int(name.rsplit("_", 1)[1]) == int(runs[-1][-1].rsplit("_", 1)[1]) + 1:
+            runs[-1].append(name)
+        else:
+            runs.append([name])
+    return ", ".join(" to ".join(dict.fromkeys((run[0], run[-1]))) for run in runs)

@@ -1,11 +1,11 @@
-"""The same robot driven, shown or held otherwise than its file says."""
+"""Variants of a robot: other actuators, no meshes, a base with a mass."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from dh2sim.model.actuators import actuator_model, seen_inertias
-from dh2sim.model.mass import ASSUMED_DENSITY, combine, of_shape
+from dh2sim.model.mass import ASSUMED_DENSITY, of_shapes
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType
 
@@ -20,8 +20,7 @@ def with_actuators(model: RobotModel, kind: ActuatorType) -> RobotModel:
     Returns:
         The robot, with gains chosen like those that a robot file leaves open.
     """
-    bodies = [link.inertial for link in model.links]
-    seen = iter(seen_inertias(model.chain, bodies, model.home))
+    seen = iter(seen_inertias(model.chain, model.bodies, model.home))
     joints = []
     for joint in model.joints:
         inertia = next(seen) if joint.joint.type.moves else 0.0
@@ -44,6 +43,6 @@ def without_meshes(model: RobotModel) -> RobotModel:
 
 def with_base_mass(model: RobotModel) -> RobotModel:
     """Give base_link the mass of its shapes at the assumed density, as a base that floats needs."""
-    inertial = combine(of_shape(shape, ASSUMED_DENSITY) for shape in model.base.shapes)
+    inertial = of_shapes(model.base.shapes, ASSUMED_DENSITY)
     base = replace(model.base, inertial=inertial, estimated=("mass", "com", "inertia"))
     return replace(model, base=base)

@@ -13,7 +13,7 @@ from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
 from dh2sim.errors import EngineCapacityError, EngineError
-from dh2sim.export import export_robot, sampling_limits
+from dh2sim.export import export_robot
 from dh2sim.files import signals_deferred
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.robot_model import RobotModel
@@ -86,7 +86,7 @@ def validate_robot(
 def _validate(
     model: RobotModel, folder: Path, samples: int, seed: int, tolerance: float, advance: Advance | None
 ) -> RobotReport:
-    lower, upper = sampling_limits(model)
+    lower, upper = model.travel
     q = random_configurations(lower, upper, samples, seed)
     library = LibraryEngine(model.chain)
     mjcf, urdf = folder / f"{model.name}.xml", folder / f"{model.name}.urdf"

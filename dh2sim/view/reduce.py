@@ -13,7 +13,6 @@ from typing import Final, assert_never
 
 import numpy as np
 
-from dh2sim.export import sampling_limits
 from dh2sim.kinematics.forward import forward_kinematics, frame_names
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.kinematics.transforms import compose
@@ -23,7 +22,7 @@ from dh2sim.view import events
 from dh2sim.view.events import EditCell, Event, OpenText, Undo
 from dh2sim.view.scene.items import Vector
 from dh2sim.view.scene.solids import position_of
-from dh2sim.view.state import IDENTITY, Goal, Matrix, Mode, Part, Pull, ViewState, configurations, travel, within
+from dh2sim.view.state import IDENTITY, Goal, Matrix, Mode, Part, Pull, ViewState, configurations, within
 from dh2sim.view.table_edits import reading_of, replaced, table_changed
 from dh2sim.view.uploads import opened
 
@@ -182,7 +181,7 @@ def _moved(state: ViewState, event: _Motion) -> ViewState:
                 return _at(state, named[name])
             return replace(state, notice=f"There is no configuration {shown_word(name)}.")
         case events.RandomConfiguration(seed=seed):
-            (drawn,) = random_configurations(*sampling_limits(model), 1, abs(seed)).tolist()
+            (drawn,) = random_configurations(*model.travel, 1, abs(seed)).tolist()
             return _at(state, tuple(drawn))
         case events.Follow(q=seen, T_world_base_link=base):
             usable = state.mode is not Mode.STILL and _fits(model, seen)
@@ -231,6 +230,6 @@ def _nudged(state: ViewState, joint: int, direction: int) -> tuple[float, ...]:
     if not 0 <= joint < len(state.q):
         return state.wanted
     moving = state.model.moving_joints[joint]
-    lower, upper = travel(moving)
+    lower, upper = moving.travel
     step = TURN_STEP if moving.joint.type.turns else SLIDE_STEP * (upper - lower)
     return _exchanged(state.wanted, joint, state.wanted[joint] + math.copysign(step, direction))

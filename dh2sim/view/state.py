@@ -185,11 +185,6 @@ class ViewState:
         return self.model.spec
 
 
-def travel(joint: JointModel) -> tuple[float, float]:
-    """Return the lowest and highest coordinate that a moving joint can be given, rad or m; ±π if continuous."""
-    return (-math.pi, math.pi) if joint.range is None else (joint.range.lower, joint.range.upper)
-
-
 def within(model: RobotModel, q: tuple[float, ...]) -> tuple[float, ...]:
     """Return joint coordinates moved inside the limits; those of continuous joints are turned whole turns.
 
@@ -201,10 +196,10 @@ def within(model: RobotModel, q: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _within(joint: JointModel, value: float) -> float:
-    lower, upper = travel(joint)
-    if joint.range is None:
-        value = value if lower <= value <= upper else math.remainder(value, 2.0 * math.pi)
-    return min(max(value, lower), upper)
+    lower, upper = joint.travel
+    if joint.position_range is None and not lower <= value <= upper:
+        return math.remainder(value, 2.0 * math.pi)
+    return joint.clamped(value)
 
 
 def configurations(model: RobotModel) -> dict[str, tuple[float, ...]]:

@@ -68,7 +68,7 @@ def test_json_tells_all_in_si_units(tmp_path: Path) -> None:
 def test_the_table_reads_as_in_a_textbook(tmp_path: Path) -> None:
     robot = write(tmp_path, FLIPPED)
     lines = dh2sim("info", robot).out.splitlines()
-    travel = build_model(load_robot(robot)).joints[1].range
+    travel = build_model(load_robot(robot)).joints[1].position_range
     assert travel is not None
     assert lines[0] == "flipped  [bold]Not markup[/bold]"
     assert lines[1].strip() == "DH table, standard convention"
@@ -78,7 +78,7 @@ def test_the_table_reads_as_in_a_textbook(tmp_path: Path) -> None:
     ]
     assert [" ".join(line.split()) for line in lines[6:10]] == [
         "1 joint_1 revolute 0.1 -90 0.3 30 - θ1* 10 … 20°",
-        f"2 joint_2 prismatic 0 0 d2* - 0.5 0 ({travel.lower:.6g} … {travel.upper:.6g} m)",
+        f"2 joint_2 prismatic 0 0 d2* - 0.5 0 ({travel[0]:.6g} … {travel[1]:.6g} m)",
         "3 joint_3 continuous 0 0 0 θ3* - 45 none",
         "4 joint_4 fixed 0 0 0.25 15",
     ]

@@ -1,20 +1,31 @@
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 import trimesh
 
 from dh2sim import build_model, parse_robot
-from dh2sim.export import ALL_FORMATS, Format, losses
+from dh2sim.export import ALL_FORMATS, Format, Loss, Lost, losses
+from dh2sim.model.robot_model import RobotModel
 from tests.export.robots import ODD, RICH, small, write
 from tests.program import contents, dh2sim
 
 PAIRS = "URDF: 2 pairs of links that do not collide ('dh2sim info' lists them, as in an SRDF)"
 
 
+def words(model: RobotModel, formats: Iterable[Format]) -> list[str]:
+    return [str(loss) for loss in losses(model, list(formats))]
+
+
+def test_a_loss_is_data_until_it_is_printed() -> None:
+    velocity = losses(build_model(parse_robot(RICH)), [Format.MJCF])
+    assert velocity == [Loss(what=Lost.VELOCITY, format=Format.MJCF, where=("joint_1", "elbow"))]
+
+
 def test_whatever_a_format_cannot_carry_is_listed() -> None:
-    assert losses(build_model(parse_robot(RICH)), ALL_FORMATS) == [
+    assert words(build_model(parse_robot(RICH)), ALL_FORMATS) == [
         "URDF: actuators and their gains",
         "URDF: armature of joint_1",
         "URDF: configurations (home, up)",
@@ -26,7 +37,7 @@ def test_whatever_a_format_cannot_carry_is_listed() -> None:
 
 def test_only_what_the_formats_written_lose_is_listed() -> None:
     model = build_model(parse_robot(RICH))
-    assert losses(model, [Format.MJCF]) == ["MJCF: velocity limits of joint_1, elbow"]
+    assert words(model, [Format.MJCF]) == ["MJCF: velocity limits of joint_1, elbow"]
     assert len(losses(model, [Format.URDF])) == 5
 
 
@@ -43,7 +54,7 @@ def test_only_what_the_formats_written_lose_is_listed() -> None:
 )
 def test_actuators_are_lost_where_the_file_says_something_of_them(actuators: str, lost: list[str]) -> None:
     model = build_model(parse_robot(small() + actuators))
-    assert losses(model, ALL_FORMATS) == [*lost, PAIRS]
+    assert words(model, ALL_FORMATS) == [*lost, PAIRS]
 
 
 def test_a_velocity_limit_is_not_lost_where_a_velocity_actuator_holds_it() -> None:
@@ -52,8 +63,8 @@ def test_a_velocity_limit_is_not_lost_where_a_velocity_actuator_holds_it() -> No
 
 
 def test_a_fixed_row_loses_no_actuator() -> None:
-    told = losses(build_model(parse_robot(ODD)), ALL_FORMATS)
-    assert told == ["URDF: 8 pairs of links that do not collide ('dh2sim info' lists them, as in an SRDF)"]
+    lost = words(build_model(parse_robot(ODD)), ALL_FORMATS)
+    assert lost == ["URDF: 8 pairs of links that do not collide ('dh2sim info' lists them, as in an SRDF)"]
 
 
 def test_a_converted_mesh_is_listed_and_written(tmp_path: Path) -> None:

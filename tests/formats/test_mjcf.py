@@ -47,9 +47,9 @@ def assert_holds_the_model(built: RobotModel, mj: mujoco.MjModel, *, own_bodies:
         np.testing.assert_array_equal(own.pos, [0, 0, 0])
         np.testing.assert_array_equal(own.axis, [0, 0, joint.joint.sign])
         assert own.qpos0[0] == 0.0
-        assert bool(mj.jnt_limited[own.id]) == (joint.range is not None)
-        if joint.range is not None:
-            assert own.range.tolist() == normal(np.array([joint.range.lower, joint.range.upper]))
+        assert bool(mj.jnt_limited[own.id]) == (joint.position_range is not None)
+        if joint.position_range is not None:
+            assert own.range.tolist() == normal(np.array(joint.position_range))
         assert own.damping[0] == joint.dynamics.damping
         assert own.frictionloss[0] == joint.dynamics.friction
         assert own.armature[0] == joint.dynamics.armature

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dh2sim.formats.mjcf.scene import to_scene
-from dh2sim.formats.mjcf.write import holding_controls, to_mjcf
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
@@ -112,8 +112,8 @@ def test_named_configurations_are_keyframes_with_controls_that_hold_still() -> N
     for name, q in (("home", HOME), ("bent", BENT)):
         key = mj.key(name)
         np.testing.assert_array_equal(key.qpos, q)
-        assert key.ctrl.tolist() == holding_controls(built, name)
-        load = built.holding[name]
+        assert key.ctrl.tolist() == built.holding_controls(read_only(q))
+        load = built.gravity_loads(read_only(q))
         assert key.ctrl[0] == np.clip(q[0] + load[0] / 1200.0, -1.5, 2.0)
         assert key.ctrl[1] == 0.0
         assert key.ctrl[2] == np.clip(load[2], -40.0, 40.0)
@@ -124,7 +124,7 @@ def test_a_position_actuator_without_gain_is_asked_for_the_position_itself() -> 
     row = Row(name="only", type=REVOLUTE, convention=STANDARD, a=0.5, actuator=ActuatorSpec(kp=0.0, kv=0.0))
     configurations = MappingProxyType({"home": read_only([0.3])})
     built = build_model(RobotSpec(name="limp", rows=(row,), configurations=configurations))
-    assert holding_controls(built, "home") == [0.3]
+    assert built.holding_controls(built.home) == [0.3]
 
 
 @pytest.mark.parametrize("in_scene", [False, True], ids=["alone", "in its scene"])

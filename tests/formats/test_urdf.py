@@ -54,13 +54,11 @@ def assert_numbers_read_back(built: RobotModel) -> None:
             assert limit is not None
             assert floats(element.find("axis"), "xyz") == [0.0, 0.0, joint.joint.sign]
             assert floats(limit, "effort") + floats(limit, "velocity") == [joint.effort, joint.velocity]
-            if joint.range is None:
+            if joint.position_range is None:
                 assert joint.joint.type.value == "continuous"
                 assert not {"lower", "upper"} & set(limit.attrib)
             else:
-                assert floats(limit, "lower") + floats(limit, "upper") == normal(
-                    np.array([joint.range.lower, joint.range.upper])
-                )
+                assert floats(limit, "lower") + floats(limit, "upper") == normal(np.array(joint.position_range))
             dynamics = element.find("dynamics")
             assert floats(dynamics, "damping") == [joint.dynamics.damping]
             assert floats(dynamics, "friction") == [joint.dynamics.friction]

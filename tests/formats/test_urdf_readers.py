@@ -55,12 +55,12 @@ def test_mujoco_and_pinocchio_read_the_limits_and_dynamics() -> None:
         assert mj.jnt_actfrcrange[i].tolist() == [-joint.effort, joint.effort]
         assert pin.effortLimit[own.idx_v] == joint.effort
         assert pin.velocityLimit[own.idx_v] == joint.velocity
-        if joint.range is None:
+        if joint.position_range is None:
             assert not mj.jnt_limited[i]
         else:
-            assert mj.jnt_range[i].tolist() == [joint.range.lower, joint.range.upper]
-            assert pin.lowerPositionLimit[own.idx_q] == joint.range.lower
-            assert pin.upperPositionLimit[own.idx_q] == joint.range.upper
+            assert mj.jnt_range[i].tolist() == list(joint.position_range)
+            limits = (pin.lowerPositionLimit[own.idx_q], pin.upperPositionLimit[own.idx_q])
+            assert limits == joint.position_range
 
 
 def test_pinocchio_reads_the_mass_properties_that_the_model_has() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import to_urdf
-from dh2sim.formats.xml_write import assumptions, estimates, number, numbers
+from dh2sim.formats.xml_write import number, numbers
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import Limits, LinkSpec, RobotSpec, Row, SourceFile
 from dh2sim.typing import read_only
@@ -113,8 +113,8 @@ def test_the_header_names_the_source_and_its_hash_and_what_was_estimated_and_ass
         "Assumed, not given: position, velocity, effort limits of a, e.",
         "Assumed, not given: velocity, effort limits of c.",
     ]
-    assert estimates(built.links) == estimated
-    assert assumptions(built.joints) == assumed
+    assert [entry.sentence for entry in built.estimates] == estimated
+    assert [entry.sentence for entry in built.assumptions] == assumed
     assert header(to_mjcf(built)) == begin + estimated
     assert header(to_scene(built)) == begin
     assert header(to_urdf(built)) == begin + estimated + assumed
@@ -125,4 +125,6 @@ def test_the_header_says_where_a_robot_was_made_in_code() -> None:
 
 
 def test_limits_that_are_assumed_of_all_joints_are_said_in_one_line() -> None:
-    assert assumptions(model("planar_2r").joints) == ["Assumed, not given: velocity, effort limits of all joints."]
+    (assumed,) = model("planar_2r").assumptions
+    assert assumed.sentence == "Assumed, not given: velocity, effort limits of all joints."
+    assert (assumed.what, assumed.where) == (("velocity", "effort"), ("joint_1", "joint_2"))

@@ -59,8 +59,8 @@ def test_every_robot_comes_back_with_its_poses_names_and_limits(
     assert _off_by(model.spec, again) <= 1e-12 * max(1.0, model.reach)
     assert [row.name for row in again.rows] == [joint.name for joint in model.moving_joints]
     for row, joint in zip(again.rows, model.moving_joints, strict=True):
-        if joint.range is not None:
-            assert row.limits.position == pytest.approx((joint.range.lower, joint.range.upper), abs=1e-9)
+        if joint.position_range is not None:
+            assert row.limits.position == pytest.approx(joint.position_range, abs=1e-9)
         if suffix == ".urdf":
             assert (row.limits.velocity, row.limits.effort) == pytest.approx((joint.velocity, joint.effort))
 

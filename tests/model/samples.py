@@ -75,9 +75,8 @@ def model(name: str) -> RobotModel:
 
 def in_limits(built: RobotModel, count: int, seed: int) -> Array:
     """Joint vectors anywhere in the ranges, shape (count, n); any angle where there is none."""
-    ranges = [joint.range for joint in built.moving_joints]
-    lower = [-math.pi if limits is None else limits.lower for limits in ranges]
-    upper = [math.pi if limits is None else limits.upper for limits in ranges]
+    ranges = [joint.position_range or (-math.pi, math.pi) for joint in built.moving_joints]
+    lower, upper = zip(*ranges, strict=True) if ranges else ((), ())
     return np.random.default_rng(seed).uniform(lower, upper, (count, len(ranges)))
 
 

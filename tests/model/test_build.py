@@ -13,9 +13,9 @@ import pytest
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import to_urdf
-from dh2sim.model.actuators import ASSUMED_BANDWIDTH, seen_inertias
+from dh2sim.model.actuators import ASSUMED_BANDWIDTH, ActuatorModel, seen_inertias
 from dh2sim.model.build import BASE_COLOR, JOINT_COLOR, PALETTE, build_model
-from dh2sim.model.robot_model import ActuatorModel, RobotModel
+from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, BaseSpec, Dynamics, LinkSpec, RobotSpec, Row
 from tests.model.samples import ODD_ROBOT, REVOLUTE, STANDARD, model
 from tests.robots.samples import NAMES
@@ -66,7 +66,7 @@ def test_nothing_of_a_model_can_be_changed() -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         built.reach = 0.0  # type: ignore[misc]
     with pytest.raises(TypeError):
-        built.holding["home"] = ()  # type: ignore[index]
+        built.spec.configurations["home"] = built.home  # type: ignore[index]
 
 
 def test_the_mass_of_a_robot_is_that_of_its_links() -> None:
@@ -104,7 +104,7 @@ def actuated(actuator: ActuatorSpec, armature: float = 0.0) -> tuple[ActuatorMod
         Row(name="b", type=REVOLUTE, convention=STANDARD, a=0.5, d=0.2),
     )
     built = build_model(RobotSpec(name="driven", rows=rows))
-    seen = seen_inertias(built.chain, [link.inertial for link in built.links], built.home)
+    seen = seen_inertias(built.chain, built.bodies, built.home)
     return built.joints[0].actuator, seen[0] + armature
 
 

@@ -25,8 +25,7 @@ def one(kind: JointType, limits: Limits | None = None) -> RobotModel:
 
 def test_a_revolute_joint_without_limits_is_assumed_to_turn_half_a_turn_either_way() -> None:
     (joint,) = one(REVOLUTE).joints
-    assert joint.range is not None
-    assert (joint.range.lower, joint.range.upper, joint.range.assumed) == (-math.pi, math.pi, True)
+    assert joint.position_range == joint.travel == (-math.pi, math.pi)
     assert joint.velocity == ASSUMED_TURN_RATE
     assert joint.assumed == ("position", "velocity", "effort")
 
@@ -34,10 +33,8 @@ def test_a_revolute_joint_without_limits_is_assumed_to_turn_half_a_turn_either_w
 def test_a_prismatic_joint_without_limits_is_assumed_to_slide_as_far_as_the_rest_reaches() -> None:
     built = one(PRISMATIC)
     (joint,) = built.joints
-    assert joint.range is not None
-    assert joint.range.upper == pytest.approx(0.3 + 0.4)
-    assert joint.range.lower == -joint.range.upper
-    assert joint.range.assumed
+    assert joint.position_range == pytest.approx((-(0.3 + 0.4), 0.3 + 0.4))
+    assert joint.assumed == ("position", "velocity", "effort")
     assert joint.velocity == ASSUMED_SLIDE_RATE
     assert built.reach == pytest.approx(2 * (0.3 + 0.4))
 
@@ -46,28 +43,34 @@ def test_a_prismatic_joint_without_limits_is_assumed_to_slide_as_far_as_the_rest
 def test_a_prismatic_joint_of_a_robot_without_lengths_is_assumed_to_slide_a_metre(rounding: float) -> None:
     row = Row(name="only", type=PRISMATIC, convention=STANDARD, a=rounding)
     (joint,) = build_model(RobotSpec(name="one", rows=(row,))).joints
-    assert joint.range is not None
-    assert (joint.range.lower, joint.range.upper) == (-1.0, 1.0)
+    assert joint.position_range == (-1.0, 1.0)
 
 
 def test_a_continuous_joint_has_no_position_limits() -> None:
     (joint,) = one(CONTINUOUS).joints
-    assert joint.range is None
+    assert (joint.position_range, joint.travel) == (None, (-math.pi, math.pi))
     assert joint.assumed == ("velocity", "effort")
 
 
 def test_a_fixed_row_has_nothing_to_assume() -> None:
     (joint,) = one(FIXED).joints
-    assert joint.range is None
+    assert joint.position_range is None
     assert joint.assumed == ()
 
 
 @pytest.mark.parametrize("kind", [REVOLUTE, PRISMATIC])
 def test_given_limits_win(kind: JointType) -> None:
     (joint,) = one(kind, Limits(position=(-0.25, 0.75), velocity=2.5, effort=30.0)).joints
-    assert joint.range is not None
-    assert (joint.range.lower, joint.range.upper, joint.range.assumed) == (-0.25, 0.75, False)
+    assert joint.position_range == joint.travel == (-0.25, 0.75)
     assert (joint.velocity, joint.effort, joint.assumed) == (2.5, 30.0, ())
+
+
+@pytest.mark.parametrize(("position", "inside"), [(-7.0, -0.25), (0.5, 0.5), (1.0, 0.75)])
+def test_a_coordinate_is_moved_inside_the_limits(position: float, inside: float) -> None:
+    (joint,) = one(REVOLUTE, Limits(position=(-0.25, 0.75))).joints
+    assert joint.clamped(position) == inside
+    (free,) = one(CONTINUOUS).joints
+    assert free.clamped(position) == position
 
 
 def test_home_is_zero_moved_inside_the_limits_where_the_file_has_none() -> None:

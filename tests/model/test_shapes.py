@@ -123,8 +123,7 @@ def test_a_slide_stays_guided_over_its_whole_travel(
 ) -> None:
     built = build_model(slide(flip, position, first))
     joint = next(joint for joint in built.joints if joint.joint.type is PRISMATIC)
-    assert joint.range is not None
-    travel = np.linspace(joint.range.lower, joint.range.upper, 41)
+    travel = np.linspace(*joint.travel, 41)
     q = np.stack([travel, np.full(41, 0.7)] if first else [np.full(41, 0.7), travel], axis=1)
     assert assert_slides_stay_together(built, q) == 41
     guide = built.all_links[0 if first else 1].shapes[-1]

@@ -36,7 +36,7 @@ def test_joints_are_those_of_the_table_that_move(floating: bool) -> None:
 def test_limits_are_those_of_the_model_and_infinite_where_there_are_none(floating: bool) -> None:
     made, robot = plant(floating=floating), model("odd")
     for i, joint in enumerate(robot.moving_joints):
-        wanted = (-np.inf, np.inf) if joint.range is None else (joint.range.lower, joint.range.upper)
+        wanted = joint.position_range or (-np.inf, np.inf)
         assert (made.lower[i], made.upper[i]) == wanted
         assert made.velocity[i] == joint.velocity
     assert (made.lower[2], made.upper[2]) == (-np.inf, np.inf)

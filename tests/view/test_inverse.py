@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.export import sampling_limits
 from dh2sim.kinematics.forward import forward_kinematics
 from dh2sim.kinematics.transforms import identity, pose_from_rpy
 from dh2sim.model.build import build_model
@@ -50,14 +49,15 @@ def angle_between(R_a: Array, R_b: Array) -> float:
 
 def assert_within_limits(model: RobotModel, q: Array) -> None:
     for joint, value in zip(model.moving_joints, q, strict=True):
-        if joint.range is not None:
-            assert joint.range.lower <= value <= joint.range.upper, joint.name
+        if joint.position_range is not None:
+            lower, upper = joint.position_range
+            assert lower <= value <= upper, joint.name
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_goal_near_the_start_that_can_be_reached_is_reached(name: str) -> None:
     model, generator = robot(name), np.random.default_rng(7)
-    lower, upper = sampling_limits(model)
+    lower, upper = model.travel
     for _ in range(40):
         q = generator.uniform(lower, upper)
         near = np.clip(q + 0.04 * (upper - lower) * generator.uniform(-1.0, 1.0, len(q)), lower, upper)
@@ -72,7 +72,7 @@ def test_a_goal_near_the_start_that_can_be_reached_is_reached(name: str) -> None
 
 def test_goals_at_the_limits_of_joints_are_reached_as_exactly_as_others() -> None:
     model, generator = robot("ssrms"), np.random.default_rng(1)
-    lower, upper = sampling_limits(model)
+    lower, upper = model.travel
     for _ in range(300):
         q = generator.uniform(lower, upper)
         beyond = q + 0.05 * (upper - lower) * generator.uniform(-0.5, 0.5, len(q))
@@ -98,7 +98,7 @@ def test_where_the_tool_is_already_nothing_moves(name: str) -> None:
 @settings(max_examples=40)
 def test_limits_hold_for_any_pose_and_errors_are_those_of_the_solution(name: str, data: st.DataObject) -> None:
     model = robot(name)
-    lower, upper = sampling_limits(model)
+    lower, upper = model.travel
     far = st.floats(-1e9, 1e9) | st.floats(-2.0, 2.0) | st.sampled_from([0.0, 1e300, -1e300])
     T = np.array(pose_from_rpy([0.0, 0.0, 0.0], data.draw(strategies.vectors(strategies.angles))))
     T[:3, 3] = data.draw(strategies.vectors(far))
@@ -117,7 +117,7 @@ def test_any_robot_stays_within_its_limits_and_gets_no_farther_from_the_goal(
 ) -> None:
     spec, vectors = robot_and_vectors
     model = build_model(spec)
-    lower, upper = sampling_limits(model)
+    lower, upper = model.travel
     start, T = np.clip(vectors[0], lower, upper), forward_kinematics(model.chain, vectors[-1])
     found = InverseKinematics(model).solve(start, T, time_budget_s=PATIENT, limit_steps=40)
     assert_within_limits(model, found.q)
@@ -150,7 +150,7 @@ def test_an_arm_in_a_plane_stretches_towards_what_is_out_of_reach(direction: flo
 @pytest.mark.parametrize("name", ["scara", "arm_5r", "puma560"])
 def test_out_of_reach_the_tool_gets_as_near_as_any_of_many_configurations(name: str) -> None:
     model, generator = robot(name), np.random.default_rng(5)
-    lower, upper = sampling_limits(model)
+    lower, upper = model.travel
     q = generator.uniform(lower, upper, (100_000, len(lower)))
     T = forward_kinematics(model.chain, q)
     farthest = np.argsort(np.linalg.norm(T[:, :3, 3], axis=1))[-2000::400]  # stretched without touching a limit
@@ -176,7 +176,7 @@ def test_a_stretched_arm_finds_out_which_way_to_bend() -> None:
 @pytest.mark.parametrize("name", FEW_JOINTS)
 def test_with_few_joints_the_position_comes_first(name: str) -> None:
     model, generator = robot(name), np.random.default_rng(11)
-    lower, upper = sampling_limits(model)
+    lower, upper = model.travel
     for _ in range(20):
         q = generator.uniform(lower + 0.2 * (upper - lower), upper - 0.2 * (upper - lower))
         T = np.array(forward_kinematics(model.chain, q + 0.02 * (upper - lower)))
@@ -224,7 +224,7 @@ def test_half_a_turn_away_there_is_a_way_too() -> None:
 
 def test_when_time_is_up_what_was_found_so_far_is_returned() -> None:
     model = robot("puma560")
-    lower, upper = sampling_limits(model)
+    lower, upper = model.travel
     T = forward_kinematics(model.chain, 0.5 * (lower + upper))
     hasty = inverse("puma560").solve(model.home, T, time_budget_s=0.0)
     one = inverse("puma560").solve(model.home, T, limit_steps=1, time_budget_s=PATIENT)

@@ -17,7 +17,7 @@ from dh2sim.robot.write import robot_file_text
 from dh2sim.view import events
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.reduce import reduce
-from dh2sim.view.state import COLUMNS, Complaint, Mode, Part, Pull, ViewState, travel
+from dh2sim.view.state import COLUMNS, Complaint, Mode, Part, Pull, ViewState
 from tests.strategies import robot_specs
 
 STANFORD = open_state(load_robot("stanford"))
@@ -97,7 +97,7 @@ def assert_sound(state: ViewState) -> None:
     assert all(math.isfinite(value) for value in state.q)
     if state.mode is Mode.STILL:
         for joint, value in zip(state.model.moving_joints, state.q, strict=True):
-            lower, upper = travel(joint)
+            lower, upper = joint.travel
             assert lower <= value <= upper
     described = parse_robot(state.text)
     assert np.array_equal(table_tool_pose(described, state.q), table_tool_pose(state.spec, state.q))

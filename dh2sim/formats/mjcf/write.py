@@ -1,12 +1,10 @@
-"""RobotModel -> MJCF, MuJoCo's own format.
-
-What drives a robot in an MJCF, what measures it, and where it starts: actuators, sensors, keyframes.
-"""
+"""RobotModel -> MJCF, MuJoCo's own format: bodies, actuators, sensors and keyframes."""
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from typing import Final
 
 from dh2sim.errors import ModelError
 from dh2sim.formats.mjcf.sites import add_site, needs_body, placed
@@ -35,24 +33,10 @@ def add_actuators(mujoco: ET.Element, model: RobotModel) -> None:
             case _:
                 gains = {}
         element = child(actuators, joint.actuator.type.value, name=name, joint=joint.name, **gains)
-        control = control_range(joint)
-        if control is not None:
-            element.set("ctrlrange", numbers(control))
+        if joint.control_range is not None:
+            element.set("ctrlrange", numbers(joint.control_range))
         if "effort" not in joint.assumed:
             element.set("forcerange", numbers([-joint.effort, joint.effort]))
-
-
-def control_range(joint: JointModel) -> tuple[float, float] | None:
-    """Range of a joint's control, from its limits: rad or m, their rate, N·m or N; None where it is unlimited."""
-    match joint.actuator.type:
-        case ActuatorType.POSITION:
-            return None if joint.range is None else (joint.range.lower, joint.range.upper)
-        case ActuatorType.VELOCITY:
-            return -joint.velocity, joint.velocity
-        case ActuatorType.MOTOR:
-            return -joint.effort, joint.effort
-        case ActuatorType.NONE:
-            return None
 
 
 def add_sensors(mujoco: ET.Element, model: RobotModel) -> None:
@@ -74,34 +58,14 @@ def add_keyframes(mujoco: ET.Element, model: RobotModel, *, floating_base: bool 
         return
     keyframe = child(mujoco, "keyframe")
     for name, q in model.spec.configurations.items():
-        controls = holding_controls(model, name)
+        controls = model.holding_controls(q)
         key = child(keyframe, "key", name=name, qpos=numbers([0, 0, 0, 1, 0, 0, 0, *q] if floating_base else q))
         if controls:
             key.set("ctrl", numbers(controls))
 
 
-def holding_controls(model: RobotModel, configuration: str) -> list[float]:
-    """Controls, one an actuator, with which the robot stands still in a named configuration.
-
-    A position actuator is asked for a little more than the joint's position, so that its pull balances gravity.
-    Clipped to the control's range.
-    """
-    controls = []
-    q, loads = model.spec.configurations[configuration], model.holding[configuration]
-    for joint, position, load in zip(model.moving_joints, q, loads, strict=True):
-        match joint.actuator.type:
-            case ActuatorType.POSITION:
-                control = float(position) + (load / joint.actuator.kp if joint.actuator.kp else 0.0)
-            case ActuatorType.VELOCITY:
-                control = 0.0
-            case ActuatorType.MOTOR:
-                control = load
-            case ActuatorType.NONE:
-                continue
-        allowed = control_range(joint)
-        controls.append(control if allowed is None else min(max(control, allowed[0]), allowed[1]))
-    return controls
-
+DYNAMICS: Final = {"damping": "damping", "friction": "frictionloss", "armature": "armature"}
+"""Attributes of an MJCF's joint for its dynamics, by their names in a robot file."""
 
 MOST_BODIES = 496
 """MuJoCo's XML reader refuses a deeper nesting of bodies; base_link is one of them."""
@@ -257,18 +221,13 @@ def _joint(body: ET.Element, joint: JointModel) -> None:
     element = child(body, "joint", name=joint.name, type="hinge" if joint.joint.type.turns else "slide")
     if joint.joint.sign < 0:
         element.set("axis", numbers([0, 0, -1]))
-    if joint.range is not None:
-        element.set("range", numbers([joint.range.lower, joint.range.upper]))
+    if joint.position_range is not None:
+        element.set("range", numbers(joint.position_range))
     if "effort" not in joint.assumed:
         element.set("actuatorfrcrange", numbers([-joint.effort, joint.effort]))
-    dynamics = joint.dynamics
-    for name, value in (
-        ("damping", dynamics.damping),
-        ("frictionloss", dynamics.friction),
-        ("armature", dynamics.armature),
-    ):
-        if value:
-            element.set(name, number(value))
+    for key, attribute in DYNAMICS.items():
+        if value := getattr(joint.dynamics, key):
+            element.set(attribute, number(value))
 
 
 def _geoms(

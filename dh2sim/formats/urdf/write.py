@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from typing import Final
 
-from dh2sim.formats.xml_write import assumptions, child, document, number, numbers, provenance
+from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.transforms import compose, identity, invert, pose_from_rpy, rpy_from_rotation
 from dh2sim.model.mass import MassProperties
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
@@ -16,6 +17,8 @@ from dh2sim.typing import Array, read_only
 T_FLANGE_DHN = pose_from_rpy([0, 0, 0], [0, math.pi / 2, 0])
 """REP-199: x of the flange points out of it, as z of tool0 does; pose of the last DH frame in the flange."""
 T_DHN_FLANGE = invert(T_FLANGE_DHN)
+DYNAMICS: Final = ("damping", "friction")
+"""What a URDF holds of a joint's dynamics, by the same names."""
 
 
 def to_urdf(model: RobotModel, *, dh_frames: bool = True) -> str:
@@ -47,9 +50,8 @@ def to_urdf(model: RobotModel, *, dh_frames: bool = True) -> str:
         parent = link.name
     _frame(robot, "flange", parent, compose(model.joints[-1].joint.T_joint_dh, T_DHN_FLANGE))
     _frame(robot, "tool0", "flange", compose(T_FLANGE_DHN, model.chain.T_dhn_tool0))
-    return '<?xml version="1.0" encoding="utf-8"?>\n' + document(
-        robot, [*provenance(model), *assumptions(model.joints)]
-    )
+    header = [*provenance(model), *(entry.sentence for entry in model.assumptions)]
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + document(robot, header)
 
 
 def _materials(model: RobotModel) -> dict[Color, str]:
@@ -144,9 +146,10 @@ def _joint(robot: ET.Element, joint: JointModel, parent: str, name: str) -> None
         return
     child(element, "axis", xyz=numbers([0, 0, joint.joint.sign]))
     limit = child(element, "limit")
-    if joint.range is not None:
-        limit.set("lower", number(joint.range.lower))
-        limit.set("upper", number(joint.range.upper))
+    if joint.position_range is not None:
+        lower, upper = joint.position_range
+        limit.set("lower", number(lower))
+        limit.set("upper", number(upper))
     limit.set("effort", number(joint.effort))
     limit.set("velocity", number(joint.velocity))
-    child(element, "dynamics", damping=number(joint.dynamics.damping), friction=number(joint.dynamics.friction))
+    child(element, "dynamics", **{key: number(getattr(joint.dynamics, key)) for key in DYNAMICS})

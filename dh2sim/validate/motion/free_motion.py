@@ -12,7 +12,6 @@ import mujoco
 import numpy as np
 
 from dh2sim.errors import EngineError
-from dh2sim.export import sampling_limits
 from dh2sim.formats.mjcf.write import EXPORTED, MjcfOptions, to_mjcf
 from dh2sim.model.collision_exclusions import ExcludedPair, Reason
 from dh2sim.model.robot_model import RobotModel
@@ -124,7 +123,7 @@ def random_states(
     Raises:
         EngineError: an acceleration is not finite.
     """
-    lower, upper = sampling_limits(model)
+    lower, upper = model.travel
     n = len(lower)
     floating = compiled.nv > n
     length = max(model.reach, LEAST_SIZE)

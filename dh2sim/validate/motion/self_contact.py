@@ -9,7 +9,6 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 
-from dh2sim.export import sampling_limits
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.validate.motion.free_motion import compile_model
@@ -95,7 +94,7 @@ def check_self_contact(model: RobotModel, compiled: mujoco.MjModel, *, seed: int
 
 def random_tour(model: RobotModel, seed: int) -> Array:
     """Configurations along straight lines between random ones inside the limits, shape (N, n)."""
-    lower, upper = sampling_limits(model)
+    lower, upper = model.travel
     waypoints = np.random.default_rng([seed, 6]).uniform(lower, upper, (WAYPOINTS, len(lower)))
     share = np.linspace(0.0, 1.0, POINTS, endpoint=False)[:, None]
     lines = [start + share * (end - start) for start, end in pairwise(waypoints)]
@@ -119,7 +118,7 @@ def by_construction(model: RobotModel) -> set[Pair]:
 
 def _rests(model: RobotModel) -> Iterator[tuple[str, Array]]:
     """Configurations in which a robot stands, each with words for it; zero only if it is inside the limits."""
-    lower, upper = sampling_limits(model)
+    lower, upper = model.travel
     zero = np.zeros_like(model.home)
     if np.all((lower <= zero) & (zero <= upper)):
         yield "at joint coordinates zero", zero

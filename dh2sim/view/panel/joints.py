@@ -16,7 +16,7 @@ from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
 from dh2sim.view.panel.pose import pose_lines, whose_pose
 from dh2sim.view.panel.readings import readings_of
-from dh2sim.view.state import ViewState, configurations, travel
+from dh2sim.view.state import ViewState, configurations
 
 if TYPE_CHECKING:
     import viser
@@ -121,7 +121,7 @@ class JointsTab:
         on_click(self._choice, self._send, lambda: _configuration(str(self._choice.value)))
 
     def _slider(self, index: int, joint: JointModel, value: float, angle: AngleUnit) -> Bound[float]:
-        lower, upper = travel(joint)
+        lower, upper = joint.travel
         unit = _unit(joint, angle)
         slider = self._gui.add_slider(
             f"{joint.name} [{_symbol(unit)}]",
@@ -144,7 +144,7 @@ def _configuration(name: str) -> Event:
 
 def _description(state: ViewState) -> object:
     """Return all that the sliders depend on besides where the joints are."""
-    joints = [(joint.name, joint.joint.type, travel(joint)) for joint in state.model.moving_joints]
+    joints = [(joint.name, joint.joint.type, joint.travel) for joint in state.model.moving_joints]
     return joints, state.angle, tuple(configurations(state.model))
 
 
@@ -164,7 +164,7 @@ def _shown(joint: JointModel, value: float, angle: AngleUnit) -> float:
 
 def _hint(index: int, joint: JointModel) -> str:
     keys = f"; keys {KEYS[index].down} and {KEYS[index].up}" if index < len(KEYS) else ""
-    limits = "turns without end" if joint.range is None else "limits of the robot file"
-    if joint.range is not None and joint.range.assumed:
+    limits = "turns without end" if joint.position_range is None else "limits of the robot file"
+    if "position" in joint.assumed:
         limits = "limits assumed: the robot file gives none"
     return f"{joint.joint.type.value}, {limits}{keys}"

@@ -100,7 +100,7 @@ def ghost_configuration(ghost: RobotModel, robot: RobotModel, q: ArrayLike) -> G
             coordinates.append(float(ghost.home[i]))
             continue
         wanted = given[partner]
-        inside = wanted if joint.range is None else min(max(wanted, joint.range.lower), joint.range.upper)
+        inside = joint.clamped(wanted)
         if inside != wanted:
             moved.append(joint.name)
         coordinates.append(inside)

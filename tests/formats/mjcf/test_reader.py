@@ -33,7 +33,7 @@ def test_an_exported_robot_is_read_back(name: str, tmp_path: Path) -> None:
     assert [joint.name for joint in robot.chain.joints] == [joint.name for joint in moving]
     assert [joint.type for joint in robot.chain.joints] == [joint.joint.type for joint in moving]
     for limits, joint in zip(robot.limits, moving, strict=True):
-        expected = None if joint.range is None else (joint.range.lower, joint.range.upper)
+        expected = joint.position_range
         assert limits.position == expected
         assert limits.effort == (None if "effort" in joint.assumed else joint.effort)
         assert limits.velocity is None

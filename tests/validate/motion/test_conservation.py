@@ -209,12 +209,15 @@ def test_states_are_drawn_inside_the_limits_and_torques_within_the_effort() -> N
     states = random_states(model, compiled, 20, np.random.default_rng(0))
     q = np.array([state.qpos[7:] for state in states])
     for column, joint in zip(q.T, model.moving_joints, strict=True):
-        assert joint.range is not None
-        assert joint.range.lower <= column.min() < column.max() <= joint.range.upper
+        assert joint.position_range is not None
+        lower, upper = joint.position_range
+        assert lower <= column.min() < column.max() <= upper
     torques = np.abs([state.ctrl for state in states])
     assert torques.min() > 0.0
     assert torques.max() == 0.5
 
 
 def replace_effort(model: RobotModel, effort: float) -> RobotModel:
-    return replace(model, joints=tuple(replace(joint, effort=effort) for joint in model.joints))
+    return replace(
+        model, joints=tuple(replace(joint, limits=replace(joint.limits, effort=effort)) for joint in model.joints)
+    )

@@ -111,7 +111,8 @@ def test_the_tour_stays_inside_the_limits_and_moves_in_straight_lines() -> None:
     assert np.array_equal(tour, random_tour(model, 5))
     assert not np.array_equal(tour, random_tour(model, 6))
     for column, joint in zip(tour.T, model.moving_joints, strict=True):
-        assert joint.range is not None
-        assert joint.range.lower <= column.min() < column.max() <= joint.range.upper
+        assert joint.position_range is not None
+        lower, upper = joint.position_range
+        assert lower <= column.min() < column.max() <= upper
     bends = np.abs(np.diff(tour, n=2, axis=0)).max(axis=1) > 1e-12
     assert np.flatnonzero(bends).tolist() == list(range(39, 599, 40))
