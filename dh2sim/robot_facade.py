@@ -311,9 +311,8 @@ class Robot:
     @cached_property
     def limits(self) -> tuple[Array, Array]:
         """Lower and upper joint coordinates, rad and m, each of shape (n,); infinite for continuous joints."""
-        ranges = [joint.range for joint in self.model.moving_joints]
-        lower = read_only([-np.inf if range_ is None else range_.lower for range_ in ranges])
-        return lower, read_only([np.inf if range_ is None else range_.upper for range_ in ranges])
+        ranges = [joint.position_range or (-np.inf, np.inf) for joint in self.model.moving_joints]
+        return read_only([lower for lower, _ in ranges]), read_only([upper for _, upper in ranges])
 
     def fk(self, q: ArrayLike, frame: str = "tool0") -> Array:
         """Return the pose of a frame in base_link.
@@ -360,10 +359,9 @@ class Robot:
 
     def random_configurations(self, count: int, *, seed: int = 0) -> Array:
         """Draw joint vectors between the limits, ±π for continuous joints; rad and m, shape (count, n)."""
-        from dh2sim.export import sampling_limits
         from dh2sim.kinematics.sampling import random_configurations
 
-        return random_configurations(*sampling_limits(self.model), count, seed)
+        return random_configurations(*self.model.travel, count, seed)
 
     def urdf(self, *, dh_frames: bool = True) -> str:
         """Return the URDF; with ``dh_frames`` it has a link for every DH frame. Meshes are written by ``export``."""
