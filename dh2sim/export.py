@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from dh2sim.errors import EngineError, MismatchError, ModelError
-from dh2sim.files import put_in_place, staged
+from dh2sim.files import atomic_files
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import DYNAMICS as URDF_DYNAMICS
@@ -271,14 +271,18 @@ def export_robot(
     """
     files = render(model, formats, dh_frames=dh_frames)
     target = out / model.name
-    with staged(out, model.name, files) as folder:
-        checks = verify(model, folder, formats) if verified else []
-        changed = [relative for relative, data in files.items() if not _holds(target / relative, data)]
-        put_in_place(folder, target, changed)
+    with atomic_files(out, model.name) as staging:
+        for relative, data in files.items():
+            (staging / relative).parent.mkdir(parents=True, exist_ok=True)
+            (staging / relative).write_bytes(data)
+        checks = verify(model, staging, formats) if verified else []
+        unchanged = {relative for relative, data in files.items() if _holds(target / relative, data)}
+        for relative in unchanged:
+            (staging / relative).unlink()
     return ExportReport(
         name=model.name,
         files=tuple(
-            ExportedFile(path=target / relative, size=len(data), changed=relative in changed)
+            ExportedFile(path=target / relative, size=len(data), changed=relative not in unchanged)
             for relative, data in files.items()
         ),
         verified=tuple(checks),

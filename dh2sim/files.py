@@ -1,10 +1,7 @@
-"""The files of a conversion: whole or not at all, and never over others unless that is wanted.
+"""Files that appear whole or not at all, folder locks, and signals deferred while files change places.
 
-Signals that come at a bad time are dealt with a little later.
-
-Single files are written beside where they will stand, and put there whole.
-
-Putting files in place all together or not at all.
+Three primitives write files: ``atomic_file`` one that somebody else fills (a library, an encoder), ``atomic_files``
+several that belong together, and ``write_file`` bytes that must survive a power cut once the call returns.
 """
 
 from __future__ import annotations
@@ -15,17 +12,28 @@ import shutil
 import signal
 import tempfile
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
+from typing import Final
 
 from dh2sim.errors import OutputError
+
+try:
+    import fcntl
+except ImportError:  # on Windows
+    _HAS_LOCKS = False
+else:
+    _HAS_LOCKS = True
+
+PARTIAL: Final = ".partial"
+"""Suffix of files and folders that are being written; their names begin with a dot."""
 
 
 @contextmanager
 def signals_deferred() -> Iterator[None]:
-    """Hold back SIGINT and SIGTERM; Python lets only the main thread do so."""
+    """Hold back SIGINT and SIGTERM until the block ends; only the main thread can, elsewhere this does nothing."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -39,203 +47,212 @@ def signals_deferred() -> Iterator[None]:
         yield
     finally:
         for kind, handler in previous.items():
-            signal.signal(kind, signal.SIG_DFL if handler is None else handler)  # None: set by something not Python
+            signal.signal(kind, signal.SIG_DFL if handler is None else handler)  # None: not installed by Python
         for number in arrived:
             signal.raise_signal(number)
 
 
 @contextmanager
-def written_whole(out: Path) -> Iterator[Path]:
-    """Give a temporary file with the same ending; it is renamed to ``out`` if all goes well, and removed otherwise.
+def atomic_file(path: Path) -> Iterator[Path]:
+    """Yield a temporary file to write to; it replaces ``path`` when the block ends well, and is removed otherwise.
 
     Args:
-        out: where the file will stand; one that stands there is replaced.
+        path: The file to write. Its folder must exist.
 
     Yields:
-        The path of the temporary file, which exists and is empty.
+        The path of an empty file beside ``path`` with the same suffix.
 
     Raises:
-        OutputError: the file cannot be written; what stood there before stands untouched.
+        OutputError: The file cannot be written; what was at ``path`` is unchanged.
     """
-    if out.is_dir():
-        raise OutputError(f"cannot write '{out}': that is a folder")
-    if not out.parent.is_dir():
-        raise OutputError(f"cannot write '{out}': there is no folder '{out.parent}'")
-    draft = out.with_name(f".{out.stem[:80]}-{secrets.token_hex(4)}{out.suffix}")
+    if path.is_dir():
+        raise OutputError(f"cannot write '{path}': that is a folder")
+    if not path.parent.is_dir():
+        raise OutputError(f"cannot write '{path}': there is no folder '{path.parent}'")
+    temporary = path.with_name(f".{path.stem[:80]}-{secrets.token_hex(4)}{path.suffix}")
     try:
         try:
-            os.close(os.open(draft, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-            yield draft
+            os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+            yield temporary
+            sync(temporary)
             with signals_deferred():
-                os.replace(draft, out)
+                os.replace(temporary, path)
         except OSError as error:
-            raise OutputError(f"cannot write '{out}': {error.strerror or error}") from error
+            raise OutputError(f"cannot write '{path}': {_reason(error)}") from error
     finally:
-        with suppress(FileNotFoundError):
-            draft.unlink()
+        temporary.unlink(missing_ok=True)
 
 
 @contextmanager
-def staged(out: Path, name: str, files: Mapping[str, bytes]) -> Iterator[Path]:
-    """Write files into a temporary folder beside where they will stand, and remove it in the end.
+def atomic_files(out: Path, name: str = "") -> Iterator[Path]:
+    """Yield an empty folder to write to; when the block ends well, all of its files are moved to ``out``/``name``.
+
+    They are moved all or none, one rename right after the other and with signals deferred: only a process that is
+    killed between two renames leaves old files beside new ones, each of them whole. Missing folders are made.
 
     Args:
-        out: the folder that holds the robots' folders; made where it is missing, and removed again if it stays empty.
-        name: the robot's name.
-        files: contents by relative path.
-
-    Yields:
-        The temporary folder, on the same file system as ``out``.
+        out: The folder that receives the files, or the folder named ``name`` that does. The temporary folder is made
+            here, on the same file system.
+        name: Folder in ``out``; empty for ``out`` itself.
 
     Raises:
-        OutputError: the files cannot be written.
+        OutputError: A file cannot be written or moved; what was there is unchanged.
     """
     made: list[Path] = []
-    folder: Path | None = None
+    temporary: Path | None = None
     try:
         try:
             with signals_deferred():
-                made += _make_folder(out)
-                folder = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=out))
-            for relative, data in files.items():
-                path = folder / "new" / relative
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(data)
+                made += make_folders(out)
+                temporary = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=out))
+            staging = temporary / "new"
+            staging.mkdir()
+            yield staging
+            files = sorted(path.relative_to(staging) for path in staging.rglob("*") if not path.is_dir())
+            for file in files:
+                sync(staging / file)
         except OSError as error:
-            raise OutputError(f"cannot write to '{out}': {error.strerror or error}; nothing was changed") from error
-        yield folder / "new"
+            raise OutputError(f"cannot write to '{out}': {_reason(error)}; nothing was changed") from error
+        _move_all(files, staging, out / name, kept=temporary / "old")
     finally:
         with signals_deferred():
-            if folder is not None:
-                shutil.rmtree(folder, ignore_errors=True)
-            _remove_empty(made)
+            if temporary is not None:
+                shutil.rmtree(temporary, ignore_errors=True)
+            remove_empty(made)
 
 
-def put_in_place(staging: Path, target: Path, files: Iterable[str]) -> None:
-    """Rename staged files into ``target``; if one cannot be, those before it are put back as they were.
-
-    A signal that arrives meanwhile is dealt with afterwards. The renames, each of them whole, follow each other at
-    once: only a process that is killed outright between two of them leaves old files beside new ones.
-
-    Args:
-        staging: the folder that holds the new files; old ones are kept beside it meanwhile.
-        target: the folder to put them in; made where it is missing.
-        files: paths relative to both.
-
-    Raises:
-        OutputError: a file cannot be put in place; the old ones stand.
-    """
-    finals = {relative: target / relative for relative in files}
+def _move_all(files: list[Path], staging: Path, target: Path, *, kept: Path) -> None:
+    """Rename files from ``staging`` to ``target``; if one fails, restore those before it from ``kept``."""
     made: list[Path] = []
-    moved: list[str] = []
+    moved: list[Path] = []
     with signals_deferred():
         try:
-            for relative, final in finals.items():
-                made += _make_folder(final.parent)
-                if os.path.lexists(final):
-                    _keep(final, _backup(staging, relative))
-            for relative, final in finals.items():
-                os.replace(staging / relative, final)
-                moved.append(relative)
+            for file in files:
+                made += make_folders((target / file).parent)
+                if os.path.lexists(target / file):
+                    _keep(target / file, kept / file)
+            for file in files:
+                os.replace(staging / file, target / file)
+                moved.append(file)
         except OSError as error:
-            for relative in reversed(moved):
-                _put_back(_backup(staging, relative), finals[relative])
-            _remove_empty(made)
+            for file in reversed(moved):
+                _restore(kept / file, target / file)
+            remove_empty(made)
             raise OutputError(
-                f"cannot write '{error.filename2 or error.filename or target}': {error.strerror or error}; "
-                "the files that stood there are unchanged"
+                f"cannot write '{error.filename2 or error.filename or target}': {_reason(error)}; "
+                "the existing files are unchanged"
             ) from error
 
 
-def _backup(staging: Path, relative: str) -> Path:
-    return staging.parent / "old" / relative
-
-
-def _keep(final: Path, saved: Path) -> None:
-    """Keep what stands at ``final``, without moving it away, so that at no moment it is missing."""
-    saved.parent.mkdir(parents=True, exist_ok=True)
+def _keep(path: Path, kept: Path) -> None:
+    """Save a file without moving it away, so that it is missing at no moment."""
+    kept.parent.mkdir(parents=True, exist_ok=True)
     try:
-        os.link(final, saved, follow_symlinks=False)
+        os.link(path, kept, follow_symlinks=False)
     except (OSError, NotImplementedError):
-        shutil.copy2(final, saved, follow_symlinks=False)
+        shutil.copy2(path, kept, follow_symlinks=False)
 
 
-def _put_back(saved: Path, final: Path) -> None:
-    with suppress(OSError):  # one that cannot be put back keeps no other from it
-        if os.path.lexists(saved):
-            os.replace(saved, final)
+def _restore(kept: Path, path: Path) -> None:
+    with suppress(OSError):  # go on with the other files
+        if os.path.lexists(kept):
+            os.replace(kept, path)
         else:
-            final.unlink()
+            path.unlink()
 
 
-def _make_folder(folder: Path) -> list[Path]:
-    """Make a folder and those above it; return those that were missing, innermost last."""
+def partial_path(path: Path) -> Path:
+    """Return the name of a file while ``write_file`` is writing it."""
+    return path.with_name(f".{path.name}{PARTIAL}")
+
+
+def write_file(path: Path, *parts: bytes) -> None:
+    """Write a file, replacing an existing one; it is on the disk, under its name, when this returns.
+
+    Raises:
+        OSError: It cannot be written. A partial file may be left behind (``partial_path``).
+    """
+    with open(partial_path(path), "wb", buffering=0) as file:
+        for part in parts:
+            left = memoryview(part)
+            while left:  # near a limit of size, a file takes some of the bytes before it refuses
+                left = left[file.write(left) :]
+        os.fsync(file.fileno())
+    os.replace(partial_path(path), path)
+    sync(path.parent)
+
+
+def sync(path: Path) -> None:
+    """Bring a file, or the names in a folder, to the disk, where the system can do that."""
+    windows = os.name == "nt"
+    if windows and path.is_dir():
+        return
+    handle = os.open(path, os.O_RDWR if windows else os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def make_folders(folder: Path) -> list[Path]:
+    """Make a folder and its parents; return those that were missing, outermost first."""
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     return missing[::-1]
 
 
-def _remove_empty(folders: list[Path]) -> None:
-    """Remove folders, innermost (last) first, as far as they are empty."""
+def remove_empty(folders: list[Path]) -> None:
+    """Remove the folders that are empty, the last one first."""
     for folder in reversed(folders):
         with suppress(OSError):
             folder.rmdir()
 
 
-@contextmanager
-def new_files(paths: Sequence[Path], *, run: Path, overwrite: bool) -> Iterator[list[Path]]:
-    """Lend temporary files; when the block ends well they are renamed to ``paths``, else removed.
+class FolderLock:
+    """An exclusive lock on a folder among processes that use this class; the system drops it when a process ends.
 
-    Args:
-        paths: where the files will stand, all in one folder, which is made where it is missing.
-        run: the run that they are made from, in which they have no place.
-        overwrite: whether files that stand there are replaced.
-
-    Yields:
-        Paths to write to, on the same file system; one for each of ``paths``.
-
-    Raises:
-        OutputError: a file exists already, or cannot be written. What stood there is unchanged.
+    Where the system or the file system has no such locks, every lock is granted.
     """
-    folder = paths[0].parent
-    if folder.resolve().is_relative_to(run.resolve()):
-        raise OutputError(f"'{paths[0]}' would be inside the run '{run}'; name a file elsewhere with --out")
-    _refuse(paths, overwrite=overwrite)
-    with staged(folder, paths[0].name, {}) as staging:
+
+    def __init__(self, folder: Path) -> None:
+        """Lock a folder.
+
+        Raises:
+            BlockingIOError: It is locked.
+            OSError: It cannot be opened.
+        """
+        self._handle: int | None = None
+        if not _HAS_LOCKS:
+            return
+        handle = os.open(folder, os.O_RDONLY)
         try:
-            staging.mkdir()
-            yield [staging / path.name for path in paths]
-            for path in paths:
-                _sync(staging / path.name)
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            raise OutputError(f"cannot write to '{folder}': {_reason(error)}; nothing was changed") from error
-        _refuse(paths, overwrite=overwrite)
-        put_in_place(staging, folder, [path.name for path in paths])
+            os.close(handle)
+            if isinstance(error, BlockingIOError):
+                raise
+        else:
+            self._handle = handle
 
+    @property
+    def effective(self) -> bool:
+        """Whether the lock keeps others out."""
+        return self._handle is not None
 
-def refuse_folder(path: Path) -> None:
-    """Raise an OutputError if a folder stands where a file is to be written."""
-    if path.is_dir():
-        raise OutputError(f"'{path}' is a folder; name a file with --out")
+    def holds(self, folder: Path) -> bool:
+        """Return whether the locked folder is still the one at this path, and no other was put in its place."""
+        try:
+            return self._handle is None or os.path.samestat(os.fstat(self._handle), os.stat(folder))
+        except FileNotFoundError:
+            return False
 
-
-def _refuse(paths: Sequence[Path], *, overwrite: bool) -> None:
-    for path in paths:
-        refuse_folder(path)
-    standing = [f"'{path}'" for path in paths if os.path.lexists(path)]
-    if standing and not overwrite:
-        exist = "exists" if len(standing) == 1 else "exist"
-        it = "it" if len(standing) == 1 else "them"
-        raise OutputError(
-            f"{' and '.join(standing)} {exist} already; --overwrite replaces {it}, --out names another file"
-        )
-
-
-def _sync(path: Path) -> None:
-    with open(path, "rb") as file:
-        os.fsync(file.fileno())
+    def release(self) -> None:
+        """Give the lock back."""
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
 
 
 def _reason(error: OSError) -> str:
-    """Return what the system said, without the words that libraries put around it."""
+    """Return what the system said, without the words that libraries add."""
     return os.strerror(error.errno) if error.errno else str(error)

@@ -158,9 +158,9 @@ def hand_over(text: str, out: Path | None, *, summary: str, notes: Iterable[str]
         sys.stdout.write(text)
         sys.stdout.flush()
     else:
-        from dh2sim.files import written_whole
+        from dh2sim.files import atomic_file
 
-        with written_whole(out) as draft:
+        with atomic_file(out) as draft:
             draft.write_text(text, encoding="utf-8")
     if quiet:
         return

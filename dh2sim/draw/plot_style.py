@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dh2sim.draw.rollout_data import RolloutData
 from dh2sim.errors import PictureError
 from dh2sim.extras import require_extra
-from dh2sim.files import written_whole
+from dh2sim.files import atomic_file
 from dh2sim.messages import shown
 
 
@@ -144,7 +144,7 @@ def save(figure: Any, out: Path, *, dpi: float) -> None:
         ".png": {"Software": "dh2sim"},
     }
     ending = out.suffix.lower()
-    with written_whole(out) as draft:
+    with atomic_file(out) as draft:
         figure.savefig(draft, dpi=dpi, format=ending[1:], metadata=dates[ending])
 
 

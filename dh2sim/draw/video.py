@@ -26,7 +26,7 @@ from dh2sim.draw.motion import Motion
 from dh2sim.draw.renderer import Look, Stage, stage
 from dh2sim.errors import PictureError
 from dh2sim.extras import require_extra
-from dh2sim.files import written_whole
+from dh2sim.files import atomic_file
 from dh2sim.messages import shown
 
 if TYPE_CHECKING:
@@ -273,7 +273,7 @@ def write_film(
     gif = out.suffix.lower() == ".gif"
     if gif:
         check_gif(len(numbers), width=look.width, height=look.height, fps=tempo.fps)
-    with written_whole(out) as draft, stage(motion, look) as scene:
+    with atomic_file(out) as draft, stage(motion, look) as scene:
         pictures = _pictures(scene, numbers, advance or (lambda _: None))
         if gif:
             spread = {round(k) for k in np.linspace(0, len(numbers) - 1, min(SAMPLES, len(numbers)))}
@@ -299,7 +299,7 @@ def write_still(out: Path, motion: Motion, look: Look, number: int) -> None:
     """
     from PIL import Image
 
-    with written_whole(out) as draft, stage(motion, look) as scene:
+    with atomic_file(out) as draft, stage(motion, look) as scene:
         Image.fromarray(scene.picture(number)).save(draft, format="PNG", optimize=True)
 
 

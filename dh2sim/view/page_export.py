@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import PictureError
-from dh2sim.files import written_whole
+from dh2sim.files import atomic_file
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.messages import listed
@@ -198,7 +198,7 @@ def export_page(model: RobotModel, q: ArrayLike, path: Path, *, rollout: Rollout
     chosen = {round(k) for k in np.linspace(0, len(moments) - 1, min(len(moments), _MEASURED))}
     extent = extent_of([moments[k][1] for k in sorted(chosen)])
     html = page_html(moments, title=model.name, extent=extent)
-    with written_whole(path) as draft:
+    with atomic_file(path) as draft:
         draft.write_text(html, encoding="utf-8")
 
 

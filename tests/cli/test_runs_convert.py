@@ -75,7 +75,7 @@ def test_an_existing_file_is_replaced_only_if_that_is_wanted(run: Path) -> None:
     assert told == Outcome(
         status=2,
         out="",
-        err="dh2sim: 'run.h5' exists already; --overwrite replaces it, --out names another file\n",
+        err="dh2sim: 'run.h5' already exists; overwrite it, or name another file\n",
     )
     assert Path("run.h5").read_text() == "mine"
     assert dh2sim("runs", run, "--to", "hdf5", "--overwrite").status == 0
@@ -92,7 +92,7 @@ def test_the_run_of_the_current_folder_is_converted_beside_it(run: Path, monkeyp
 @pytest.mark.parametrize("out", ["", ".", ".."])
 def test_a_folder_is_no_file_to_write_to(run: Path, kind: str, out: str) -> None:
     told = dh2sim("runs", run, "--to", kind, "--out", out)
-    assert told == Outcome(status=2, out="", err=f"dh2sim: '{out or '.'}' is a folder; name a file with --out\n")
+    assert told == Outcome(status=2, out="", err=f"dh2sim: '{out or '.'}' is a folder; name a file\n")
 
 
 def test_a_terminal_sees_a_bar_that_vanishes(run: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 from pathlib import Path
 
@@ -23,8 +22,7 @@ from dh2sim.draw.video import (
     write_mp4,
     write_still,
 )
-from dh2sim.errors import OutputError, PictureError
-from dh2sim.files import written_whole
+from dh2sim.errors import PictureError
 from tests.draw.drawing import moving, require_gl
 
 LOOK = Look(width=160, height=120)
@@ -162,32 +160,3 @@ def test_an_interrupted_film_leaves_nothing_but_what_was_there_before(tmp_path: 
         write_film(out, moving(), LOOK, Tempo(fps=25.0), interrupt)
     assert [path.name for path in tmp_path.iterdir()] == [out.name]
     assert out.read_bytes() == b"older"
-
-
-def test_a_film_is_placed_only_when_it_is_whole(tmp_path: Path) -> None:
-    out = tmp_path / "a.png"
-    with written_whole(out) as draft:
-        assert draft.parent == tmp_path
-        assert draft.suffix == ".png"
-        draft.write_bytes(b"new")
-        assert not out.exists()
-    assert out.read_bytes() == b"new"
-    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
-    before = os.umask(0o027)
-    try:
-        with written_whole(out):
-            pass
-    finally:
-        os.umask(before)
-    assert out.stat().st_mode & 0o777 == 0o640, "readable like any other new file"
-
-
-def test_places_where_no_file_can_be_are_told(tmp_path: Path) -> None:
-    for out, told in (
-        (tmp_path / "no" / "a.png", f"there is no folder '{tmp_path / 'no'}'"),
-        (tmp_path, "that is a folder"),
-    ):
-        with pytest.raises(OutputError) as caught, written_whole(out):
-            pass
-        assert str(caught.value) == f"cannot write '{out}': {told}"
-    assert list(tmp_path.iterdir()) == []

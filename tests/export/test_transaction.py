@@ -8,69 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from dh2sim.errors import OutputError
-from dh2sim.files import put_in_place, staged
 from tests.export.robots import small, write
 from tests.program import Outcome, contents, dh2sim, environment
-
-NEW = {"a.txt": b"new a", "meshes/b.txt": b"new b", "c.txt": b"new c"}
-
-
-def _place(out: Path) -> None:
-    with staged(out, "arm", NEW) as folder:
-        put_in_place(folder, out / "arm", NEW)
-
-
-def test_files_are_put_in_place_and_nothing_else_is_left(tmp_path: Path) -> None:
-    _place(tmp_path / "deep" / "out")
-    assert contents(tmp_path) == {f"deep/out/arm/{name}": data for name, data in NEW.items()}
-
-
-def test_other_files_in_the_folder_stay(tmp_path: Path) -> None:
-    (tmp_path / "arm").mkdir()
-    (tmp_path / "arm" / "notes.txt").write_bytes(b"mine")
-    _place(tmp_path)
-    assert contents(tmp_path / "arm") == {**NEW, "notes.txt": b"mine"}
-
-
-def test_files_placed_before_one_that_cannot_be_are_put_back(tmp_path: Path) -> None:
-    target = tmp_path / "arm"
-    (target / "c.txt").mkdir(parents=True)
-    (target / "a.txt").write_bytes(b"old a")
-    before = (target / "a.txt").stat()
-    with pytest.raises(OutputError) as caught:
-        _place(tmp_path)
-    assert str(caught.value) == (
-        f"cannot write '{target / 'c.txt'}': Is a directory; the files that stood there are unchanged"
-    )
-    after = (target / "a.txt").stat()
-    assert (after.st_ino, after.st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
-    assert contents(tmp_path) == {"arm/a.txt": b"old a"}
-    assert not (target / "meshes").exists()
-
-
-def test_files_that_vanish_from_the_staging_folder_are_an_error_and_the_others_are_put_back(
-    tmp_path: Path,
-) -> None:
-    target = tmp_path / "arm"
-    target.mkdir()
-    (target / "a.txt").write_bytes(b"old a")
-    with staged(tmp_path, "arm", NEW) as folder:
-        (folder / "c.txt").unlink()
-        with pytest.raises(OutputError):
-            put_in_place(folder, target, NEW)
-    assert contents(tmp_path) == {"arm/a.txt": b"old a"}
-
-
-def test_a_link_that_stood_there_is_put_back_as_a_link(tmp_path: Path) -> None:
-    target = tmp_path / "arm"
-    (target / "c.txt").mkdir(parents=True)
-    (tmp_path / "elsewhere.txt").write_bytes(b"old a")
-    (target / "a.txt").symlink_to(tmp_path / "elsewhere.txt")
-    with pytest.raises(OutputError):
-        _place(tmp_path)
-    assert (target / "a.txt").readlink() == tmp_path / "elsewhere.txt"
-    assert (tmp_path / "elsewhere.txt").read_bytes() == b"old a"
 
 
 def test_a_file_where_a_folder_is_needed_is_told(tmp_path: Path) -> None:
@@ -90,8 +29,7 @@ def test_a_file_where_a_folder_is_needed_is_told(tmp_path: Path) -> None:
     assert dh2sim("export", robot, "--out", tmp_path / "made") == Outcome(
         status=2,
         out="",
-        err=f"dh2sim: cannot write '{tmp_path / 'made' / 'small'}': File exists; the files that stood there are "
-        "unchanged\n",
+        err=f"dh2sim: cannot write '{tmp_path / 'made' / 'small'}': File exists; the existing files are unchanged\n",
     )
     assert contents(tmp_path / "made") == {"small": b"mine"}
 
@@ -108,7 +46,7 @@ def test_a_folder_at_a_files_name_is_told_and_old_files_stay(tmp_path: Path) -> 
     assert run == Outcome(
         status=2,
         out="",
-        err=f"dh2sim: cannot write '{path}': Is a directory; the files that stood there are unchanged\n",
+        err=f"dh2sim: cannot write '{path}': Is a directory; the existing files are unchanged\n",
     )
     assert contents(out) == before
 

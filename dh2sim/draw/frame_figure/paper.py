@@ -18,7 +18,7 @@ import numpy as np
 
 from dh2sim.errors import PictureError
 from dh2sim.extras import require_extra
-from dh2sim.files import written_whole
+from dh2sim.files import atomic_file
 from dh2sim.messages import shown
 from dh2sim.typing import Array
 
@@ -122,7 +122,7 @@ class Paper:
         self.axes.set_ylim(bottom - border, top + border)
         self.figure.set_size_inches((right - left + 2 * border) / 72, (top - bottom + 2 * border) / 72)
         ending = out.suffix.lower()
-        with written_whole(out) as draft:
+        with atomic_file(out) as draft:
             self.figure.savefig(draft, dpi=_DPI, format=ending[1:], metadata=dates[ending])
 
     def _remember(self, points: Array) -> None:

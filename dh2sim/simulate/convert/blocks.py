@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dh2sim.errors import RunDamagedError
+from dh2sim.errors import OutputError, RunDamagedError
+from dh2sim.files import atomic_files
 from dh2sim.simulate.store.blocks import Blocks
 from dh2sim.simulate.store.reader import damaged, open_dataset, read_attributes, read_seal, reading
 
@@ -91,3 +94,39 @@ def plain(value: Any) -> Any:
 
 def untold(_rollouts: int) -> None:
     """Tell nobody of progress."""
+
+
+@contextmanager
+def output_files(paths: Sequence[Path], *, run: Path, overwrite: bool) -> Iterator[list[Path]]:
+    """Yield temporary files to write to; when the block ends well they become ``paths``, all or none.
+
+    Args:
+        paths: The files to write, all in one folder, which is made if it is missing.
+        run: The run that is converted; it must not contain the files.
+        overwrite: Whether existing files are replaced.
+
+    Raises:
+        OutputError: A file exists or cannot be written; what was there is unchanged.
+    """
+    folder = paths[0].parent
+    if folder.resolve().is_relative_to(run.resolve()):
+        raise OutputError(f"'{paths[0]}' would be inside the run '{run}'; name a file elsewhere")
+    _refuse_existing(paths, overwrite=overwrite)
+    with atomic_files(folder) as staging:
+        yield [staging / path.name for path in paths]
+        _refuse_existing(paths, overwrite=overwrite)
+
+
+def refuse_folder(path: Path) -> None:
+    """Raise an OutputError if the path of an output file is a folder."""
+    if path.is_dir():
+        raise OutputError(f"'{path}' is a folder; name a file")
+
+
+def _refuse_existing(paths: Sequence[Path], *, overwrite: bool) -> None:
+    for path in paths:
+        refuse_folder(path)
+    existing = [f"'{path}'" for path in paths if os.path.lexists(path)]
+    if existing and not overwrite:
+        exist, them = ("exists", "it") if len(existing) == 1 else ("exist", "them")
+        raise OutputError(f"{' and '.join(existing)} already {exist}; overwrite {them}, or name another file")

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dh2sim.extras import require_extra
-from dh2sim.files import new_files, signals_deferred
-from dh2sim.simulate.convert.blocks import StoredRun, attribute_text, open_run, plain, untold
+from dh2sim.files import signals_deferred
+from dh2sim.simulate.convert.blocks import StoredRun, attribute_text, open_run, output_files, plain, untold
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -120,7 +120,7 @@ def to_hdf5(
     """
     require_extra("data", "xarray", "h5netcdf", "h5py", what="HDF5")
     run = open_run(path)
-    with new_files([out], run=path, overwrite=overwrite) as [staged], _opened(staged) as (file, sink):
+    with output_files([out], run=path, overwrite=overwrite) as [staged], _opened(staged) as (file, sink):
         with signals_deferred():  # HDF5 calls Python for every write, and is lost if that raises
             _define(file, run)
         for rollouts, block in run.blocks():

@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dh2sim.extras import require_extra
-from dh2sim.files import new_files, refuse_folder
-from dh2sim.simulate.convert.blocks import attribute_text, open_run, plain, untold
+from dh2sim.simulate.convert.blocks import attribute_text, open_run, output_files, plain, refuse_folder, untold
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -74,7 +73,7 @@ def to_parquet(
     tables = make_tables(run.dataset)
     metadata = _metadata(run.dataset)
     paths = parquet_files(out)
-    with new_files(paths, run=path, overwrite=overwrite) as staged, ExitStack() as stack:
+    with output_files(paths, run=path, overwrite=overwrite) as staged, ExitStack() as stack:
         writers = []
         for table, temporary in zip(tables, staged, strict=True):
             file = stack.enter_context(open(temporary, "wb"))

@@ -47,7 +47,7 @@ def test_what_exists_is_not_overwritten_unless_that_is_wanted(run: Path, tmp_pat
     it = "it" if len(files) == 1 else "them"
     with pytest.raises(OutputError) as caught:
         convert(run, out)
-    assert str(caught.value) == (f"{named} {exist} already; --overwrite replaces {it}, --out names another file")
+    assert str(caught.value) == f"{named} already {exist}; overwrite {it}, or name another file"
     assert {file.read_text() for file in files} == {"mine"}
     assert convert(run, out, overwrite=True) == files
     assert set(contents(tmp_path)) == {file.name for file in files}
@@ -58,9 +58,7 @@ def test_a_single_table_that_exists_is_reason_enough(run: Path, tmp_path: Path) 
     (tmp_path / "out.steps.parquet").write_text("mine")
     with pytest.raises(OutputError) as caught:
         to_parquet(run, tmp_path / "out.parquet")
-    assert str(caught.value) == (
-        f"'{tmp_path}/out.steps.parquet' exists already; --overwrite replaces it, --out names another file"
-    )
+    assert str(caught.value) == (f"'{tmp_path}/out.steps.parquet' already exists; overwrite it, or name another file")
     assert contents(tmp_path) == {"out.steps.parquet": b"mine"}
 
 
@@ -70,7 +68,7 @@ def test_a_folder_is_never_replaced(run: Path, tmp_path: Path, kind: str) -> Non
     out.mkdir()
     with pytest.raises(OutputError) as caught:
         CONVERTERS[kind](run, out, overwrite=True)
-    assert str(caught.value) == f"'{out}' is a folder; name a file with --out"
+    assert str(caught.value) == f"'{out}' is a folder; name a file"
 
 
 @both
@@ -79,7 +77,7 @@ def test_nothing_is_written_into_the_run_itself(run: Path, kind: str) -> None:
     for out in (run / "out", run / "status" / "out"):
         with pytest.raises(OutputError) as caught:
             CONVERTERS[kind](run, out, overwrite=True)
-        assert str(caught.value) == f"'{out}' would be inside the run '{run}'; name a file elsewhere with --out"
+        assert str(caught.value) == f"'{out}' would be inside the run '{run}'; name a file elsewhere"
     assert contents(run) == before
 
 
