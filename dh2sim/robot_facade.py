@@ -497,7 +497,7 @@ class Robot:
         Raises:
             OutputError: There is a file already, or it cannot be written.
         """
-        from dh2sim.files import written_whole
+        from dh2sim.files import atomic_file
         from dh2sim.robot.write import robot_file_text
 
         file = Path(path)
@@ -508,7 +508,7 @@ class Robot:
         text = robot_file_text(
             self.spec, header=header, folder=file.absolute().parent, angle=units.angle, length=units.length
         )
-        with written_whole(file) as draft:
+        with atomic_file(file) as draft:
             draft.write_text(text, encoding="utf-8")
 
     def view(self, *, host: str = "127.0.0.1", port: int = 8080, browser: bool = True) -> Viewer:
