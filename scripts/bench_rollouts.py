@@ -111,8 +111,8 @@ class _Paces:
     def watched(self, make: Callable[[Any], Any]) -> Callable[[Any], Any]:
         """Make controllers that look at the clock."""
 
-        def make_watched(lanes: Any) -> Any:
-            controller = make(lanes)
+        def make_watched(batch: Any) -> Any:
+            controller = make(batch)
             ticks: list[tuple[int, float]] = []
             self._groups.append(ticks)
             name = "control" if hasattr(controller, "control") else "controls"

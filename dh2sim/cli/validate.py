@@ -105,9 +105,9 @@ def validate(
 
 def _simulated(model: RobotModel, report: RobotReport, seed: int) -> RobotReport:
     """Add the physics checks to a robot's report."""
-    from dh2sim.validate.motion.run import check_physics
+    from dh2sim.validate.motion.run import check_motion
 
-    return replace(report, checks=(*report.checks, *check_physics(model, seed=seed)))
+    return replace(report, checks=(*report.checks, *check_motion(model, seed=seed)))
 
 
 def _require_folders(robots: list[str], models: list[RobotModel], folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""Does it move: MJCF and controller to rollouts, to a dataset.
+"""Simulation of many rollouts of a robot in MuJoCo, recorded as a dataset.
 
 Names are imported when they are first used.
 """
@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 _HOMES = {
     "ClosedLoop": "controllers.protocol",
     "Controller": "controllers.protocol",
-    "Lanes": "controllers.protocol",
     "Observation": "controllers.protocol",
     "OpenLoop": "controllers.protocol",
+    "RolloutBatch": "controllers.protocol",
     "open_dataset": "store.reader",
     "rollout": "run",
 }
@@ -23,9 +23,9 @@ __all__ = [*_HOMES]
 if TYPE_CHECKING:
     from dh2sim.simulate.controllers.protocol import ClosedLoop as ClosedLoop
     from dh2sim.simulate.controllers.protocol import Controller as Controller
-    from dh2sim.simulate.controllers.protocol import Lanes as Lanes
     from dh2sim.simulate.controllers.protocol import Observation as Observation
     from dh2sim.simulate.controllers.protocol import OpenLoop as OpenLoop
+    from dh2sim.simulate.controllers.protocol import RolloutBatch as RolloutBatch
     from dh2sim.simulate.run import rollout as rollout
     from dh2sim.simulate.store.reader import open_dataset as open_dataset
 else:

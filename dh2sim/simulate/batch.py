@@ -82,9 +82,9 @@ def _dense_index(model: mujoco.MjModel) -> NDArray[np.intp]:
 class BatchObservation:
     """The states of a persistent batch at the present instant; see ``Observation``. Arrays are the caller's own."""
 
-    def __init__(self, plant: Plant, batch: Batch, weights: Weights) -> None:
+    def __init__(self, plant: Plant, batch: Batch, gravity_forces: GravityForces) -> None:
         """Observe a batch whose simulations have just been given their start."""
-        self._plant, self._batch, self._weights = plant, batch, weights
+        self._plant, self._batch, self._gravity_forces = plant, batch, gravity_forces
         self._first_q, self._first_v = (7, 6) if plant.floating else (0, 0)
         self._space = JointSpace(plant)
         self._gravity: Array | None = None
@@ -130,7 +130,7 @@ class BatchObservation:
     def gravity(self) -> Array:
         """Forces that balance gravity, shape (batch, n)."""
         if self._gravity is None:
-            self._gravity = self._weights.forces(self._batch.bind("qpos"))
+            self._gravity = self._gravity_forces.forces(self._batch.bind("qpos"))
         return self._gravity.copy()
 
     def _field(self, name: str) -> Array:
@@ -140,7 +140,7 @@ class BatchObservation:
         return self._fields[name]
 
 
-class Weights:
+class GravityForces:
     """The same models at rest, which tell the forces of gravity alone."""
 
     def __init__(self, plant: Plant, simulations: int, threads: int, factors: dict[str, Array]) -> None:
@@ -171,7 +171,7 @@ WARNINGS = {
 }
 
 
-class Group:
+class MonitoredBatch:
     """Simulations that run together; each that MuJoCo warns of or fails on stops alone."""
 
     def __init__(self, plant: Plant, batch: Batch, recorder: Recorder, steps: int) -> None:

@@ -13,8 +13,8 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from dh2sim.errors import ControllerError, EngineError
-from dh2sim.simulate.batch import BatchObservation, Group, Weights
-from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, Lanes, OpenLoop
+from dh2sim.simulate.batch import BatchObservation, GravityForces, MonitoredBatch
+from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, OpenLoop, RolloutBatch
 from dh2sim.simulate.dataset_layout import run_sizes, run_variables
 from dh2sim.simulate.initial_states import starts
 from dh2sim.simulate.loops import Scheduled, checked, simulate_closed_loop, simulate_open_loop
@@ -25,7 +25,7 @@ from dh2sim.simulate.records import Recorder
 from dh2sim.simulate.settings import Settings
 from dh2sim.typing import Array, read_only
 
-GROUP = 256
+BATCH_SIZE = 256
 """Simulations that run together: so many that Python's share is small, and so few that what a closed loop keeps of
 each of them between its steps stays in the processor's cache."""
 REFERENCE_STEPS = 512
@@ -60,8 +60,8 @@ def simulate_block(
     plant = plant_of(mjcf, settings)
     arrays = _empty(plant, settings, rollouts)
     with quiet_engine():
-        for first in range(rollouts.start, rollouts.stop, GROUP):
-            part = range(first, min(first + GROUP, rollouts.stop))
+        for first in range(rollouts.start, rollouts.stop, BATCH_SIZE):
+            part = range(first, min(first + BATCH_SIZE, rollouts.stop))
             rows = slice(part.start - rollouts.start, part.stop - rollouts.start)
             own = {name: array[rows] for name, array in arrays.items()}
             _simulate(plant, settings, part, threads, own, told=settings.steps)
@@ -113,17 +113,17 @@ def _simulate(plant: Plant, settings: Settings, rollouts: range, threads: int, a
     factors = scales(plant, settings, rollouts)
     q0, v0 = starts(plant, settings, rollouts)
     qpos0 = np.concatenate([np.tile(_base(plant), (len(q0), 1)), q0], axis=1)
-    weights = Weights(plant, len(rollouts), threads, factors)
-    lanes = Lanes(
+    gravity = GravityForces(plant, len(rollouts), threads, factors)
+    started = RolloutBatch(
         plant=plant,
         steps=told,
         rollouts=rollouts,
         q0=read_only(q0),
         v0=read_only(v0),
-        gravity0=read_only(weights.forces(qpos0)),
+        gravity0=read_only(gravity.forces(qpos0)),
         generators=Generators(settings.seed, rollouts, Purpose.CONTROLLER),
     )
-    controller = settings.controller.make(lanes)
+    controller = settings.controller.make(started)
     recorder = Recorder(plant, arrays, settings.every)
     looks = isinstance(controller, ClosedLoop) or recorder.looks_between_steps
     # between the steps of a closed loop an MjData keeps what it has computed already
@@ -131,21 +131,23 @@ def _simulate(plant: Plant, settings: Settings, rollouts: range, threads: int, a
     apply_scales(batch, plant, factors)
     batch.bind("qpos")[:] = qpos0
     batch.bind("qvel")[:, plant.model.nv - plant.n :] = v0
-    group = Group(plant, batch, recorder, settings.steps)
+    monitored = MonitoredBatch(plant, batch, recorder, settings.steps)
     _record_start(recorder, batch)
     name = settings.controller.name
     if isinstance(controller, ClosedLoop):
-        simulate_closed_loop(group, controller, BatchObservation(plant, batch, weights), name)
+        simulate_closed_loop(monitored, controller, BatchObservation(plant, batch, gravity), name)
     elif not isinstance(controller, OpenLoop):
         raise ControllerError(f"controller '{name}' has neither 'control' nor 'controls'")
     elif looks:
-        simulate_closed_loop(group, Scheduled(controller, group, name), BatchObservation(plant, batch, weights), name)
+        simulate_closed_loop(
+            monitored, Scheduled(controller, monitored, name), BatchObservation(plant, batch, gravity), name
+        )
     else:
-        simulate_open_loop(group, controller, name)
+        simulate_open_loop(monitored, controller, name)
     _record_reference(recorder, controller, settings, len(rollouts))
-    recorder.end(group.stop_step)
-    arrays["status"][:], arrays["stop_step"][:] = group.status, group.stop_step
-    arrays["saturation"][:] = group.saturation
+    recorder.end(monitored.stop_step)
+    arrays["status"][:], arrays["stop_step"][:] = monitored.status, monitored.stop_step
+    arrays["saturation"][:] = monitored.saturation
     for name, values in factors.items():
         arrays[f"{name}_scale"][:] = values
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.errors import ControllerError
-from dh2sim.simulate.batch import BatchObservation, Group
+from dh2sim.simulate.batch import BatchObservation, MonitoredBatch
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Observation, OpenLoop
 from dh2sim.simulate.records import DERIVED, INTERVALS
 from dh2sim.typing import Array
@@ -57,35 +57,35 @@ SCHEDULED_STEPS = 64
 _OPEN_LOOP_AXES = "rollouts, time steps or 1, actuators"
 
 
-def simulate_open_loop(group: Group, controller: OpenLoop, name: str) -> None:
-    """Simulate a group from its start to its end, recording.
+def simulate_open_loop(monitored: MonitoredBatch, controller: OpenLoop, name: str) -> None:
+    """Simulate a batch from its start to its end, recording.
 
     Args:
-        group: at its start.
-        controller: of the group.
+        monitored: at its start.
+        controller: of its rollouts.
         name: of the controller, for errors.
 
     Raises:
         ControllerError: it returned what are no controls.
     """
-    segment = _Segment(group)
-    for first in range(0, group.steps, segment.steps):
-        if not group.alive.any():
+    segment = _Segment(monitored)
+    for first in range(0, monitored.steps, segment.steps):
+        if not monitored.alive.any():
             break
-        count = min(segment.steps, group.steps - first)
-        controls, outside = group.clipped(controls_of(controller, first, count, group, name))
+        count = min(segment.steps, monitored.steps - first)
+        controls, outside = monitored.clipped(controls_of(controller, first, count, monitored, name))
         segment.run(controls, first, count)
-        group.count(outside, first, count)
-    _end(group)
+        monitored.count(outside, first, count)
+    _end(monitored)
 
 
-def controls_of(controller: OpenLoop, first: int, count: int, group: Group, name: str) -> Array:
+def controls_of(controller: OpenLoop, first: int, count: int, monitored: MonitoredBatch, name: str) -> Array:
     """Return the controls of some time steps, shape (batch, count or 1, actuators).
 
     Raises:
         ControllerError: they are no such array.
     """
-    simulations, actuators = group.batch.nsim, len(group.plant.actuators)
+    simulations, actuators = monitored.batch.nsim, len(monitored.plant.actuators)
     shapes = [(simulations, count, actuators), (simulations, 1, actuators)]
     return checked(controller.controls(first, count), shapes, _OPEN_LOOP_AXES, controller=name, what="controls")
 
@@ -93,9 +93,9 @@ def controls_of(controller: OpenLoop, first: int, count: int, group: Group, name
 class Scheduled:
     """An open-loop controller, driven step by step: slower, for what can be recorded in no other way."""
 
-    def __init__(self, controller: OpenLoop, group: Group, name: str) -> None:
+    def __init__(self, controller: OpenLoop, monitored: MonitoredBatch, name: str) -> None:
         """Ask for nothing yet."""
-        self._controller, self._group, self._name = controller, group, name
+        self._controller, self._monitored, self._name = controller, monitored, name
         self._controls: Array | None = None
 
     def control(self, observation: Observation) -> Array:
@@ -103,43 +103,43 @@ class Scheduled:
         step = observation.step % SCHEDULED_STEPS
         if step == 0 or self._controls is None:
             first = observation.step - step
-            count = min(SCHEDULED_STEPS, self._group.steps - first)
-            self._controls = controls_of(self._controller, first, count, self._group, self._name)
+            count = min(SCHEDULED_STEPS, self._monitored.steps - first)
+            self._controls = controls_of(self._controller, first, count, self._monitored, self._name)
         return self._controls[:, min(step, self._controls.shape[1] - 1)]
 
 
 class _Segment:
-    """Some time steps of a group, in buffers that are used again and again."""
+    """Some time steps of a batch, in buffers that are used again and again."""
 
-    def __init__(self, group: Group) -> None:
-        self._group = group
-        recorder, data = group.recorder, mujoco.MjData(group.plant.model)
+    def __init__(self, monitored: MonitoredBatch) -> None:
+        self._monitored = monitored
+        recorder, data = monitored.recorder, mujoco.MjData(monitored.plant.model)
         self._fields = (*recorder.state_fields, *recorder.derived_fields)
         shapes = {field: np.shape(getattr(data, field)) for field in self._fields}
-        width = group.plant.model.nu + sum(int(np.prod(shape)) for shape in shapes.values())
-        self.steps = max(16, min(group.steps, SEGMENT_BYTES // (8 * group.batch.nsim * max(1, width))))
+        width = monitored.plant.model.nu + sum(int(np.prod(shape)) for shape in shapes.values())
+        self.steps = max(16, min(monitored.steps, SEGMENT_BYTES // (8 * monitored.batch.nsim * max(1, width))))
         self._buffers = {
-            field: np.empty((group.batch.nsim, self.steps, *shape), np.int32 if field == "ncon" else np.float64)
+            field: np.empty((monitored.batch.nsim, self.steps, *shape), np.int32 if field == "ncon" else np.float64)
             for field, shape in shapes.items()
         }
 
     def run(self, controls: Array, first: int, count: int) -> None:
         """Simulate ``count`` time steps from ``first``; controls of shape (batch, count or 1, actuators)."""
-        group, batch = self._group, self._group.batch
+        monitored, batch = self._monitored, self._monitored.batch
         before = batch.state.copy()
-        ids, rows = group.ids, group.rows
+        ids, rows = monitored.ids, monitored.rows
         out = self._out(count, rows)
-        failed = group.call(self._advance, controls, rows, ids, count, out)
+        failed = monitored.call(self._advance, controls, rows, ids, count, out)
         for field, values in out.items():
-            group.recorder.put_field(field, first + (field in group.recorder.state_fields), values, rows)
-        group.recorder.put("ctrl", first, np.broadcast_to(controls, (len(controls), count, controls.shape[2])))
+            monitored.recorder.put_field(field, first + (field in monitored.recorder.state_fields), values, rows)
+        monitored.recorder.put("ctrl", first, np.broadcast_to(controls, (len(controls), count, controls.shape[2])))
         if len(failed):
             self._step_by_step(failed, before, controls, first, count)
 
     def _advance(
         self, controls: Array, rows: Any, ids: NDArray[np.int32] | None, count: int, out: dict[str, NDArray[Any]]
     ) -> None:
-        batch = self._group.batch
+        batch = self._monitored.batch
         if controls.shape[1] == count:
             batch.rollout(count, controls[rows], record=self._fields, ids=ids, out=out)
             return
@@ -150,12 +150,12 @@ class _Segment:
     def _out(self, count: int, rows: Any) -> dict[str, NDArray[Any]]:
         if count == self.steps and isinstance(rows, slice):
             return self._buffers
-        alive = int(np.count_nonzero(self._group.alive))
+        alive = int(np.count_nonzero(self._monitored.alive))
         return {name: np.empty((alive, count, *old.shape[2:]), old.dtype) for name, old in self._buffers.items()}
 
     def _step_by_step(self, failed: NDArray[np.intp], before: Array, controls: Array, first: int, count: int) -> None:
         """Simulate those that failed once more, to find out in which step, and record what went before it."""
-        group, batch = self._group, self._group.batch
+        monitored, batch = self._monitored, self._monitored.batch
         batch.state[failed] = before[failed]
         batch.warning[failed] = 0
         left = failed
@@ -163,60 +163,66 @@ class _Segment:
             now = controls[left, min(j, controls.shape[1] - 1)][:, None]
             ids = left.astype(np.int32)
             out = {name: np.empty((len(left), 1, *old.shape[2:]), old.dtype) for name, old in self._buffers.items()}
-            stopped = group.call(self._one, now, ids, out)
+            stopped = monitored.call(self._one, now, ids, out)
             stopped = stopped[np.isin(stopped, left)]
-            group.stop(stopped, first + j)
+            monitored.stop(stopped, first + j)
             for field, values in out.items():
-                group.recorder.put_field(field, first + j + (field in group.recorder.state_fields), values, left)
+                monitored.recorder.put_field(
+                    field, first + j + (field in monitored.recorder.state_fields), values, left
+                )
             left = left[~np.isin(left, stopped)]
             if not len(left):
                 return
 
     def _one(self, controls: Array, ids: NDArray[np.int32], out: dict[str, NDArray[Any]]) -> None:
         given = controls if controls.shape[2] else None
-        self._group.batch.rollout(1, given, record=self._fields, ids=ids, out=out)
+        self._monitored.batch.rollout(1, given, record=self._fields, ids=ids, out=out)
 
 
-def _end(group: Group) -> None:
+def _end(monitored: MonitoredBatch) -> None:
     """Record what is computed from the last state."""
     fields = {
-        field: group.batch.bind(field) for field in ("sensordata", "energy") if field in group.recorder.derived_fields
+        field: monitored.batch.bind(field)
+        for field in ("sensordata", "energy")
+        if field in monitored.recorder.derived_fields
     }
-    group.look(group.steps)
+    monitored.look(monitored.steps)
     for field, values in fields.items():
-        group.recorder.put_field(field, group.steps, values[group.rows][:, None], group.rows, DERIVED)
+        monitored.recorder.put_field(field, monitored.steps, values[monitored.rows][:, None], monitored.rows, DERIVED)
 
 
-SEGMENT = 64
+PAGE_STEPS = 64
 """Time steps after which what was seen is put into the arrays."""
 BEFORE_STEP = (*DERIVED, "contacts")
 """Variables that MuJoCo has computed when a time step begins; the others of ``INTERVALS`` come with the step."""
 _CLOSED_LOOP_AXES = "rollouts, actuators"
 
 
-def simulate_closed_loop(group: Group, controller: ClosedLoop, observation: BatchObservation, name: str) -> None:
-    """Simulate a group from its start to its end, recording.
+def simulate_closed_loop(
+    monitored: MonitoredBatch, controller: ClosedLoop, observation: BatchObservation, name: str
+) -> None:
+    """Simulate a batch from its start to its end, recording.
 
     Before a step, what MuJoCo derives from positions and velocities is computed (``mjSTAGE_VEL``); the step goes on
     from there, so that looking costs nothing.
 
     Args:
-        group: at its start; its batch is persistent.
-        controller: of the group.
+        monitored: at its start; its batch is persistent.
+        controller: of its rollouts.
         observation: of its batch.
         name: of the controller, for errors.
 
     Raises:
         ControllerError: it returned what are no controls.
     """
-    batch, recorder = group.batch, group.recorder
+    batch, recorder = monitored.batch, monitored.recorder
     controls = batch.bind("ctrl")
     derived = {field: batch.bind(field) for field in recorder.derived_fields}
     states = {field: batch.bind(field) for field in recorder.state_fields}
-    pages = _Pages(group)
-    group.look(0)
-    for step in range(group.steps):
-        if not group.alive.any():
+    pages = _Pages(monitored)
+    monitored.look(0)
+    for step in range(monitored.steps):
+        if not monitored.alive.any():
             break
         for field, values in derived.items():
             if field != "qacc":
@@ -224,43 +230,43 @@ def simulate_closed_loop(group: Group, controller: ClosedLoop, observation: Batc
         wanted = checked(
             controller.control(observation), [controls.shape], _CLOSED_LOOP_AXES, controller=name, what="controls"
         )
-        controls[:], outside = group.clipped(wanted)
+        controls[:], outside = monitored.clipped(wanted)
         pages.note("ctrl", "before", controls)
-        failed = group.call(batch.step, group.ids)
+        failed = monitored.call(batch.step, monitored.ids)
         for field in ("qacc", "sensordata"):
             if field in derived:
                 pages.note(field, "after", derived[field])
         for field, values in states.items():
             pages.note(field, "state", values)
         pages.turn()
-        group.stop(failed, step)
-        group.look(step + 1)
+        monitored.stop(failed, step)
+        monitored.look(step + 1)
         if outside is not None:
-            group.count(outside[:, None], step, 1)
+            monitored.count(outside[:, None], step, 1)
         observation.advance()
     pages.flush()
     for field, values in derived.items():
-        recorder.put_field(field, group.steps, values[:, None], only=DERIVED)
+        recorder.put_field(field, monitored.steps, values[:, None], only=DERIVED)
 
 
 class _Pages:
     """Keeps what was seen in the order of time, and turns it over to the recorder many steps at once."""
 
-    def __init__(self, group: Group) -> None:
-        self._recorder = group.recorder
+    def __init__(self, monitored: MonitoredBatch) -> None:
+        self._recorder = monitored.recorder
         self._kept: dict[tuple[str, str], NDArray[Any]] = {}
         self._first = self._count = 0
 
     def note(self, field: str, when: str, values: NDArray[Any]) -> None:
         """Keep a copy of what a field holds in the present step; shape (batch, …)."""
         if (field, when) not in self._kept:
-            self._kept[field, when] = np.empty((SEGMENT, *values.shape), values.dtype)
+            self._kept[field, when] = np.empty((PAGE_STEPS, *values.shape), values.dtype)
         self._kept[field, when][self._count] = values
 
     def turn(self) -> None:
         """Go on to the next step."""
         self._count += 1
-        if self._count == SEGMENT:
+        if self._count == PAGE_STEPS:
             self.flush()
 
     def flush(self) -> None:

@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from dh2sim.simulate import Lanes, Observation
+from dh2sim.simulate import Observation, RolloutBatch
 from dh2sim.typing import Array
 
 
 class Wave:
     """Open loop, the robot's own actuators; by the scalar sine, so that a loop can do the same."""
 
-    def __init__(self, lanes: Lanes) -> None:
-        self._rollouts, self._count = lanes.rollouts, len(lanes.plant.actuators)
+    def __init__(self, batch: RolloutBatch) -> None:
+        self._rollouts, self._count = batch.rollouts, len(batch.plant.actuators)
 
     def controls(self, first: int, count: int) -> Array:
         values = [
@@ -41,9 +41,9 @@ class Spring:
 
     actuation = "motor"
 
-    def __init__(self, lanes: Lanes) -> None:
-        self._joints = list(lanes.plant.driven)
-        self._floating = lanes.plant.floating
+    def __init__(self, batch: RolloutBatch) -> None:
+        self._joints = list(batch.plant.driven)
+        self._floating = batch.plant.floating
 
     def control(self, observation: Observation) -> Array:
         wanted = 30.0 * (0.1 - observation.q) - 3.0 * observation.v
@@ -59,13 +59,13 @@ class _Bad:
     actuation = "motor"
 
     def __init__(
-        self, lanes: Lanes, *, rollout: int = 3, step: int = 10, value: str = "nan", before: str = "0.2"
+        self, batch: RolloutBatch, *, rollout: int = 3, step: int = 10, value: str = "nan", before: str = "0.2"
     ) -> None:
-        self._lanes, self._step, self._value, self._before = lanes, step, float(value), float(before)
-        self._row = rollout - lanes.rollouts.start if rollout in lanes.rollouts else None
+        self._batch, self._step, self._value, self._before = batch, step, float(value), float(before)
+        self._row = rollout - batch.rollouts.start if rollout in batch.rollouts else None
 
     def _at(self, step: int) -> Array:
-        controls = np.full((len(self._lanes.rollouts), len(self._lanes.plant.actuators)), 0.2)
+        controls = np.full((len(self._batch.rollouts), len(self._batch.plant.actuators)), 0.2)
         if self._row is not None:
             controls[self._row] = self._value if step >= self._step else self._before
         return controls
@@ -90,7 +90,7 @@ class Nothing:
 
     actuation = "motor"
 
-    def __init__(self, lanes: Lanes) -> None: ...
+    def __init__(self, batch: RolloutBatch) -> None: ...
 
     def control(self, observation: Observation) -> Any:
         """Forgets to return."""
@@ -114,8 +114,8 @@ class Late(Flat):
 class LateOpen:
     """Forgets how many steps it was asked for, if they are many."""
 
-    def __init__(self, lanes: Lanes) -> None:
-        self._q = lanes.q0
+    def __init__(self, batch: RolloutBatch) -> None:
+        self._q = batch.q0
 
     def controls(self, first: int, count: int) -> Array:
         return np.repeat(self._q[:, None], count if count == 1 else 0, axis=1)
@@ -153,8 +153,8 @@ class Lists(Nothing):
 class Narrow:
     """Open loop with an actuator too few."""
 
-    def __init__(self, lanes: Lanes) -> None:
-        self._batch = len(lanes.rollouts)
+    def __init__(self, batch: RolloutBatch) -> None:
+        self._batch = len(batch.rollouts)
 
     def controls(self, first: int, count: int) -> Array:
         return np.zeros((self._batch, count, 1))
@@ -163,8 +163,8 @@ class Narrow:
 class Still:
     """Open loop, the same at every step, in single precision and not contiguous."""
 
-    def __init__(self, lanes: Lanes) -> None:
-        self._q: Any = lanes.q0.astype(np.float32)
+    def __init__(self, batch: RolloutBatch) -> None:
+        self._q: Any = batch.q0.astype(np.float32)
 
     def controls(self, first: int, count: int) -> Array:
         shown: Array = np.broadcast_to(self._q[:, None], (len(self._q), count, self._q.shape[1]))
@@ -214,9 +214,9 @@ class Drawn:
 
     actuation = "motor"
 
-    def __init__(self, lanes: Lanes) -> None:
-        count = len(lanes.plant.actuators)
-        self._drawn = np.stack([source.random(count) for source in lanes.generators])
+    def __init__(self, batch: RolloutBatch) -> None:
+        count = len(batch.plant.actuators)
+        self._drawn = np.stack([source.random(count) for source in batch.generators])
 
     def controls(self, first: int, count: int) -> Array:
         return self._drawn[:, None]

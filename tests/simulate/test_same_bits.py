@@ -82,7 +82,7 @@ def test_groups_of_any_size_give_the_same_bits(controller: str, monkeypatch: pyt
     made = job(controller)
     together = simulated(made, range(ROLLOUTS))
     for size in (1, 2, 4):
-        monkeypatch.setattr(block, "GROUP", size)
+        monkeypatch.setattr(block, "BATCH_SIZE", size)
         assert_same(simulated(made, range(ROLLOUTS)), together)
 
 
@@ -95,7 +95,7 @@ def test_segments_of_any_length_give_the_same_bits(
     at_once = simulated(made, range(ROLLOUTS))
     monkeypatch.setattr(open_loop, "SEGMENT_BYTES", 1)  # as short as they get, 16 steps
     for length in (1, 7, 64):
-        monkeypatch.setattr(closed_loop, "SEGMENT", length)
+        monkeypatch.setattr(closed_loop, "PAGE_STEPS", length)
         monkeypatch.setattr(block, "REFERENCE_STEPS", length)
         assert_same(simulated(made, range(ROLLOUTS)), at_once)
 

@@ -104,7 +104,7 @@ def test_clipped_controls_count_until_the_stop(driver: str, segment: int, monkey
 
 @BOTH
 def test_when_all_have_failed_the_run_is_over(driver: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(block, "GROUP", 1)
+    monkeypatch.setattr(block, "BATCH_SIZE", 1)
     run = run_of(driver, float("nan"), rollouts=4)
     alone = rollout(robots.arm(), rollouts=1, steps=10**6, every=10**5, controller=f"{DRIVERS}:{driver}:rollout=0")
     assert run.status.values.tolist() == [0, 0, 0, STATUS["bad_ctrl"]]

@@ -20,7 +20,7 @@ from typing import Any, Final, Literal
 from dh2sim.errors import ControllerError
 from dh2sim.messages import did_you_mean, listed
 from dh2sim.robot.spec import ActuatorType
-from dh2sim.simulate.controllers.protocol import Controller, Lanes
+from dh2sim.simulate.controllers.protocol import Controller, RolloutBatch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +30,7 @@ class ControllerChoice:
     text: str
     """As on the command line, ``NAME`` or ``NAME:key=value,…``: all options that were given, in a fixed order."""
     name: str
-    make: Callable[[Lanes], Controller] = field(compare=False, repr=False)
+    make: Callable[[RolloutBatch], Controller] = field(compare=False, repr=False)
     """Makes the controller of a group of rollouts, options already bound."""
     actuation: ActuatorType | None
     """The actuators that the model is simulated with, one at every joint (none: no actuators at all); None: those of
@@ -225,7 +225,7 @@ def options_of(constructor: Callable[..., object], module: str, *, skip: int) ->
     parameters = list(inspect.signature(constructor).parameters.values())
     first = parameters[:skip]
     if len(first) < skip or any(p.kind in (p.KEYWORD_ONLY, p.VAR_KEYWORD) for p in first):
-        raise TypeError("its constructor must take the rollouts (lanes) as its first argument")
+        raise TypeError("its constructor must take a RolloutBatch as its first argument")
     named = [p for p in parameters[skip:] if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
     # an inherited constructor knows the names of its own module
     written = getattr(constructor, "__init__", None) if isinstance(constructor, type) else constructor

@@ -18,7 +18,7 @@ import numpy as np
 from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.controllers.options import Within
-from dh2sim.simulate.controllers.protocol import Lanes
+from dh2sim.simulate.controllers.protocol import RolloutBatch
 from dh2sim.simulate.controllers.trajectories import (
     INSIDE,
     MINIMUM_JERK_PEAK,
@@ -64,16 +64,16 @@ def driven_joints(plant: Plant) -> list[int]:
     return list(plant.driven)
 
 
-def holding_controls(lanes: Lanes, *, against_gravity: bool) -> Array:
+def holding_controls(batch: RolloutBatch, *, against_gravity: bool) -> Array:
     """Return the controls that keep a robot near its start, inside their ranges, shape (batch, actuators).
 
     Positions: the start, and with ``against_gravity`` as much more as makes the actuator's pull, kp times the
     difference, balance gravity. Velocities and forces: 0, and for forces with ``against_gravity`` that of gravity.
     """
-    plant = lanes.plant
+    plant = batch.plant
     joints = driven_joints(plant)
     position, motor = of_type(plant, ActuatorType.POSITION), of_type(plant, ActuatorType.MOTOR)
-    start, load = lanes.q0[:, joints], lanes.gravity0[:, joints]
+    start, load = batch.q0[:, joints], batch.gravity0[:, joints]
     controls = np.where(position, start, 0.0)
     if against_gravity:
         kp = plant.model.actuator_gainprm[:, 0]
@@ -87,16 +87,16 @@ class Hold:
 
     actuation = ActuatorType.POSITION
 
-    def __init__(self, lanes: Lanes) -> None:
+    def __init__(self, batch: RolloutBatch) -> None:
         """Compute the setpoints, which never change."""
-        self._controls = holding_controls(lanes, against_gravity=True)[:, None]
+        self._controls = holding_controls(batch, against_gravity=True)[:, None]
 
     def controls(self, first: int, count: int) -> Array:  # noqa: ARG002 - the same at every step
         """Return the setpoints, rad or m, shape (batch, 1, actuators)."""
         return self._controls
 
 
-class Noise:
+class RandomSpline:
     """The robot's own actuators get smoothed noise.
 
     Controls are uniform cubic B-splines through the neighbourhood of random points, twice continuously differentiable
@@ -108,7 +108,7 @@ class Noise:
 
     def __init__(
         self,
-        lanes: Lanes,
+        batch: RolloutBatch,
         *,
         rate: Annotated[float, Within(above=0.0, unit="Hz")] = 5.0,
         amplitude: Annotated[float, Within(at_least=0.0, at_most=1.0)] = 0.3,
@@ -116,7 +116,7 @@ class Noise:
         """Draw the points.
 
         Args:
-            lanes: the rollouts.
+            batch: the rollouts.
             rate: random points a second, Hz.
             amplitude: share of half the control's range that they are in, at either side of the start, or as near to
                 it as the range allows.
@@ -124,7 +124,7 @@ class Noise:
         Raises:
             ControllerError: there is more than one point a time step.
         """
-        plant = lanes.plant
+        plant = batch.plant
         if rate * plant.timestep > 1.0:
             raise ControllerError(
                 f"option 'rate' is {rate:g} Hz, above that of the time steps, {1 / plant.timestep:g} Hz"
@@ -135,10 +135,10 @@ class Noise:
         position, velocity = of_type(plant, ActuatorType.POSITION), of_type(plant, ActuatorType.VELOCITY)
         free = np.where(position, free_ranges(plant)[joints], np.where(velocity, plant.velocity[joints], 1.0))
         reach = INSIDE * amplitude * half_ranges(self._lower, self._upper, free)
-        start = holding_controls(lanes, against_gravity=False)
+        start = holding_controls(batch, against_gravity=False)
         center = centers(start, reach, self._lower, self._upper)
-        self._pieces = math.floor(lanes.steps * plant.timestep * rate) + 1
-        targets = center + reach * uniform(lanes.generators, self._pieces, len(joints))
+        self._pieces = math.floor(batch.steps * plant.timestep * rate) + 1
+        targets = center + reach * uniform(batch.generators, self._pieces, len(joints))
         # a spline is nowhere quicker than its points are apart
         most = np.where(position, INSIDE * plant.velocity[joints] / rate, np.inf)
         self._points = follow(start, [start, start, *targets], most)
@@ -166,7 +166,7 @@ class Sine:
 
     def __init__(
         self,
-        lanes: Lanes,
+        batch: RolloutBatch,
         *,
         harmonics: Annotated[int, Within(at_least=1, at_most=100)] = 5,
         frequency: Annotated[float, Within(above=0.0, unit="Hz")] = 0.1,
@@ -176,7 +176,7 @@ class Sine:
         """Draw amplitudes and phases.
 
         Args:
-            lanes: the rollouts.
+            batch: the rollouts.
             harmonics: number of sines.
             frequency: of the first, Hz; the others are its multiples.
             amplitude: sum of the sines' amplitudes as a share of half the joint's range, before the velocity limit.
@@ -185,28 +185,28 @@ class Sine:
         Raises:
             ControllerError: the highest frequency is more than time steps can show.
         """
-        plant = lanes.plant
-        self._timestep, self._fade, self._start = plant.timestep, fade, lanes.q0
+        plant = batch.plant
+        self._timestep, self._fade, self._start = plant.timestep, fade, batch.q0
         if harmonics * frequency * plant.timestep > 0.5:
             raise ControllerError(
                 f"the highest frequency, harmonics x frequency = {harmonics * frequency:g} Hz, is above half the "
                 f"rate of the time steps, {0.5 / plant.timestep:g} Hz"
             )
         self._rates = [2.0 * math.pi * frequency * h for h in range(1, harmonics + 1)]
-        drawn = np.stack([g.standard_normal((2 * harmonics, plant.n)) for g in lanes.generators], axis=1)
+        drawn = np.stack([g.standard_normal((2 * harmonics, plant.n)) for g in batch.generators], axis=1)
         sizes = np.sqrt(drawn[:harmonics] * drawn[:harmonics] + drawn[harmonics:] * drawn[harmonics:])
         total, speed = np.zeros(sizes.shape[1:]), np.zeros(sizes.shape[1:])
         for rate, size in zip(self._rates, sizes, strict=True):
             total, speed = total + size, speed + rate * size
         reach = INSIDE * amplitude * half_ranges(plant.lower, plant.upper, free_ranges(plant))
         # on the way to the series: rate of the weight times the distance, and the series' own velocity
-        away = np.abs(centers(lanes.q0, reach, plant.lower, plant.upper) - lanes.q0)
+        away = np.abs(centers(batch.q0, reach, plant.lower, plant.upper) - batch.q0)
         fastest = MINIMUM_JERK_PEAK / fade * (away + reach) + reach * speed / total
         limit = INSIDE * plant.velocity
         reach = reach * np.where(fastest > limit, limit / np.where(fastest > 0.0, fastest, 1.0), 1.0)
-        self._center = centers(lanes.q0, reach, plant.lower, plant.upper)
+        self._center = centers(batch.q0, reach, plant.lower, plant.upper)
         self._terms = [*(drawn * (reach / total)), self._center]
-        self._lower, self._upper = widened(lanes)
+        self._lower, self._upper = widened(batch)
 
     def controls(self, first: int, count: int) -> Array:
         """Return setpoints, rad or m, shape (batch, count, n)."""

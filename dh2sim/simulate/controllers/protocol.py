@@ -68,7 +68,7 @@ class Observation(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Lanes:
+class RolloutBatch:
     """A group of rollouts that are driven together, at their start."""
 
     plant: Plant
@@ -131,7 +131,7 @@ class Prepared:
     robot is driven.
     """
 
-    make: Callable[[Lanes], Controller] = field(repr=False)
+    make: Callable[[RolloutBatch], Controller] = field(repr=False)
     """Makes the controller of a group of rollouts."""
     actuation: ActuatorType | str | None = None
     """As the class attribute."""

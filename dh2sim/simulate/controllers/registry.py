@@ -11,13 +11,20 @@ from typing import Any, Final
 from dh2sim.errors import ControllerError
 from dh2sim.messages import did_you_mean, listed
 from dh2sim.robot.spec import ActuatorType
-from dh2sim.simulate.controllers import user_code as discovery
 from dh2sim.simulate.controllers.options import ControllerChoice, Option, join_pairs, options_of, read_options
-from dh2sim.simulate.controllers.position import Hold, Noise, Sine
-from dh2sim.simulate.controllers.protocol import Controller, Lanes, Prepared
+from dh2sim.simulate.controllers.position import Hold, RandomSpline, Sine
+from dh2sim.simulate.controllers.protocol import Controller, Prepared, RolloutBatch
 from dh2sim.simulate.controllers.replay import Replay
 from dh2sim.simulate.controllers.torque import PD, ComputedTorque, GravityCompensation, Passive
-from dh2sim.simulate.controllers.user_code import blamed, guarded
+from dh2sim.simulate.controllers.user_code import (
+    guard_methods,
+    load_class,
+    load_plugin,
+    module_and_class,
+    plugins,
+    source_digest,
+    user_code,
+)
 
 BUILT_IN: Final[Mapping[str, type]] = MappingProxyType(
     {
@@ -27,7 +34,7 @@ BUILT_IN: Final[Mapping[str, type]] = MappingProxyType(
         "pd": PD,
         "computed-torque": ComputedTorque,
         "sine": Sine,
-        "random": Noise,
+        "random": RandomSpline,
         "replay": Replay,
     }
 )
@@ -36,7 +43,7 @@ BUILT_IN: Final[Mapping[str, type]] = MappingProxyType(
 def controllers() -> Mapping[str, str]:
     """Return the names of all controllers, each with a line of help; no installed package is imported for it."""
     known = {name: (found.__doc__ or "").splitlines()[0].rstrip(".") for name, found in BUILT_IN.items()}
-    for name, entries in discovery.plugins().items():
+    for name, entries in plugins().items():
         packages = sorted({entry.dist.name if entry.dist is not None else entry.module for entry in entries})
         known.setdefault(name, f"of the installed package {listed(packages)}")
     return MappingProxyType(known)
@@ -56,16 +63,16 @@ def choose(text: str) -> ControllerChoice:
     name = head.strip()
     if name in BUILT_IN:
         return _choice(name, BUILT_IN[name], rest, own=True)
-    plugins = discovery.plugins()
-    if name in plugins:
-        return _choice(name, discovery.load_plugin(name, plugins[name]), rest, own=False)
-    written = discovery.module_and_class(text)
+    installed = plugins()
+    if name in installed:
+        return _choice(name, load_plugin(name, installed[name]), rest, own=False)
+    written = module_and_class(text)
     if written is not None:
         module, class_name, options = written
-        found = discovery.load_class(module, class_name)
+        found = load_class(module, class_name)
         if found is not None:
             return _choice(f"{module}:{class_name}", found, options, own=False)
-    known = [*BUILT_IN, *(plugin for plugin in plugins if plugin not in BUILT_IN)]
+    known = [*BUILT_IN, *(plugin for plugin in installed if plugin not in BUILT_IN)]
     what = f"controller '{name}'" if written is None else f"controller and no module '{name}'"
     raise ControllerError(
         f"there is no {what}.{did_you_mean(name, known)} Known controllers: {listed(known)}; "
@@ -83,14 +90,14 @@ class _Maker:
     own: bool
     """Whether the code is dh2sim's own."""
 
-    def __call__(self, lanes: Lanes) -> Controller:
+    def __call__(self, batch: RolloutBatch) -> Controller:
         if self.own:
             with _named(self.name):
-                return self.make(lanes, **self.options)
-        with blamed(self.name):
-            controller = self.make(lanes, **self.options)
+                return self.make(batch, **self.options)
+        with user_code(self.name):
+            controller = self.make(batch, **self.options)
         _check_methods(self.name, controller)
-        return guarded(self.name, controller)
+        return guard_methods(self.name, controller)
 
 
 def _choice(name: str, found: type, text: str, *, own: bool) -> ControllerChoice:
@@ -107,10 +114,10 @@ def _choice(name: str, found: type, text: str, *, own: bool) -> ControllerChoice
         )
         maker = _Maker(name=name, make=found, options=arguments, own=own)
     else:
-        with _named(name) if own else blamed(name):
+        with _named(name) if own else user_code(name):
             prepared = prepare(**arguments)
         maker = _Maker(name=name, make=prepared.make, own=own)
-    code = "" if own else discovery.source_digest(found)
+    code = "" if own else source_digest(found)
     return ControllerChoice(
         text=join_pairs(name, given.items()),
         name=name,

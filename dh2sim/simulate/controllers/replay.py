@@ -10,7 +10,7 @@ import numpy as np
 from dh2sim.errors import ControllerError
 from dh2sim.messages import listed
 from dh2sim.simulate.controllers.options import Within
-from dh2sim.simulate.controllers.protocol import Lanes, Prepared
+from dh2sim.simulate.controllers.protocol import Prepared, RolloutBatch
 from dh2sim.simulate.controllers.recording import Recording, read_recording
 from dh2sim.typing import Array
 
@@ -54,16 +54,16 @@ class Replay:
 class ReplayedControls:
     """Controls of a file, each held until the next."""
 
-    def __init__(self, lanes: Lanes, *, recording: Recording) -> None:
+    def __init__(self, batch: RolloutBatch, *, recording: Recording) -> None:
         """Read what the rollouts need.
 
         Raises:
             ControllerError: the file's columns are not the robot's actuators, or it has too few rollouts.
         """
-        self._data = _rows(lanes, recording, lanes.plant.actuators, "actuators")
-        self._times = recording.times_at(lanes.plant.timestep)
-        self._timestep = lanes.plant.timestep
-        self._batch = len(lanes.rollouts)
+        self._data = _rows(batch, recording, batch.plant.actuators, "actuators")
+        self._times = recording.times_at(batch.plant.timestep)
+        self._timestep = batch.plant.timestep
+        self._batch = len(batch.rollouts)
 
     def controls(self, first: int, count: int) -> Array:
         """Return controls, shape (batch, count, actuators)."""
@@ -75,16 +75,16 @@ class ReplayedControls:
 class ReplayedPositions:
     """Positions of a file, straight between its instants; the last is held."""
 
-    def __init__(self, lanes: Lanes, *, recording: Recording) -> None:
+    def __init__(self, batch: RolloutBatch, *, recording: Recording) -> None:
         """Read what the rollouts need.
 
         Raises:
             ControllerError: the file's columns are not the robot's joints, or it has too few rollouts.
         """
-        self._data = _rows(lanes, recording, lanes.plant.joints, "joints")
-        self._times = recording.times_at(lanes.plant.timestep)
-        self._timestep = lanes.plant.timestep
-        self._batch = len(lanes.rollouts)
+        self._data = _rows(batch, recording, batch.plant.joints, "joints")
+        self._times = recording.times_at(batch.plant.timestep)
+        self._timestep = batch.plant.timestep
+        self._batch = len(batch.rollouts)
 
     def controls(self, first: int, count: int) -> Array:
         """Return setpoints, rad or m, shape (batch, count, n)."""
@@ -103,19 +103,19 @@ class ReplayedPositions:
         return _for_all(q, self._batch), _for_all((end - start) / duration[:, None], self._batch)
 
 
-def _rows(lanes: Lanes, recording: Recording, names: tuple[str, ...], what: str) -> Array:
+def _rows(batch: RolloutBatch, recording: Recording, names: tuple[str, ...], what: str) -> Array:
     """Return the numbers of a group of rollouts in the order of ``names``, shape (batch or 1, K, names)."""
-    columns = recording.columns(names, what, joints=lanes.plant.joints)
+    columns = recording.columns(names, what, joints=batch.plant.joints)
     if recording.rollouts is None:
         return recording.read(range(1))[:, :, columns]
-    if lanes.rollouts.stop > recording.rollouts:
+    if batch.rollouts.stop > recording.rollouts:
         raise ControllerError(
             f"{recording.file} has {recording.rollouts} rollouts, 0 to {recording.rollouts - 1}; "
-            f"rollout {lanes.rollouts.stop - 1} of this run has none to replay. "
+            f"rollout {batch.rollouts.stop - 1} of this run has none to replay. "
             "Ask for fewer rollouts, or let all replay one with rollout=NUMBER"
         )
-    data = recording.read(lanes.rollouts)[:, :, columns]
-    stopped = [i for i, rows in zip(lanes.rollouts, data, strict=True) if not np.isfinite(rows).all()]
+    data = recording.read(batch.rollouts)[:, :, columns]
+    stopped = [i for i, rows in zip(batch.rollouts, data, strict=True) if not np.isfinite(rows).all()]
     if stopped:
         raise ControllerError(
             f"{recording.file} does not hold all of rollouts {listed(map(str, stopped))}: "

@@ -18,7 +18,7 @@ import numpy as np
 
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.controllers.options import Within
-from dh2sim.simulate.controllers.protocol import Lanes, Observation
+from dh2sim.simulate.controllers.protocol import Observation, RolloutBatch
 from dh2sim.simulate.controllers.trajectories import Amplitude, Period, SmoothReference
 from dh2sim.simulate.plant import Plant
 from dh2sim.typing import Array
@@ -60,9 +60,9 @@ class Passive:
 
     actuation = ActuatorType.NONE
 
-    def __init__(self, lanes: Lanes) -> None:
+    def __init__(self, batch: RolloutBatch) -> None:
         """Note how many rollouts there are."""
-        self._controls = np.zeros((len(lanes.rollouts), 1, 0))
+        self._controls = np.zeros((len(batch.rollouts), 1, 0))
 
     def controls(self, first: int, count: int) -> Array:  # noqa: ARG002 - the same at every step
         """Return no controls, shape (batch, 1, 0)."""
@@ -74,11 +74,11 @@ class GravityCompensation:
 
     actuation = ActuatorType.MOTOR
 
-    def __init__(self, lanes: Lanes, *, damping: Annotated[float, Within(at_least=0.0)] = 0.0) -> None:  # noqa: ARG002
+    def __init__(self, batch: RolloutBatch, *, damping: Annotated[float, Within(at_least=0.0)] = 0.0) -> None:  # noqa: ARG002
         """Keep the damping.
 
         Args:
-            lanes: the rollouts.
+            batch: the rollouts.
             damping: torque against motion per velocity, N·m·s/rad or N·s/m.
         """
         self._damping = damping
@@ -97,7 +97,7 @@ class PD:
 
     def __init__(
         self,
-        lanes: Lanes,
+        batch: RolloutBatch,
         *,
         kp: Annotated[float | None, Within(at_least=0.0)] = None,
         kd: Annotated[float | None, Within(at_least=0.0)] = None,
@@ -108,7 +108,7 @@ class PD:
         """Draw the references.
 
         Args:
-            lanes: the rollouts.
+            batch: the rollouts.
             kp: stiffness of every joint, N·m/rad or N/m; None: the robot's own, softened as
                 the time step requires.
             kd: damping of every joint, N·m·s/rad or N·s/m; None: likewise.
@@ -116,11 +116,11 @@ class PD:
             period: duration of a motion between waypoints, s.
             amplitude: share of the joints' range that the waypoints are in.
         """
-        own_kp, own_kd = steady_gains(lanes.plant)
-        self._kp = own_kp if kp is None else np.full(lanes.plant.n, kp)
-        self._kd = own_kd if kd is None else np.full(lanes.plant.n, kd)
+        own_kp, own_kd = steady_gains(batch.plant)
+        self._kp = own_kp if kp is None else np.full(batch.plant.n, kp)
+        self._kd = own_kd if kd is None else np.full(batch.plant.n, kd)
         self._gravity = gravity
-        self._smooth = SmoothReference(lanes, period=period, amplitude=amplitude)
+        self._smooth = SmoothReference(batch, period=period, amplitude=amplitude)
 
     def control(self, observation: Observation) -> Array:
         """Return torques or forces, N·m or N, shape (batch, n)."""
@@ -146,7 +146,7 @@ class ComputedTorque:
 
     def __init__(
         self,
-        lanes: Lanes,
+        batch: RolloutBatch,
         *,
         bandwidth: Annotated[float, Within(above=0.0, unit="rad/s")] = 20.0,
         period: Period = 1.0,
@@ -155,13 +155,13 @@ class ComputedTorque:
         """Draw the references.
 
         Args:
-            lanes: the rollouts.
+            batch: the rollouts.
             bandwidth: how fast errors vanish, rad/s.
             period: duration of a motion between waypoints, s.
             amplitude: share of the joints' range that the waypoints are in.
         """
         self._kp, self._kd = bandwidth * bandwidth, 2.0 * bandwidth
-        self._smooth = SmoothReference(lanes, period=period, amplitude=amplitude)
+        self._smooth = SmoothReference(batch, period=period, amplitude=amplitude)
 
     def control(self, observation: Observation) -> Array:
         """Return torques or forces, N·m or N, shape (batch, n)."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from dh2sim.errors import ControllerError
 from dh2sim.simulate.controllers.options import Within
-from dh2sim.simulate.controllers.protocol import Lanes
+from dh2sim.simulate.controllers.protocol import RolloutBatch
 from dh2sim.simulate.plant import Plant
 from dh2sim.typing import Array
 
@@ -175,9 +175,9 @@ def uniform(generators: Sequence[np.random.Generator], a: int, m: int) -> Array:
     return np.ascontiguousarray(np.moveaxis(np.stack(drawn), 0, -2))
 
 
-def widened(lanes: Lanes) -> tuple[Array, Array]:
+def widened(batch: RolloutBatch) -> tuple[Array, Array]:
     """Return the joints' limits, and where a rollout starts outside of them its start, each of shape (batch, n)."""
-    return np.minimum(lanes.plant.lower, lanes.q0), np.maximum(lanes.plant.upper, lanes.q0)
+    return np.minimum(batch.plant.lower, batch.q0), np.maximum(batch.plant.upper, batch.q0)
 
 
 Period: TypeAlias = Annotated[float, Within(above=0.0, unit="s")]
@@ -208,11 +208,11 @@ class SmoothReference:
     velocity limit is moved closer. Every motion stays between its two waypoints, so that nothing leaves the limits.
     """
 
-    def __init__(self, lanes: Lanes, *, period: float, amplitude: float) -> None:
+    def __init__(self, batch: RolloutBatch, *, period: float, amplitude: float) -> None:
         """Draw the waypoints.
 
         Args:
-            lanes: the rollouts.
+            batch: the rollouts.
             period: duration of a motion from waypoint to waypoint, s.
             amplitude: width of the window as a share of the joint's range, 0 to 1; of joints without limits, as a
                 share of 2 pi rad or 2 m.
@@ -220,7 +220,7 @@ class SmoothReference:
         Raises:
             ControllerError: a motion would be shorter than ten time steps.
         """
-        plant = lanes.plant
+        plant = batch.plant
         self._timestep = plant.timestep
         if period < _FEWEST * plant.timestep:
             raise ControllerError(
@@ -228,14 +228,14 @@ class SmoothReference:
                 f"{_FEWEST * plant.timestep:g} s"
             )
         self._period = period
-        self._motions = math.floor(lanes.steps * plant.timestep / period) + 1
-        self._lower, self._upper = widened(lanes)
+        self._motions = math.floor(batch.steps * plant.timestep / period) + 1
+        self._lower, self._upper = widened(batch)
         reach = INSIDE * amplitude * half_ranges(plant.lower, plant.upper, free_ranges(plant))
-        center = centers(lanes.q0, reach, plant.lower, plant.upper)
-        targets = center + reach * uniform(lanes.generators, self._motions, plant.n)
+        center = centers(batch.q0, reach, plant.lower, plant.upper)
+        targets = center + reach * uniform(batch.generators, self._motions, plant.n)
         # nobody is quicker than the velocity limit, even where a start outside the limits makes the way longer
         most = INSIDE * plant.velocity * period / MINIMUM_JERK_PEAK
-        self._waypoints = follow(lanes.q0, targets, most)
+        self._waypoints = follow(batch.q0, targets, most)
         self._ahead = Motion(q=np.empty((0, 0, 0)), v=np.empty((0, 0, 0)), a=np.empty((0, 0, 0)))
         self._ahead_first = -1
 

@@ -31,7 +31,7 @@ _INSTALLED = {"site-packages", "dist-packages"}
 
 
 @contextmanager
-def blamed(name: str) -> Iterator[None]:
+def user_code(name: str) -> Iterator[None]:
     """Turn what a user's code raises into an error that says what was raised and where.
 
     Args:
@@ -48,12 +48,12 @@ def blamed(name: str) -> Iterator[None]:
         raise ControllerError(f"controller '{name}': {_what(error)}{_where(error)}") from error
 
 
-def guarded(name: str, controller: Controller) -> Controller:
-    """Return a controller that does the same, whose failures are told by ``blamed``."""
+def guard_methods(name: str, controller: Controller) -> Controller:
+    """Return a controller that does the same, whose failures are told by ``user_code``."""
     methods = {}
     for method in _METHODS:
         if callable(getattr(controller, method, None)):
-            methods[method] = _guarded(name, getattr(controller, method))
+            methods[method] = _guard(name, getattr(controller, method))
     return cast("Controller", SimpleNamespace(**methods))
 
 
@@ -63,10 +63,10 @@ def shown_path(path: str | os.PathLike[str]) -> str:
     return str(absolute.relative_to(Path.cwd()) if absolute.is_relative_to(Path.cwd()) else absolute)
 
 
-def _guarded(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
+def _guard(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(method)
     def call(*args: Any, **kwargs: Any) -> Any:
-        with blamed(name):
+        with user_code(name):
             return method(*args, **kwargs)
 
     return call
@@ -95,7 +95,7 @@ def _of_python_or_dh2sim(file: str) -> bool:
     return of_python or file.startswith("<") or Path(file).is_relative_to(_DH2SIM)
 
 
-GROUP: Final = "dh2sim.controllers"
+ENTRY_POINTS: Final = "dh2sim.controllers"
 """Entry points of this group are controller classes."""
 _MODULE: Final = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _CLASS: Final = re.compile(r"[^\W\d]\w*")
@@ -104,7 +104,7 @@ _CLASS: Final = re.compile(r"[^\W\d]\w*")
 def plugins() -> Mapping[str, tuple[EntryPoint, ...]]:
     """Return the entry points of installed packages by name; nothing is imported."""
     found: dict[str, tuple[EntryPoint, ...]] = {}
-    for entry in sorted(entry_points(group=GROUP), key=lambda entry: (entry.name, entry.value)):
+    for entry in sorted(entry_points(group=ENTRY_POINTS), key=lambda entry: (entry.name, entry.value)):
         if entry not in found.get(entry.name, ()):
             found[entry.name] = (*found.get(entry.name, ()), entry)
     return found
@@ -119,7 +119,7 @@ def load_plugin(name: str, entries: tuple[EntryPoint, ...]) -> type:
     if len(entries) > 1:
         ways = listed((f"'{entry.value}'" for entry in entries), " or ")
         raise ControllerError(f"controller '{name}': more than one installed package has it; choose {ways}")
-    with blamed(name):
+    with user_code(name):
         found = entries[0].load()
     return _class(name, found, f"'{entries[0].value}'")
 
@@ -143,7 +143,7 @@ def load_class(module_name: str, class_name: str) -> type | None:
         ControllerError: the module cannot be imported, or has no such class.
     """
     name = f"{module_name}:{class_name}"
-    with blamed(name), _from_here():
+    with user_code(name), _from_here():
         try:
             module = importlib.import_module(module_name)
         except ModuleNotFoundError as error:

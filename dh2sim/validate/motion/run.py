@@ -27,7 +27,7 @@ MOST_ROWS = 60
 """Rows of tables that are checked; the time that simulations take grows with their cube."""
 
 
-def check_physics(model: RobotModel, *, seed: int = 0) -> tuple[Check, ...]:
+def check_motion(model: RobotModel, *, seed: int = 0) -> tuple[Check, ...]:
     """Check that a robot moves as physics has it, when it is simulated.
 
     Args:

@@ -13,13 +13,13 @@ SWING = '''
     from typing import TYPE_CHECKING
 
     if TYPE_CHECKING:
-        from dh2sim.simulate import Lanes, Observation
+        from dh2sim.simulate import RolloutBatch, Observation
 
 
     class Swing:
         actuation = "motor"
 
-        def __init__(self, lanes: Lanes, *, gain: float = 3.0):
+        def __init__(self, batch: RolloutBatch, *, gain: float = 3.0):
             if gain < 0:
                 raise ValueError("a gain is not negative")
             self.gain = gain
@@ -29,11 +29,11 @@ SWING = '''
 
 
     class Still:
-        def __init__(self, lanes):
-            self.lanes = lanes
+        def __init__(self, batch):
+            self.batch = batch
 
         def controls(self, first, count):
-            return self.lanes.q0[:, None]
+            return self.batch.q0[:, None]
 
         def reference(self, first, count):
             return None, 1 / 0
@@ -42,17 +42,17 @@ SWING = '''
     class Odd:
         actuation = "motors"
 
-        def __init__(self, lanes): ...
+        def __init__(self, batch): ...
 
         def control(self, observation): ...
 
 
     class Neither:
-        def __init__(self, lanes): ...
+        def __init__(self, batch): ...
 
 
     class Both:
-        def __init__(self, lanes): ...
+        def __init__(self, batch): ...
 
         def control(self, observation): ...
 

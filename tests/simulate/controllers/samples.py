@@ -12,7 +12,7 @@ import numpy as np
 
 import dh2sim
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Convention, Dynamics, JointType, Limits, RobotSpec, Row
-from dh2sim.simulate.controllers.protocol import Controller, Lanes
+from dh2sim.simulate.controllers.protocol import Controller, RolloutBatch
 from dh2sim.simulate.controllers.registry import choose
 from dh2sim.simulate.plant import Plant, make_plant
 from dh2sim.typing import Array, read_only
@@ -61,7 +61,7 @@ def plant(spec: RobotSpec, *, timestep: float = 0.002) -> Plant:
     )
 
 
-def lanes(
+def started(
     spec: RobotSpec,
     rollouts: range = range(7),
     *,
@@ -69,13 +69,13 @@ def lanes(
     timestep: float = 0.002,
     seed: int = 1,
     q0: Array | None = None,
-) -> Lanes:
+) -> RolloutBatch:
     """Rollouts that start at random inside the limits, or at ``q0``; each as it is in any other group."""
     made = plant(spec, timestep=timestep)
     lower, upper = np.maximum(made.lower, -3.0), np.minimum(made.upper, 3.0)
     starts = [np.random.default_rng([seed, 0, i]).uniform(lower, upper) for i in rollouts]
     q = np.stack(starts) if q0 is None else np.tile(q0, (len(rollouts), 1))
-    return Lanes(
+    return RolloutBatch(
         plant=made,
         steps=steps,
         rollouts=rollouts,
@@ -91,10 +91,10 @@ def driven(spec: RobotSpec, kind: ActuatorType) -> RobotSpec:
     return replace(spec, rows=tuple(replace(row, actuator=ActuatorSpec(type=kind)) for row in spec.rows))
 
 
-def make(text: str, spec: RobotSpec, rollouts: range = range(7), **options: Any) -> tuple[Controller, Lanes]:
+def make(text: str, spec: RobotSpec, rollouts: range = range(7), **options: Any) -> tuple[Controller, RolloutBatch]:
     """A controller, and the rollouts that it drives with the actuators that it asks for."""
     choice = choose(text)
-    group = lanes(spec if choice.actuation is None else driven(spec, choice.actuation), rollouts, **options)
+    group = started(spec if choice.actuation is None else driven(spec, choice.actuation), rollouts, **options)
     return choice.make(group), group
 
 

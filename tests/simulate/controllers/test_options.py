@@ -13,7 +13,7 @@ from dh2sim.simulate.controllers.registry import choose
 
 
 def constructor(  # type: ignore[no-untyped-def]
-    lanes: object,
+    batch: object,
     *,
     gain: float = 3.0,
     turns: int = 2,
@@ -128,7 +128,7 @@ def test_a_controller_without_options_says_so() -> None:
 
 
 def test_a_type_that_no_text_can_give_is_refused() -> None:
-    def bad(lanes: object, *, gains: list[float]) -> None: ...
+    def bad(batch: object, *, gains: list[float]) -> None: ...
 
     message = (
         "option 'gains' is of type list; it may be float, int, bool, str, a Literal of texts, or one of these or None"
@@ -138,7 +138,7 @@ def test_a_type_that_no_text_can_give_is_refused() -> None:
 
 
 def test_an_annotation_that_is_not_understood_is_refused() -> None:
-    def bad(lanes: object, *, gain: Nonsense = 1.0) -> None: ...  # type: ignore[name-defined] # noqa: F821
+    def bad(batch: object, *, gain: Nonsense = 1.0) -> None: ...  # type: ignore[name-defined] # noqa: F821
 
     message = "the annotation of option 'gain' is not understood: name 'Nonsense' is not defined"
     with pytest.raises(TypeError, match=f"^{re.escape(message)}$"):
@@ -146,14 +146,14 @@ def test_an_annotation_that_is_not_understood_is_refused() -> None:
 
 
 def test_a_parameter_without_a_name_is_refused() -> None:
-    def bad(lanes: object, gain: float = 1.0, /) -> None: ...
+    def bad(batch: object, gain: float = 1.0, /) -> None: ...
 
     with pytest.raises(TypeError, match=r"^parameter 'gain' cannot be given by name$"):
         options_of(bad, __name__, skip=1)
 
 
 def test_annotations_of_what_is_no_option_are_not_looked_at() -> None:
-    def good(lanes: Nonsense, *, gain: float = 1.0) -> None: ...  # type: ignore[name-defined] # noqa: F821
+    def good(batch: Nonsense, *, gain: float = 1.0) -> None: ...  # type: ignore[name-defined] # noqa: F821
 
     assert [option.name for option in options_of(good, __name__, skip=1)] == ["gain"]
 

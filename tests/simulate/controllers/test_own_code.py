@@ -127,8 +127,8 @@ PREPARED = """
             digest = Path(file).read_text(encoding="utf-8")
             return Prepared(make=Reading, actuation="velocity", digest=digest)
 
-        def __init__(self, lanes):
-            self.zero = 0.0 * lanes.q0[:, None]
+        def __init__(self, batch):
+            self.zero = 0.0 * batch.q0[:, None]
 
         def controls(self, first, count):
             return self.zero

@@ -32,7 +32,7 @@ def refused(text: str) -> str:
         ),
         ("Neither", "it has neither control(observation) nor controls(first, count); it needs one of them"),
         ("Both", "it has both control(observation) and controls(first, count); it needs one of them"),
-        ("Alone", "its constructor must take the rollouts (lanes) as its first argument"),
+        ("Alone", "its constructor must take a RolloutBatch as its first argument"),
     ],
 )
 def test_a_class_that_cannot_be_a_controller_is_refused(folder: Path, name: str, problem: str) -> None:
@@ -62,7 +62,7 @@ def test_a_failing_method_is_told_by_its_text_and_line(folder: Path) -> None:
 
 def test_a_failure_inside_a_library_is_told_by_the_users_line(folder: Path) -> None:
     text = (
-        "import numpy as np\n\n\nclass A:\n    def __init__(self, lanes):\n        np.linalg.inv(np.zeros((2, 2)))\n"
+        "import numpy as np\n\n\nclass A:\n    def __init__(self, batch):\n        np.linalg.inv(np.zeros((2, 2)))\n"
     )
     write(folder, "inverting.py", text + "\n    def control(self, observation):\n        pass\n")
     assert refused("inverting:A") == "controller 'inverting:A': LinAlgError: Singular matrix (inverting.py, line 6)"

@@ -12,7 +12,7 @@ import pytest
 
 from dh2sim.errors import ControllerError
 from dh2sim.simulate.controllers.options import options_of
-from dh2sim.simulate.controllers.protocol import ClosedLoop, Lanes, Observation
+from dh2sim.simulate.controllers.protocol import ClosedLoop, Observation, RolloutBatch
 from dh2sim.simulate.controllers.registry import BUILT_IN, choose
 from dh2sim.simulate.controllers.replay import Replay
 from dh2sim.simulate.plant import Plant
@@ -40,8 +40,8 @@ def test_the_page_says_which_actuators_are_used(name: str) -> None:
 
 
 def test_the_page_names_everything_that_a_controller_is_given() -> None:
-    named = set(re.findall(r"`(?:observation|lanes)?\.?(\w+)`", PAGE))
-    for given in (Observation, Lanes, Plant):
+    named = set(re.findall(r"`(?:observation|batch)?\.?(\w+)`", PAGE))
+    for given in (Observation, RolloutBatch, Plant):
         names = [name for name in (*vars(given), *inspect.get_annotations(given)) if not name.startswith("_")]
         hidden = {"floating", "turns", "driven"}
         assert set(names) - hidden <= named
@@ -76,6 +76,6 @@ def test_the_class_on_the_page_drives_an_arm(tmp_path: Path, monkeypatch: pytest
 
 
 def test_a_package_is_offered_as_the_page_says() -> None:
-    from dh2sim.simulate.controllers.user_code import GROUP
+    from dh2sim.simulate.controllers.user_code import ENTRY_POINTS
 
-    assert f'[project.entry-points."{GROUP}"]' in PAGE
+    assert f'[project.entry-points."{ENTRY_POINTS}"]' in PAGE

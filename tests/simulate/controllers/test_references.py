@@ -11,7 +11,7 @@ from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.simulate.controllers.trajectories import SmoothReference
 from dh2sim.typing import Array
-from tests.simulate.controllers.samples import arm, lanes, make
+from tests.simulate.controllers.samples import arm, make, started
 from tests.strategies import robot_specs
 
 STEPS = 1300
@@ -27,7 +27,7 @@ def quintic(start: Array, end: Array, s: Array) -> Array:
     spec=robot_specs(max_rows=4), period=st.floats(0.05, 3.0), amplitude=st.floats(0.0, 1.0), seed=st.integers(0, 99)
 )
 def test_references_stay_inside_all_limits(spec: RobotSpec, period: float, amplitude: float, seed: int) -> None:
-    group = lanes(spec, range(3), steps=400, seed=seed)
+    group = started(spec, range(3), steps=400, seed=seed)
     motion = SmoothReference(group, period=period, amplitude=amplitude).motion(0, 401)
     plant = group.plant
     assert (motion.q >= plant.lower).all()
@@ -39,7 +39,7 @@ def test_references_stay_inside_all_limits(spec: RobotSpec, period: float, ampli
 
 
 def test_a_reference_begins_at_rest_where_the_rollout_starts() -> None:
-    group = lanes(arm())
+    group = started(arm())
     motion = SmoothReference(group, period=0.5, amplitude=0.5).motion(0, 1)
     assert np.array_equal(motion.q[:, 0], group.q0)
     assert not motion.v.any()
@@ -47,7 +47,7 @@ def test_a_reference_begins_at_rest_where_the_rollout_starts() -> None:
 
 
 def test_a_reference_is_a_quintic_from_waypoint_to_waypoint() -> None:
-    group = lanes(arm(), steps=STEPS)
+    group = started(arm(), steps=STEPS)
     motion = SmoothReference(group, period=0.5, amplitude=0.5).motion(0, STEPS + 1)
     for first in range(0, STEPS - 249, 250):
         s = (np.arange(251) / 250)[:, None]
@@ -57,14 +57,14 @@ def test_a_reference_is_a_quintic_from_waypoint_to_waypoint() -> None:
 
 def test_velocities_and_accelerations_are_the_derivatives() -> None:
     step = 1e-4
-    group = lanes(arm(), steps=5000, timestep=step)
+    group = started(arm(), steps=5000, timestep=step)
     motion = SmoothReference(group, period=0.5, amplitude=0.5).motion(0, 5000)
     np.testing.assert_allclose(np.gradient(motion.q, step, axis=1)[:, 1:-1], motion.v[:, 1:-1], rtol=0, atol=1e-5)
     np.testing.assert_allclose(np.gradient(motion.v, step, axis=1)[:, 1:-1], motion.a[:, 1:-1], rtol=0, atol=0.05)
 
 
 def test_a_waypoint_out_of_reach_is_approached_as_fast_as_is_allowed() -> None:
-    group = lanes(arm(), range(40), steps=STEPS)
+    group = started(arm(), range(40), steps=STEPS)
     motion = SmoothReference(group, period=0.1, amplitude=1.0).motion(0, STEPS)
     fastest = np.abs(motion.v).max(axis=(0, 1))
     np.testing.assert_allclose(fastest, group.plant.velocity, rtol=1e-6)
@@ -72,13 +72,13 @@ def test_a_waypoint_out_of_reach_is_approached_as_fast_as_is_allowed() -> None:
 
 
 def test_an_amplitude_of_zero_stays_at_the_start() -> None:
-    group = lanes(arm(), steps=STEPS)
+    group = started(arm(), steps=STEPS)
     motion = SmoothReference(group, period=0.5, amplitude=0.0).motion(0, STEPS)
     np.testing.assert_allclose(motion.q, np.broadcast_to(group.q0[:, None], motion.q.shape), rtol=0, atol=1e-12)
 
 
 def test_waypoints_fill_the_share_of_the_range_that_is_asked_for() -> None:
-    group = lanes(arm(), range(200), steps=400, timestep=0.1, q0=np.array([0.75, 0.05, 0.4]))
+    group = started(arm(), range(200), steps=400, timestep=0.1, q0=np.array([0.75, 0.05, 0.4]))
     motion = SmoothReference(group, period=10.0, amplitude=0.5).motion(0, 401)
     reached = np.abs(motion.q[:, 100::100] - group.q0[:, None]).max(axis=(0, 1))
     np.testing.assert_allclose(reached, [0.5 * 1.75, 0.5 * 0.25, 0.5 * np.pi], rtol=0.02)
@@ -86,7 +86,7 @@ def test_waypoints_fill_the_share_of_the_range_that_is_asked_for() -> None:
 
 
 def test_one_time_step_at_a_time_gives_the_same_bits() -> None:
-    group = lanes(arm(), steps=STEPS)
+    group = started(arm(), steps=STEPS)
     reference = SmoothReference(group, period=0.5, amplitude=0.5)
     motion = reference.motion(0, 300)
     for step in (*range(140), 5, 299):

@@ -58,7 +58,7 @@ def test_built_in_controllers_are_classes_as_users_write_them() -> None:
     for name, found in BUILT_IN.items():
         if name != "replay":
             parameters = list(inspect.signature(found).parameters.values())
-            assert parameters[0].name == "lanes"
+            assert parameters[0].name == "batch"
             assert all(p.kind is p.KEYWORD_ONLY and p.default is not p.empty for p in parameters[1:])
 
 

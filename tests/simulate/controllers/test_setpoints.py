@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import ActuatorType, RobotSpec
-from dh2sim.simulate.controllers.position import Hold, Noise, Sine
+from dh2sim.simulate.controllers.position import Hold, RandomSpline, Sine
 from dh2sim.simulate.controllers.protocol import OpenLoop
-from tests.simulate.controllers.samples import arm, driven, lanes, make
+from tests.simulate.controllers.samples import arm, driven, make, started
 from tests.strategies import robot_specs
 
 POSITION, MOTOR, VELOCITY, NONE = ActuatorType.POSITION, ActuatorType.MOTOR, ActuatorType.VELOCITY, ActuatorType.NONE
@@ -26,7 +26,7 @@ def test_passive_has_no_controls() -> None:
 
 
 def test_hold_keeps_a_simulated_arm_still() -> None:
-    group = lanes(driven(arm(), POSITION), range(1), q0=np.array([0.4, 0.1, 0.3]))
+    group = started(driven(arm(), POSITION), range(1), q0=np.array([0.4, 0.1, 0.3]))
     data = mujoco.MjData(group.plant.model)
     data.qpos[:] = group.q0[0]
     for _ in range(300):
@@ -36,7 +36,7 @@ def test_hold_keeps_a_simulated_arm_still() -> None:
 
 
 def test_hold_asks_for_nothing_outside_of_the_range() -> None:
-    group = lanes(driven(arm(), POSITION), range(1), q0=np.array([-1.0, 0.3, 0.0]))
+    group = started(driven(arm(), POSITION), range(1), q0=np.array([-1.0, 0.3, 0.0]))
     controls = Hold(group).controls(0, 1)[0, 0]
     wanted = group.q0[0] + group.gravity0[0] / group.plant.model.actuator_gainprm[:, 0]
     assert (wanted > group.plant.control_upper).any() or (wanted < group.plant.control_lower).any()
@@ -55,7 +55,7 @@ def test_hold_asks_for_nothing_outside_of_the_range() -> None:
 def test_sines_stay_inside_all_limits(
     spec: RobotSpec, seed: int, harmonics: int, frequency: float, amplitude: float, fade: float
 ) -> None:
-    group = lanes(driven(spec, POSITION), range(3), steps=400, timestep=0.01, seed=seed)
+    group = started(driven(spec, POSITION), range(3), steps=400, timestep=0.01, seed=seed)
     plant = group.plant
     sine = Sine(group, harmonics=harmonics, frequency=frequency, amplitude=amplitude, fade=fade)
     controls = sine.controls(0, 400)
@@ -68,7 +68,7 @@ def test_sines_stay_inside_all_limits(
 
 
 def test_sines_begin_at_rest_where_the_rollout_starts() -> None:
-    group = lanes(driven(arm(), POSITION))
+    group = started(driven(arm(), POSITION))
     q, v = Sine(group).reference(0, 1)
     assert np.array_equal(q[:, 0], group.q0)
     assert not v.any()
@@ -76,13 +76,13 @@ def test_sines_begin_at_rest_where_the_rollout_starts() -> None:
 
 def test_rates_of_sines_are_the_derivatives() -> None:
     step = 1e-4
-    group = lanes(driven(arm(), POSITION), steps=4000, timestep=step)
+    group = started(driven(arm(), POSITION), steps=4000, timestep=step)
     q, v = Sine(group, fade=0.2, frequency=1.0).reference(0, 4000)
     np.testing.assert_allclose(np.gradient(q, step, axis=1)[:, 1:-1], v[:, 1:-1], rtol=0, atol=2e-5)
 
 
 def test_sines_have_the_frequencies_that_are_asked_for_and_no_others() -> None:
-    group = lanes(driven(arm(), POSITION), steps=2500)
+    group = started(driven(arm(), POSITION), steps=2500)
     q = Sine(group, harmonics=3, frequency=0.5, fade=0.5).controls(500, 2000)  # 4 s, two periods
     spectrum = np.abs(np.fft.rfft(q - q.mean(axis=1, keepdims=True), axis=1)) / 2000
     lines = spectrum[:, [2, 4, 6]]
@@ -92,7 +92,7 @@ def test_sines_have_the_frequencies_that_are_asked_for_and_no_others() -> None:
 
 
 def test_amplitudes_of_sines_add_up_to_the_share_that_is_asked_for() -> None:
-    group = lanes(driven(arm(), POSITION), steps=20000, timestep=0.01, q0=np.array([0.75, 0.05, 0.0]))
+    group = started(driven(arm(), POSITION), steps=20000, timestep=0.01, q0=np.array([0.75, 0.05, 0.0]))
     q = Sine(group, harmonics=4, frequency=0.01, amplitude=0.3, fade=20.0).controls(10000, 10000)  # one period
     lines = 2.0 * np.abs(np.fft.rfft(q, axis=1))[:, 1:5] / 10000
     expected = np.broadcast_to([0.3 * 1.75, 0.3 * 0.25, 0.3 * np.pi], (7, 3))
@@ -115,9 +115,9 @@ def test_a_frequency_that_time_steps_cannot_show_is_refused() -> None:
 def test_noise_stays_inside_the_ranges_and_is_smooth(
     spec: RobotSpec, kind: ActuatorType, rate: float, seed: int
 ) -> None:
-    group = lanes(driven(spec, kind), range(3), steps=400, seed=seed)
+    group = started(driven(spec, kind), range(3), steps=400, seed=seed)
     plant = group.plant
-    controls = Noise(group, rate=rate, amplitude=1.0).controls(0, 400)
+    controls = RandomSpline(group, rate=rate, amplitude=1.0).controls(0, 400)
     assert (controls >= plant.control_lower).all()
     assert (controls <= plant.control_upper).all()
     start = group.q0 if kind is POSITION else np.zeros_like(group.q0)
@@ -132,8 +132,8 @@ def test_noise_stays_inside_the_ranges_and_is_smooth(
 
 
 def test_noise_uses_the_range_that_is_asked_for() -> None:
-    group = lanes(arm((POSITION, MOTOR, VELOCITY)), range(50), steps=4000, q0=np.array([0.75, 0.05, 0.0]))
-    controls = Noise(group, rate=5.0, amplitude=0.2).controls(0, 4000)
+    group = started(arm((POSITION, MOTOR, VELOCITY)), range(50), steps=4000, q0=np.array([0.75, 0.05, 0.0]))
+    controls = RandomSpline(group, rate=5.0, amplitude=0.2).controls(0, 4000)
     reached = np.abs(controls - [0.75, 0.0, 0.0]).max(axis=(0, 1))
     bound = np.array([0.2 * 1.75, 0.2 * 90.0, 0.2 * 2.0])
     assert (reached <= bound).all()
@@ -141,13 +141,13 @@ def test_noise_uses_the_range_that_is_asked_for() -> None:
 
 
 def test_noise_drives_the_joints_that_have_actuators() -> None:
-    group = lanes(arm((NONE, POSITION, NONE)))
-    controls = Noise(group).controls(0, 1)
+    group = started(arm((NONE, POSITION, NONE)))
+    controls = RandomSpline(group).controls(0, 1)
     np.testing.assert_allclose(controls[:, 0], group.q0[:, [1]], rtol=0, atol=1e-15)
 
 
 def test_noise_for_a_robot_without_actuators_is_nothing() -> None:
-    assert Noise(lanes(arm(NONE))).controls(0, 300).shape == (7, 300, 0)
+    assert RandomSpline(started(arm(NONE))).controls(0, 300).shape == (7, 300, 0)
 
 
 def test_noise_of_more_points_than_time_steps_is_refused() -> None:

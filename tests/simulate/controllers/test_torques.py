@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from dh2sim.robot.spec import ActuatorType
-from dh2sim.simulate.controllers.protocol import ClosedLoop, Lanes
+from dh2sim.simulate.controllers.protocol import ClosedLoop, RolloutBatch
 from dh2sim.simulate.controllers.torque import PD, ComputedTorque, GravityCompensation, steady_gains
 from dh2sim.typing import Array, read_only
-from tests.simulate.controllers.samples import arm, driven, lanes, observe, plant, see
+from tests.simulate.controllers.samples import arm, driven, observe, plant, see, started
 
 MOTORS = driven(arm(), ActuatorType.MOTOR)
 
 
-def simulated(controller: ClosedLoop, group: Lanes, steps: int) -> Array:
+def simulated(controller: ClosedLoop, group: RolloutBatch, steps: int) -> Array:
     """Positions of the first rollout after each time step, by a plain loop over ``mj_step``."""
     plant = group.plant
     data = mujoco.MjData(plant.model)
@@ -34,20 +34,20 @@ def state() -> tuple[Array, Array]:
 
 
 def test_gravity_compensation_keeps_a_simulated_arm_still() -> None:
-    group = lanes(MOTORS, range(1))
+    group = started(MOTORS, range(1))
     states = simulated(GravityCompensation(group), group, 300)
     np.testing.assert_allclose(states, np.tile(group.q0, (300, 1)), rtol=0, atol=1e-9)
 
 
 def test_gravity_compensation_damps_motion_where_it_is_asked_to() -> None:
-    group, (q, v) = lanes(MOTORS), state()
+    group, (q, v) = started(MOTORS), state()
     seen = observe(group.plant, 0, q, v)
     plain, damped = GravityCompensation(group).control(seen), GravityCompensation(group, damping=3.0).control(seen)
     np.testing.assert_allclose(plain - damped, 3.0 * v, rtol=0, atol=1e-12)
 
 
 def test_pd_pulls_with_the_robots_gains_and_balances_gravity() -> None:
-    group, (q, v) = lanes(MOTORS), state()
+    group, (q, v) = started(MOTORS), state()
     controller, seen = PD(group), observe(group.plant, 120, q, v)
     q_ref, v_ref = (array[:, 0] for array in controller.reference(120, 1))
     expected = [50.0, 60.0, 70.0] * (q_ref - q) + [0.5, 0.6, 0.7] * (v_ref - v) + seen.gravity
@@ -67,7 +67,7 @@ def test_pd_is_as_soft_as_the_time_step_requires(timestep: float) -> None:
 
 
 def test_pd_follows_its_reference_without_trembling() -> None:
-    group = lanes(MOTORS, range(1), steps=500, q0=np.array([0.4, 0.05, 0.2]))
+    group = started(MOTORS, range(1), steps=500, q0=np.array([0.4, 0.05, 0.2]))
     group = replace(group, plant=replace(group.plant, kv=read_only([400, 900, 30]), kp=read_only([4e4, 9e4, 3e3])))
     controller = PD(group, amplitude=0.2)
     states = simulated(controller, group, 500)
@@ -77,14 +77,14 @@ def test_pd_follows_its_reference_without_trembling() -> None:
 
 
 def test_pd_pulls_with_the_gains_that_it_is_told() -> None:
-    group, (q, v) = lanes(MOTORS), state()
+    group, (q, v) = started(MOTORS), state()
     controller, seen = PD(group, kp=9.0, kd=0.0, gravity=False), observe(group.plant, 120, q, v)
     q_ref = controller.reference(120, 1)[0][:, 0]
     np.testing.assert_allclose(controller.control(seen), 9.0 * (q_ref - q), rtol=1e-13)
 
 
 def test_computed_torque_makes_errors_vanish_like_a_critically_damped_oscillator() -> None:
-    group, (q, v) = lanes(MOTORS), state()
+    group, (q, v) = started(MOTORS), state()
     controller = ComputedTorque(group, bandwidth=12.0, period=0.3)
     torque = controller.control(observe(group.plant, 40, q, v))
     before, here, after = np.moveaxis(controller.reference(39, 3)[1], 1, 0)
@@ -100,7 +100,7 @@ def test_computed_torque_makes_errors_vanish_like_a_critically_damped_oscillator
 
 
 def test_computed_torque_follows_its_reference() -> None:
-    group = lanes(MOTORS, range(1), steps=1000, timestep=0.001, q0=np.array([0.4, 0.05, 0.2]))
+    group = started(MOTORS, range(1), steps=1000, timestep=0.001, q0=np.array([0.4, 0.05, 0.2]))
     controller = ComputedTorque(group, amplitude=0.2)
     states = simulated(controller, group, 1000)
     reference = controller.reference(1, 1000)[0][0]

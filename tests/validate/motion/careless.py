@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dh2sim.robot.spec import ActuatorType
-from dh2sim.simulate.controllers.protocol import Lanes, Observation
+from dh2sim.simulate.controllers.protocol import Observation, RolloutBatch
 from dh2sim.simulate.controllers.torque import ComputedTorque
 from dh2sim.typing import Array
 
@@ -13,7 +13,7 @@ class Weak:
 
     actuation = ActuatorType.MOTOR
 
-    def __init__(self, lanes: Lanes) -> None:
+    def __init__(self, batch: RolloutBatch) -> None:
         pass
 
     def control(self, observation: Observation) -> Array:

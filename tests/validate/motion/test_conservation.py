@@ -23,7 +23,7 @@ from tests.validate.motion.robots import FRICTION, LIFT, PENDULUM, TURNTABLE, bu
 
 @pytest.fixture(autouse=True)
 def quiet() -> Iterator[None]:
-    """As in ``check_physics``: unstable simulations are part of the search for a timestep."""
+    """As in ``check_motion``: unstable simulations are part of the search for a timestep."""
     with quiet_engine():
         yield
 

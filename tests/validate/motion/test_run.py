@@ -13,7 +13,7 @@ from dh2sim.errors import EngineError
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.validate.motion import run as physics
 from dh2sim.validate.motion.free_motion import compile_model
-from dh2sim.validate.motion.run import check_physics
+from dh2sim.validate.motion.run import check_motion
 from tests.export.robots import snake
 from tests.strategies import robot_specs
 from tests.validate.motion.robots import LIFT, built, heavier
@@ -22,7 +22,7 @@ QUANTITIES = ["energy order", "momentum", "rest", "tracking", "inverse dynamics"
 
 
 def test_every_check_is_made_and_the_same_seed_finds_the_same() -> None:
-    first, again, other = (check_physics(built("scara"), seed=seed) for seed in (4, 4, 5))
+    first, again, other = (check_motion(built("scara"), seed=seed) for seed in (4, 4, 5))
     assert [check.quantity.value for check in first] == QUANTITIES
     assert {check.engine for check in first} == {"mujoco-rollout"}
     assert all(check.ok for check in first)
@@ -35,25 +35,25 @@ def test_every_check_is_made_and_the_same_seed_finds_the_same() -> None:
 @given(robot_specs(max_rows=5))
 def test_any_robot_moves_as_physics_has_it(spec: RobotSpec) -> None:
     """Motors may be too weak to be asked, since efforts are drawn at random."""
-    checks = check_physics(build_model(replace(spec, name="arm")))
+    checks = check_motion(build_model(replace(spec, name="arm")))
     assert [check for check in checks if check.ok is False] == []
     assert {check.quantity.value for check in checks if check.ok is None} <= {"rest", "tracking"}
 
 
 def test_a_single_slide_passes_all_checks() -> None:
-    assert [check.ok for check in check_physics(built(LIFT))] == [True] * 6
+    assert [check.ok for check in check_motion(built(LIFT))] == [True] * 6
 
 
 def test_a_robot_that_does_not_move_is_not_simulated() -> None:
     model = built("name: post\nconvention: standard\njoints:\n  - {type: fixed, a: 0.4}\n")
-    checks = check_physics(model)
+    checks = check_motion(model)
     assert [(check.ok, check.reason) for check in checks] == [
         (None, f"{quantity}: the robot has no joint that moves") for quantity in QUANTITIES
     ]
 
 
 def test_a_very_long_chain_is_not_simulated() -> None:
-    [check, *_] = check_physics(built(snake(61)))
+    [check, *_] = check_motion(built(snake(61)))
     assert check.ok is None
     assert check.reason == "energy order: the table has 61 rows; at most 60 are simulated"
 
@@ -62,7 +62,7 @@ def test_a_model_that_mujoco_refuses_is_told() -> None:
     model = heavier(built("planar_2r"), 0, 1e-30)
     with pytest.raises(EngineError, match=r"^MuJoCo refuses the model: .*mass and inertia") as raised:
         compile_model(model)
-    check = next(check for check in check_physics(model) if check.quantity.value == "energy order")
+    check = next(check for check in check_motion(model) if check.quantity.value == "energy order")
     assert (check.ok, check.reason) == (None, f"energy order: {raised.value}")
 
 
@@ -71,7 +71,7 @@ def test_a_check_that_breaks_down_has_failed_and_the_others_are_made(monkeypatch
         raise KeyError("qpos")
 
     monkeypatch.setattr(physics, "check_rest", broken)
-    checks = check_physics(built(LIFT))
+    checks = check_motion(built(LIFT))
     assert [check.ok for check in checks] == [True, True, False, True, True, True]
     assert checks[2].reason == "broke down: KeyError: 'qpos'"
 
@@ -81,6 +81,6 @@ def test_no_warning_of_mujoco_is_left_in_the_current_folder(
 ) -> None:
     """Timesteps that are too long make some of the simulations unstable, of which MuJoCo warns."""
     monkeypatch.chdir(tmp_path)
-    check_physics(built("puma560"), seed=1)
+    check_motion(built("puma560"), seed=1)
     assert list(tmp_path.iterdir()) == []
     assert capfd.readouterr() == ("", "")
