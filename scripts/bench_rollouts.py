@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import statistics
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -17,10 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scripts.bench_timing import Ratios, Row, Usage, measure, run_python
+
 if TYPE_CHECKING:
     from dh2sim.simulate.prepare import Job
 
-Row = tuple[str, str, str, bool | None]
 ROLLOUTS, STEPS = 1024, 2000
 RECORD = ("qpos", "qvel", "ctrl")
 
@@ -36,32 +35,30 @@ def rollouts() -> Iterator[Row]:
     model = mujoco.MjModel.from_xml_string(mjcf)  # as exported
     lean = mujoco.MjModel.from_xml_string(mjcf)
     lean.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_SENSOR)  # as simulated: no sensor is recorded
-    ceiling, lowest, stock, closed = [], [], [], []
-    own: list[float] = []
+    ceiling, lowest, stock, closed = Ratios(), Ratios(), Ratios(), Ratios()
+    runs: list[Usage] = []
     with TemporaryDirectory() as folder:
         _run(folder, "hold", 64)  # so that nothing is imported while the clock runs
         _run(folder, "computed-torque", 64)
         for _ in range(7):
             with quiet_engine():
-                floor = _seconds(lambda: _bare_steps(model, q0, ctrl))
-                least = _seconds(lambda: _bare_steps(lean, q0, ctrl))
-            own.append(_seconds(lambda: _run(folder, "hold", ROLLOUTS)))
-            ceiling.append(floor / own[-1])
-            lowest.append(least / own[-1])
-            stock.append(_seconds(lambda: _stock_rollout(model, q0, ctrl)) / own[-1])
-            closed.append(own[-1] / _seconds(lambda: _run(folder, "computed-torque", ROLLOUTS)))
-    rate = ROLLOUTS * STEPS / statistics.median(own)
-    threads = os.cpu_count()
-    yield f"steps/s end to end into Zarr, {threads} threads", f"{rate:,.0f}", "", None
-    for what, ratios, target in (
-        ("the same / mj_step in C, nothing recorded", ceiling, 0.9),
-        ("the same / that without sensors", lowest, None),
-        ("the same / mujoco.rollout, left in memory", stock, 1.2),
-        ("computed-torque / the same", closed, 0.4),
-    ):
-        ratio = statistics.median(ratios)
-        figure = f"{ratio:.2f} ({min(ratios):.2f} to {max(ratios):.2f})"
-        yield what, figure, "" if target is None else f"{target}", None if target is None else ratio >= target
+                floor = measure(lambda: _bare_steps(model, q0, ctrl))
+                least = measure(lambda: _bare_steps(lean, q0, ctrl))
+            own = measure(lambda: _run(folder, "hold", ROLLOUTS))
+            runs.append(own)
+            ceiling.add(floor, own)
+            lowest.add(least, own)
+            stock.add(measure(lambda: _stock_rollout(model, q0, ctrl)), own)
+            closed.add(own, measure(lambda: _run(folder, "computed-torque", ROLLOUTS)))
+    threads = os.cpu_count() or 1
+    rate = threads * ROLLOUTS * STEPS / statistics.median(usage.cpu for usage in runs)
+    by_wall = ROLLOUTS * STEPS / statistics.median(usage.wall for usage in runs)
+    figure = f"{rate:,.0f}, by wall time {by_wall:,.0f}"
+    yield f"steps/s end to end into Zarr, {threads} idle processors", figure, "", None
+    yield ceiling.row("mj_step in C, nothing recorded / the same steps into Zarr", least=0.9)
+    yield lowest.row("mj_step in C without sensors / the same steps into Zarr")
+    yield stock.row("mujoco.rollout, left in memory / the same steps into Zarr", least=1.2)
+    yield closed.row("hold into Zarr / computed-torque into Zarr", least=0.4)
 
 
 def memory() -> Iterator[Row]:
@@ -71,15 +68,12 @@ def memory() -> Iterator[Row]:
         with TemporaryDirectory() as folder:
             arguments = ["rollout", "stanford", "--out", f"{folder}/run.zarr", "--quiet"]
             options = ["--rollouts", str(count), "--steps", "1000", "--record", "qpos,qvel,ctrl"]
-            process = subprocess.Popen([sys.executable, "-m", "dh2sim", *arguments, *options])
-            _, status, usage = os.wait4(process.pid, 0)
-            process.returncode = os.waitstatus_to_exitcode(status)
-            peaks.append(usage.ru_maxrss * 1024 if process.returncode == 0 else float("inf"))
+            peaks.append(run_python("-m", "dh2sim", *arguments, *options).peak)
             if count == 20_000:
                 size = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file())
-    yield "memory of 20 000 rollouts of 1000 steps", f"{peaks[1] / 1e6:.0f} MB", "2000 MB", peaks[1] < 2e9
+    yield "memory of 20 000 rollouts of 1000 steps", f"{peaks[1] / 1e6:.0f} MB", "< 2000 MB", peaks[1] < 2e9
     growth = peaks[1] / peaks[0]
-    yield "the same / that of half as many", f"{growth:.2f} ({size / 1e9:.1f} GB on disk)", "1.25", growth <= 1.25
+    yield "the same / that of half as many", f"{growth:.2f} ({size / 1e9:.1f} GB on disk)", "<= 1.25", growth <= 1.25
 
 
 def steady() -> Iterator[Row]:
@@ -98,18 +92,18 @@ def steady() -> Iterator[Row]:
         simulate_block(job.mjcf, replace(job.settings, controller=choice), range(1000))
         ratio = paces.late / paces.early
         what = f"60 s of 1000 arms, {controller}: step at the end / start"
-        yield what, f"{ratio:.2f} ({paces.early * 1e3:.2f} ms for 256 arms)", "1.15", ratio <= 1.15
+        yield what, f"{ratio:.2f} ({paces.early * 1e3:.2f} ms for 256 arms)", "<= 1.15", ratio <= 1.15
 
 
 class _Paces:
-    """Looks at the clock whenever a controller is asked: seconds a step early and late in the rollouts."""
+    """Reads the processor time whenever a controller is asked: seconds a step early and late in the rollouts."""
 
     def __init__(self, steps: int) -> None:
         self._steps = steps
         self._groups: list[list[tuple[int, float]]] = []
 
     def watched(self, make: Callable[[Any], Any]) -> Callable[[Any], Any]:
-        """Make controllers that look at the clock."""
+        """Make controllers that are timed."""
 
         def make_watched(batch: Any) -> Any:
             controller = make(batch)
@@ -119,7 +113,7 @@ class _Paces:
             asked = getattr(controller, name)
 
             def ask(first: Any, *rest: int) -> Any:
-                ticks.append((first if isinstance(first, int) else first.step, time.perf_counter()))
+                ticks.append((first if isinstance(first, int) else first.step, time.process_time()))
                 return asked(first, *rest)
 
             setattr(controller, name, ask)
@@ -209,9 +203,3 @@ def _stock_rollout(model: Any, q0: NDArray[np.float64], ctrl: NDArray[np.float64
     controls = np.repeat(ctrl[:, None], STEPS, axis=1)
     with mujoco.rollout.Rollout(nthread=threads) as pool:
         pool.rollout(model, [mujoco.MjData(model) for _ in range(threads)], initial, controls)
-
-
-def _seconds(work: Callable[[], object]) -> float:
-    started = time.perf_counter()
-    work()
-    return time.perf_counter() - started

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from scripts.bench_timing import Row
 from scripts.bench_view_pages import OPTIONS, choose_plain_shading, click, go, opened, program, window
 from scripts.bench_view_probes import FIRST_PICTURE, FRAMES, NO_DRAWING, NUMBERS, POSES
 
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
     from dh2sim.view.page import Page as ViewerPage
-
-Row = tuple[str, str, str, bool | None]
 
 MOVES = 50
 FROM_REST = 1.0
