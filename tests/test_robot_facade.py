@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -189,3 +191,50 @@ def test_a_robot_prints_its_table(arm: Robot) -> None:
         "2  joint_2  revolute     0       90  0.15      θ2*",
         "3  joint_3  prismatic    0        0   d3*        0  0.1 … 1.2 m",
     ]
+
+
+def test_functions_take_a_robot_in_any_form(arm: Robot) -> None:
+    q = arm.random_configurations(4)
+    for robot in (arm, arm.spec, arm.model, arm.chain):
+        assert np.array_equal(dh2sim.forward_kinematics(robot, q), arm.fk(q))
+        assert np.array_equal(dh2sim.geometric_jacobian(robot, q), arm.jacobian(q))
+        assert dh2sim.frame_poses(robot, q).shape == (4, 4, 4, 4)
+    for robot in (arm, arm.spec, arm.model):
+        assert dh2sim.to_mjcf(robot) == arm.mjcf()
+        assert dh2sim.to_urdf(robot) == arm.urdf()
+        assert dh2sim.to_scene(robot).startswith("<!--")
+        assert (
+            dh2sim.build_model(robot).name == dh2sim.convert_robot(robot, Convention.MODIFIED).spec.name == "my_arm"
+        )
+
+
+@pytest.mark.parametrize(
+    ("function", "wanted"),
+    [
+        (lambda robot: dh2sim.forward_kinematics(robot, [0.0]), "a Robot, a RobotSpec or a KinematicChain"),
+        (lambda robot: dh2sim.geometric_jacobian(robot, [0.0]), "a Robot, a RobotSpec or a KinematicChain"),
+        (dh2sim.build_chain, "a Robot or a RobotSpec"),
+        (dh2sim.build_model, "a Robot or a RobotSpec"),
+        (dh2sim.to_mjcf, "a Robot or a RobotSpec"),
+        (dh2sim.to_urdf, "a Robot or a RobotSpec"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("given", "described"),
+    [
+        ("stanford", "'stanford'; Robot.load reads a file, or a robot that comes with dh2sim"),
+        (3.0, "a float"),
+        (None, "None"),
+    ],
+)
+def test_what_is_no_robot_is_refused_in_words(
+    function: Callable[[Any], object], wanted: str, given: object, described: str
+) -> None:
+    with pytest.raises(TypeError) as caught:
+        function(given)
+    assert str(caught.value) == f"expected {wanted}, got {described}"
+
+
+def test_an_import_takes_the_path_as_text() -> None:
+    imported = dh2sim.import_robot(str(GENERATED / "scara" / "scara.urdf"))
+    assert imported.spec.name == "scara"

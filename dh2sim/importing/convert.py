@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dh2sim.errors import MismatchError
-from dh2sim.kinematics.chain import build_chain
+from dh2sim.kinematics.chain import SpecLike, build_chain, spec_of
 from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.frame_assignment.recover import CONFIGURATIONS, SEED
 from dh2sim.kinematics.sampling import random_configurations
@@ -49,17 +49,18 @@ class Converted:
         )
 
 
-def convert_robot(spec: RobotSpec, to: Convention, *, folder: Path | None = None) -> Converted:
+def convert_robot(spec: SpecLike, to: Convention, *, folder: Path | None = None) -> Converted:
     """Write a robot's table in another convention, and compare the text's tool poses with the robot's own.
 
     Args:
-        spec: The robot.
+        spec: The robot, in any form.
         to: Standard or modified.
         folder: Where the robot file will stand, which paths of meshes are relative to.
 
     Raises:
         MismatchError: The poses differ by more than rounding.
     """
+    spec = spec_of(spec)
     conversion = convert_rows(spec, to)
     notes = list(conversion.notes)
     if spec.parameters:

@@ -8,6 +8,7 @@ Joint axes, as a file of axes gives them, to robot files.
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -195,7 +196,9 @@ class ImportOptions:
     """Of the robot, instead of the file's."""
 
 
-def import_robot(path: Path, options: ImportOptions = ImportOptions(), *, folder: Path | None = None) -> Imported:
+def import_robot(
+    path: str | os.PathLike[str], options: ImportOptions = ImportOptions(), *, folder: Path | None = None
+) -> Imported:
     """Make a robot file of a URDF, an MJCF or a Denavit-Hartenberg table.
 
     Args:
@@ -208,7 +211,8 @@ def import_robot(path: Path, options: ImportOptions = ImportOptions(), *, folder
         MismatchError: The table that was made is not the file's kinematics to within the tolerance.
         Dh2simError: The file cannot be read, or is of another format.
     """
-    return import_data(read_file(path), str(path), options, folder=folder)
+    file = os.fspath(path)
+    return import_data(read_file(Path(file)), file, options, folder=folder)
 
 
 def read_file(path: Path) -> bytes:

@@ -1,12 +1,14 @@
 """The table turned once into a chain of joint-placed bodies; nothing after it knows of conventions.
 
-Joint vectors as they come in: checked, and as one array of shape (count, n).
+Also what functions of a robot are given: the robot in one of its forms, and joint vectors.
 """
 
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass, field
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,7 +54,57 @@ class KinematicChain:
         return len(self.moving_joints)
 
 
-def build_chain(spec: RobotSpec) -> KinematicChain:
+class HasChain(Protocol):
+    """A robot in a larger form: a ``Robot`` or a ``RobotModel``."""
+
+    @property
+    def spec(self) -> RobotSpec:
+        """The robot as its file describes it."""
+        ...
+
+    @property
+    def chain(self) -> KinematicChain:
+        """The chain of its table."""
+        ...
+
+
+SpecLike: TypeAlias = RobotSpec | HasChain
+ChainLike: TypeAlias = KinematicChain | RobotSpec | HasChain
+
+
+def spec_of(robot: SpecLike) -> RobotSpec:
+    """Return the specification of a robot, whatever form it is given in.
+
+    Raises:
+        TypeError: It is not a robot.
+    """
+    spec = robot if isinstance(robot, RobotSpec) else getattr(robot, "spec", None)
+    if not isinstance(spec, RobotSpec):
+        raise TypeError(f"expected a Robot or a RobotSpec, got {_described(robot)}")
+    return spec
+
+
+def chain_of(robot: ChainLike) -> KinematicChain:
+    """Return the chain of a robot, whatever form it is given in.
+
+    Raises:
+        TypeError: It is not a robot.
+    """
+    if isinstance(robot, RobotSpec):
+        return build_chain(robot)
+    chain = robot if isinstance(robot, KinematicChain) else getattr(robot, "chain", None)
+    if not isinstance(chain, KinematicChain):
+        raise TypeError(f"expected a Robot, a RobotSpec or a KinematicChain, got {_described(robot)}")
+    return chain
+
+
+def _described(value: object) -> str:
+    if isinstance(value, str | os.PathLike):
+        return f"{value!r}; Robot.load reads a file, or a robot that comes with dh2sim"
+    return f"a {type(value).__name__}" if value is not None else "None"
+
+
+def build_chain(spec: SpecLike) -> KinematicChain:
     """Turn a Denavit-Hartenberg table into a chain of joint-placed bodies.
 
     With X = Tx(a) Rx(alpha) and Z = Rz(theta) Tz(d), a row's transform is Z X (standard), X Z (modified) or
@@ -65,6 +117,7 @@ def build_chain(spec: RobotSpec) -> KinematicChain:
     Returns:
         One joint for every row; its transforms are the same bits on every machine.
     """
+    spec = spec_of(spec)
     T_base_link_dh0 = pose_from_rpy(spec.base.pose.xyz, spec.base.pose.rpy)
     T_parent_dh = T_base_link_dh0  # the previous row's DH frame in the parent of the joint at hand
     joints = []

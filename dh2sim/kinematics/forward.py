@@ -23,16 +23,16 @@ from dh2sim.kinematics.batch_frame import (
     sines_and_cosines,
     write_column,
 )
-from dh2sim.kinematics.chain import KinematicChain, joint_vectors
+from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vectors
 from dh2sim.kinematics.transforms import compose, identity, joint_part
 from dh2sim.typing import Array
 
 
-def forward_kinematics(chain: KinematicChain, q: ArrayLike) -> Array:
+def forward_kinematics(chain: ChainLike, q: ArrayLike) -> Array:
     """Return the pose of tool0 in base_link.
 
     Args:
-        chain: The robot.
+        chain: The robot, in any form.
         q: Joint vectors, rad and m, shape (..., n).
 
     Returns:
@@ -41,21 +41,22 @@ def forward_kinematics(chain: KinematicChain, q: ArrayLike) -> Array:
     Raises:
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
-    T_joint_tool0 = compose(chain.joints[-1].T_joint_dh, chain.T_dhn_tool0)
+    robot = chain_of(chain)
+    T_joint_tool0 = compose(robot.joints[-1].T_joint_dh, robot.T_dhn_tool0)
 
     def fill(out: Array, columns: Array) -> None:
-        for frame in joint_frames(chain, columns):
+        for frame in joint_frames(robot, columns):
             last = frame
         last.then(T_joint_tool0).write(out)
 
-    return in_blocks(chain, q, (4, 4), fill)
+    return in_blocks(robot, q, (4, 4), fill)
 
 
-def frame_poses(chain: KinematicChain, q: ArrayLike) -> Array:
+def frame_poses(chain: ChainLike, q: ArrayLike) -> Array:
     """Return the poses of all DH frames in base_link.
 
     Args:
-        chain: The robot.
+        chain: The robot, in any form.
         q: Joint vectors, rad and m, shape (..., n).
 
     Returns:
@@ -64,13 +65,14 @@ def frame_poses(chain: KinematicChain, q: ArrayLike) -> Array:
     Raises:
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
+    robot = chain_of(chain)
 
     def fill(out: Array, columns: Array) -> None:
-        out[:, 0] = chain.T_base_link_dh0
-        for i, frame in enumerate(joint_frames(chain, columns)):
-            frame.then(chain.joints[i].T_joint_dh).write(out[:, i + 1])
+        out[:, 0] = robot.T_base_link_dh0
+        for i, frame in enumerate(joint_frames(robot, columns)):
+            frame.then(robot.joints[i].T_joint_dh).write(out[:, i + 1])
 
-    return in_blocks(chain, q, (len(chain.joints) + 1, 4, 4), fill)
+    return in_blocks(robot, q, (len(robot.joints) + 1, 4, 4), fill)
 
 
 def joint_poses(chain: KinematicChain, q: ArrayLike) -> Array:
@@ -179,11 +181,11 @@ def frame_names(chain: KinematicChain) -> tuple[str, ...]:
     return ("base_link", *links, *(f"dh_{i}" for i in range(n + 1)), "tool0")
 
 
-def frame_pose(chain: KinematicChain, frame: str, q: ArrayLike) -> Array:
+def frame_pose(chain: ChainLike, frame: str, q: ArrayLike) -> Array:
     """Return the pose of a named frame in base_link.
 
     Args:
-        chain: The robot.
+        chain: The robot, in any form.
         frame: One of ``frame_names``; link_i stands at joint i, dh_i is the table's frame i.
         q: Joint vectors, rad and m, shape (..., n).
 
@@ -194,28 +196,29 @@ def frame_pose(chain: KinematicChain, frame: str, q: ArrayLike) -> Array:
         UnknownFrameError: There is no such frame.
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
-    names = frame_names(chain)
+    robot = chain_of(chain)
+    names = frame_names(robot)
     if frame not in names:
         close = difflib.get_close_matches(frame, names, n=1)
         hint = f" Did you mean '{close[0]}'?" if close else ""
-        n = len(chain.joints)
+        n = len(robot.joints)
         raise UnknownFrameError(
             f"there is no frame '{frame}'.{hint} Frames: base_link, link_1 to link_{n}, dh_0 to dh_{n}, tool0"
         )
-    tool = forward_kinematics(chain, q)
+    tool = forward_kinematics(robot, q)
     if frame == "tool0":
         return tool
     if frame == "base_link":
         return np.broadcast_to(identity(), tool.shape).copy()
     kind, index = frame.split("_")
-    poses, number = (frame_poses(chain, q), int(index)) if kind == "dh" else (joint_poses(chain, q), int(index) - 1)
+    poses, number = (frame_poses(robot, q), int(index)) if kind == "dh" else (joint_poses(robot, q), int(index) - 1)
     return np.asarray(poses[..., number, :, :])
 
 
 _NOTHING: Column = (0.0, 0.0, 0.0)
 
 
-def geometric_jacobian(chain: KinematicChain, q: ArrayLike) -> Array:
+def geometric_jacobian(chain: ChainLike, q: ArrayLike) -> Array:
     """Return the Jacobian of tool0 in base_link: [velocity; angular velocity] = J · dq/dt.
 
     For a joint that turns about the unit axis z through p the column is [z x (p_tool0 - p); z], for one that
@@ -223,7 +226,7 @@ def geometric_jacobian(chain: KinematicChain, q: ArrayLike) -> Array:
     Control, 2006, section 4.6.
 
     Args:
-        chain: The robot.
+        chain: The robot, in any form.
         q: Joint vectors, rad and m, shape (..., n).
 
     Returns:
@@ -233,16 +236,17 @@ def geometric_jacobian(chain: KinematicChain, q: ArrayLike) -> Array:
     Raises:
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
-    T_joint_tool0 = compose(chain.joints[-1].T_joint_dh, chain.T_dhn_tool0)
+    robot = chain_of(chain)
+    T_joint_tool0 = compose(robot.joints[-1].T_joint_dh, robot.T_dhn_tool0)
 
     def fill(out: Array, columns: Array) -> None:
-        frames = list(joint_frames(chain, columns))
+        frames = list(joint_frames(robot, columns))
         tool = frames[-1].then(T_joint_tool0)
-        moving = [pair for pair in zip(chain.joints, frames, strict=True) if pair[0].type.moves]
+        moving = [pair for pair in zip(robot.joints, frames, strict=True) if pair[0].type.moves]
         for i, (joint, frame) in enumerate(moving):
             _write(out[:, :, i], frame, tool, turns=joint.type.turns, sign=joint.sign * frame.signs[2])
 
-    return in_blocks(chain, q, (6, chain.n), fill)
+    return in_blocks(robot, q, (6, robot.n), fill)
 
 
 def _write(out: Array, frame: BlockFrame, tool: BlockFrame, *, turns: bool, sign: float) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol, TypeAlias
 
-from dh2sim.kinematics.chain import Joint, KinematicChain, build_chain
+from dh2sim.kinematics.chain import HasChain, Joint, KinematicChain, SpecLike, build_chain, spec_of
 from dh2sim.model.actuators import actuator_model, seen_inertias
 from dh2sim.model.collision_exclusions import excluded_pairs
 from dh2sim.model.limits import Range, clamped, filled_limits, load_bound, position_ranges, reach_bound
@@ -29,7 +30,32 @@ BASE_COLOR: Color = (0.25, 0.28, 0.33, 1.0)
 JOINT_COLOR: Color = (0.20, 0.22, 0.26, 1.0)
 
 
-def build_model(spec: RobotSpec) -> RobotModel:
+class HasModel(HasChain, Protocol):
+    """A robot in a larger form: a ``Robot``."""
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot with shapes, masses and limits."""
+        ...
+
+
+ModelLike: TypeAlias = RobotModel | RobotSpec | HasModel
+
+
+def model_of(robot: ModelLike) -> RobotModel:
+    """Return the model of a robot, whatever form it is given in.
+
+    Raises:
+        TypeError: It is not a robot.
+        MeshError: A mesh file cannot be used.
+    """
+    if isinstance(robot, RobotModel):
+        return robot
+    model = getattr(robot, "model", None)
+    return model if isinstance(model, RobotModel) else build_model(robot)
+
+
+def build_model(spec: SpecLike) -> RobotModel:
     """Give a robot shapes, mass, inertia, limits and actuators.
 
     Args:
@@ -41,6 +67,7 @@ def build_model(spec: RobotSpec) -> RobotModel:
     Raises:
         MeshError: a mesh file cannot be used.
     """
+    spec = spec_of(spec)
     chain = build_chain(spec)
     ranges = position_ranges(chain, spec.rows)
     shapes = _shapes(spec, chain, ranges)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.forward import reference_joint_poses
 from dh2sim.kinematics.transforms import identity, move_point
+from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import read_only
 
@@ -27,15 +28,16 @@ class _Extent:
     lowest: float
 
 
-def to_scene(model: RobotModel) -> str:
+def to_scene(model: ModelLike) -> str:
     """Write a scene that includes the robot's MJCF, ``<name>.xml`` beside it.
 
     Args:
-        model: the robot.
+        model: the robot, in any form.
 
     Returns:
         The text of the file. The floor is at z = 0, or below the robot where it hangs lower at home.
     """
+    model = model_of(model)
     extent = _extent(model)
     cell = 10.0 ** math.floor(math.log10(extent.radius))
     floor = 0.0 if extent.lowest >= -1e-9 else _short(extent.lowest - 0.15 * extent.radius)

@@ -10,6 +10,7 @@ from dh2sim.errors import ModelError
 from dh2sim.formats.mjcf.sites import add_site, needs_body, placed
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.transforms import compose
+from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.mass import MassProperties
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
@@ -91,11 +92,11 @@ EXPORTED = MjcfOptions()
 """Of the files that ``dh2sim export`` writes."""
 
 
-def to_mjcf(model: RobotModel, options: MjcfOptions = EXPORTED) -> str:
+def to_mjcf(model: ModelLike, options: MjcfOptions = EXPORTED) -> str:
     """Write a robot as MJCF.
 
     Args:
-        model: the robot.
+        model: the robot, in any form.
         options: how it is simulated.
 
     Returns:
@@ -104,6 +105,7 @@ def to_mjcf(model: RobotModel, options: MjcfOptions = EXPORTED) -> str:
     Raises:
         ModelError: the robot has more bodies than MuJoCo can read back.
     """
+    model = model_of(model)
     nested = 1 + len(model.links) + any(needs_body(T, model.links[-1].inertial) for _, T in _last_frames(model))
     if nested > MOST_BODIES:
         raise ModelError(

@@ -8,6 +8,7 @@ from typing import Final
 
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.transforms import compose, identity, invert, pose_from_rpy, rpy_from_rotation
+from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.mass import MassProperties
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
@@ -21,17 +22,18 @@ DYNAMICS: Final = ("damping", "friction")
 """What a URDF holds of a joint's dynamics, by the same names."""
 
 
-def to_urdf(model: RobotModel, *, dh_frames: bool = True) -> str:
+def to_urdf(model: ModelLike, *, dh_frames: bool = True) -> str:
     """Write a robot as URDF.
 
     Args:
-        model: the robot.
+        model: the robot, in any form.
         dh_frames: whether to add the massless links dh_0 … dh_n, one at every DH frame.
 
     Returns:
         The text of the file. Mesh file names are relative to it: ``meshes/link_1.stl``. The ``mujoco`` element, which
         other readers ignore, makes MuJoCo keep the fixed links as bodies and give no mass to the base.
     """
+    model = model_of(model)
     robot = ET.Element("robot", name=model.name)
     child(child(robot, "mujoco"), "compiler", fusestatic="false", inertiafromgeom="false")
     materials = _materials(model)
