@@ -1,7 +1,27 @@
+"""What every run of the tests shares: how long property tests search, and which tests need a browser.
+
+``pytest`` alone is the quick suite: the options in ``pyproject.toml`` leave out what is marked ``slow`` or
+``browser``, and property tests try fewer examples. ``pytest -m ""`` runs everything, as CI does.
+"""
+
 from __future__ import annotations
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # derandomized: the same robots in every run, so that a failure is one of the code and not of the day
-settings.register_profile("dh2sim", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("dh2sim")
+settings.register_profile("full", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("quick", settings.get_profile("full"), max_examples=20)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Choose how many examples property tests try."""
+    settings.load_profile("quick" if "not slow" in config.getoption("markexpr") else "full")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests that drive a browser by the fixture that they use."""
+    for item in items:
+        if "browser" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.browser)

@@ -56,6 +56,7 @@ def repository(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_action_passes_for_robots_that_match(action: dict[str, Any], repository: Path) -> None:
     done = run_step(action, repository, robots="arms/*.yaml", dir="models", samples="20", junit="report.xml")
     assert done.returncode == 0, done.stdout + done.stderr
@@ -63,6 +64,7 @@ def test_action_passes_for_robots_that_match(action: dict[str, Any], repository:
     assert (repository / "report.xml").read_text(encoding="utf-8").count("<testsuite ") == 2
 
 
+@pytest.mark.slow
 def test_action_exports_afresh_without_a_folder(action: dict[str, Any], repository: Path) -> None:
     shutil.rmtree(repository / "models")
     done = run_step(action, repository, robots="arms/rpr.yaml arms/planar_2r.yaml", samples="20")
@@ -70,6 +72,7 @@ def test_action_exports_afresh_without_a_folder(action: dict[str, Any], reposito
     assert not (repository / "generated").exists()
 
 
+@pytest.mark.slow
 def test_action_fails_when_a_twist_changes_its_sign(action: dict[str, Any], repository: Path) -> None:
     robot = repository / "arms" / "rpr.yaml"
     text = robot.read_text(encoding="utf-8")

@@ -104,6 +104,7 @@ def _same_table(made: RobotSpec, published: RobotSpec) -> None:
         np.testing.assert_array_equal(pose.rpy, expected_pose.rpy)
 
 
+@pytest.mark.slow
 def test_the_script_draws_every_picture_of_the_page(tmp_path: Path) -> None:
     draw_pictures(tmp_path)
     linked = re.findall(r"\]\(images/(\w+\.svg)\)", PAGE)

@@ -122,6 +122,7 @@ def test_light_work_imports_nothing_heavy(code: str, allowed: set[str]) -> None:
     assert _imported(code) & HEAVY <= allowed
 
 
+@pytest.mark.slow
 def test_an_export_imports_neither_mesh_library_nor_other_engines(tmp_path: Path) -> None:
     arguments = ["export", "stanford", "--out", str(tmp_path)]
     assert not _imported(RUN.format(arguments=arguments)) & {"trimesh", "yourdfpy", "pinocchio", "scipy", "rich"}
@@ -138,6 +139,7 @@ def test_a_rollout_imports_neither_tables_nor_pictures(tmp_path: Path) -> None:
     assert not found & {*TABLES, *PICTURES, *MODELS}
 
 
+@pytest.mark.slow
 def test_a_picture_of_a_robot_imports_nothing_of_runs(tmp_path: Path) -> None:
     arguments = ["render", "rpr", "--out", str(tmp_path / "rpr.png"), "--size", "64x64"]
     assert not _imported(RUN.format(arguments=arguments)) & {*RUNS, *TABLES, "matplotlib", "imageio_ffmpeg"}

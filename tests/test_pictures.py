@@ -31,6 +31,7 @@ print(seen.mean(), rows.min(), rows.max(), columns.min(), columns.max(), picture
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["stanford", "scara", "ssrms", "puma560", "cylindrical_wrist", "spherical_wrist"])
 def test_camera_frames_the_whole_robot(robot: str) -> None:
     if ctypes.util.find_library("EGL") is None:

@@ -37,6 +37,7 @@ def without_rounding_noise(text: str) -> list[str]:
     return [" ".join(line.split()) for line in text.splitlines()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "output"), shown_commands(), ids=[command for command, _ in shown_commands()])
 def test_commands_print_what_the_readme_shows(command: str, output: str, tmp_path: Path) -> None:
     program, *arguments = command.split()

@@ -33,6 +33,7 @@ def test_the_robot_file_is_printed(axes: Path) -> None:
     assert run.err.startswith("two, 2 rows, standard; off by at most ")
 
 
+@pytest.mark.slow
 def test_with_explain_every_step_is_told_and_drawn(axes: Path, tmp_path: Path) -> None:
     out = tmp_path / "two.yaml"
     run = dh2sim("frames", axes, "--explain", "-o", out)

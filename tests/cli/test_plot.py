@@ -31,6 +31,7 @@ def test_a_plot_stands_beside_its_run(run: Path) -> None:
         assert (picture.format, picture.size) == ("PNG", (700, 500))
 
 
+@pytest.mark.slow
 def test_a_plot_is_a_drawing_where_its_ending_says_so(run: Path, tmp_path: Path) -> None:
     assert dh2sim("plot", run, "--what", "tracking", "--out", tmp_path / "a.svg", "--quiet").out == ""
     assert dh2sim("plot", run, "--what", "tracking", "--out", tmp_path / "a.PDF").status == 0

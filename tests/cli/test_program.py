@@ -56,6 +56,7 @@ def test_the_help_of_the_program_lists_every_command_whole() -> None:
     assert "Exit status: 0 done, 1 a check fell short, 2 bad input or usage, 130" in run.out
 
 
+@pytest.mark.slow
 def test_every_example_of_the_programs_help_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copy(ROOT / "generated" / "scara" / "scara.urdf", "arm.urdf")
@@ -159,6 +160,7 @@ def _shell(script: str, **variables: str) -> Outcome:
     return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["schema", "info stanford", "fk stanford --json"])
 def test_a_reader_that_has_had_enough_is_no_error(command: str) -> None:
     run = _shell(f"{{ $DH2SIM {command}; echo $? >&2; }} | head -c 1")
@@ -167,6 +169,7 @@ def test_a_reader_that_has_had_enough_is_no_error(command: str) -> None:
     assert _shell(f"{{ sleep 0.2; $DH2SIM {command}; echo $? >&2; }} | true").err == "0\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["list", "schema", "fk stanford", "info stanford", "export rpr --check"])
 def test_a_program_without_standard_output_or_error_does_its_work(command: str, tmp_path: Path) -> None:
     expected = 1 if command.startswith("export") else 0
@@ -182,6 +185,7 @@ def test_results_that_cannot_be_written_are_an_error() -> None:
     assert run == Outcome(status=2, out="", err="dh2sim: No space left on device\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
 def test_a_terminal_that_knows_few_characters_is_written_to_all_the_same(tmp_path: Path, encoding: str) -> None:
     robot = write(tmp_path, small() + "description: été θ 臂\n")

@@ -40,6 +40,7 @@ def test_a_rollout_becomes_a_film_beside_its_run(run: Path) -> None:
     assert film.read_bytes()[4:8] == b"ftyp"
 
 
+@pytest.mark.slow
 def test_a_gif_and_a_still_are_chosen_by_their_ending(run: Path, tmp_path: Path) -> None:
     require_gl()
     done = dh2sim("render", run, "--out", tmp_path / "a.gif", "--size", "96x64", "--speed", "2", "--frames")
@@ -134,6 +135,7 @@ def test_options_that_do_not_fit_are_told(arguments: list[str], told: str) -> No
     assert told in done.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["mp4", "gif"])
 def test_an_interrupted_film_leaves_nothing(run: Path, tmp_path: Path, ending: str) -> None:
     require_gl()
@@ -154,6 +156,7 @@ def test_an_interrupted_film_leaves_nothing(run: Path, tmp_path: Path, ending: s
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs limits of POSIX")
 @pytest.mark.parametrize(
     ("name", "why"),

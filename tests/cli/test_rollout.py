@@ -245,6 +245,7 @@ def test_no_bar_is_drawn_into_a_file(folder: Path) -> None:
     assert "\x1b" not in run.out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quiet", [False, True])
 def test_a_bar_is_drawn_on_a_terminal_unless_it_should_be_quiet(quiet: bool, folder: Path) -> None:
     ours, theirs = pty.openpty()

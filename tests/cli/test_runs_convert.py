@@ -95,6 +95,7 @@ def test_a_folder_is_no_file_to_write_to(run: Path, kind: str, out: str) -> None
     assert told == Outcome(status=2, out="", err=f"dh2sim: '{out or '.'}' is a folder; name a file\n")
 
 
+@pytest.mark.slow
 def test_a_terminal_sees_a_bar_that_vanishes(run: Path) -> None:
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))

@@ -6,6 +6,8 @@ import json
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import pytest
+
 from tests.export.robots import small, write
 from tests.program import Outcome, dh2sim, dh2sim_process
 from tests.validate.motion.robots import FOLDED, WEAK
@@ -32,6 +34,7 @@ def test_the_table_shows_the_physics_checks_after_the_others(tmp_path: Path) -> 
     assert "mujoco-rollout" not in without.out
 
 
+@pytest.mark.slow
 def test_programs_get_the_same_report_every_time(tmp_path: Path) -> None:
     robot = write(tmp_path, small())
     options = ("validate", robot, "--samples", "3", "--dynamics", "--json", "-")
@@ -62,6 +65,7 @@ def test_a_robot_that_falls_short_makes_the_exit_status_1(tmp_path: Path) -> Non
     assert dh2sim("validate", tmp_path / "folded.yaml", "--samples", "3").status == 0
 
 
+@pytest.mark.slow
 def test_what_cannot_be_checked_is_told_and_is_no_failure(tmp_path: Path) -> None:
     run = dh2sim("validate", write(tmp_path, WEAK), "--samples", "3", "--dynamics")
     assert run.status == 0
@@ -72,6 +76,7 @@ def test_what_cannot_be_checked_is_told_and_is_no_failure(tmp_path: Path) -> Non
         assert f"mujoco-rollout: {text}" in told(run)
 
 
+@pytest.mark.slow
 def test_several_robots_are_simulated_one_after_the_other() -> None:
     run = dh2sim("validate", "scara", "rpr", "--samples", "3", "--dynamics", "--json", "-")
     assert run.status == 0

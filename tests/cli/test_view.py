@@ -113,6 +113,7 @@ def page_of(url: str) -> str:
         return str(answer.read().decode())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "status", "told"),
     [(signal.SIGINT, 130, "dh2sim: interrupted\n"), (signal.SIGTERM, 143, "")],
@@ -149,6 +150,7 @@ def test_it_ends_at_once_though_a_page_is_open() -> None:
     assert is_free(port)
 
 
+@pytest.mark.slow
 def test_an_interruption_while_it_starts_is_no_traceback() -> None:
     rng = random.Random(0)
     for _ in range(6):
@@ -177,6 +179,7 @@ def test_a_signal_that_a_callback_swallows_still_wakes_and_ends_the_viewer(
     assert (process.returncode, err) == (status, message)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere 127.0.0.1 alone is this machine's own address")
 def test_it_can_only_be_reached_from_this_machine_unless_it_is_told_otherwise() -> None:
     with serving("stanford", "--port", str(port := unused_port())) as process:
@@ -223,6 +226,7 @@ def test_of_a_taken_port_it_takes_the_next_that_is_free_and_says_so() -> None:
     assert process.returncode == 130
 
 
+@pytest.mark.slow
 def test_a_second_viewer_stands_beside_the_first() -> None:
     port = unused_port()
     with serving("stanford", "--port", str(port)) as first:
@@ -244,6 +248,7 @@ def test_an_address_that_nobody_can_listen_at_is_refused() -> None:
     assert (done.status, done.out, done.err) == (2, "", f"dh2sim: cannot listen at 192.0.2.1, port 8080: {why}\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("host", ["256.0.0.1", "a..b", "x" * 64])
 def test_a_host_that_is_no_address_is_refused(host: str) -> None:
     done = dh2sim_process("view", "stanford", "--no-browser", "--host", host)

@@ -36,6 +36,7 @@ def decoded(path: Path) -> tuple[str, NDArray[np.uint8]]:
     return about, np.frombuffer(done.stdout, dtype=np.uint8).reshape(-1, 120, 160, 3)
 
 
+@pytest.mark.slow
 def test_an_mp4_is_h264_of_the_right_size_speed_and_length_and_shows_what_was_drawn(tmp_path: Path) -> None:
     require_gl()
     out = tmp_path / "film.mp4"
@@ -54,6 +55,7 @@ def test_an_mp4_is_h264_of_the_right_size_speed_and_length_and_shows_what_was_dr
     assert [path.name for path in tmp_path.iterdir()] == ["film.mp4"]
 
 
+@pytest.mark.slow
 def test_a_gif_has_the_right_size_times_and_colours(tmp_path: Path) -> None:
     require_gl()
     out = tmp_path / "film.gif"

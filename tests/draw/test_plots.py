@@ -220,6 +220,7 @@ def test_what_was_not_recorded_is_told_with_how_to_record_it(what: str, gone: tu
     assert str(caught.value) == f"run.zarr: this plot {told}(recorded: {', '.join(there)})"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "ending"),
     [

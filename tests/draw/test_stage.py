@@ -80,6 +80,7 @@ def test_looking_straight_down_the_floor_is_not_all_white() -> None:
     assert (picture.min(axis=2) > 250).mean() < 0.02
 
 
+@pytest.mark.slow
 def test_the_trace_is_shown_where_the_tool_has_been_and_not_where_it_will_be() -> None:
     motion = moving("stanford")
     last = len(motion.time) - 1

@@ -23,6 +23,7 @@ def test_two_runs_write_the_same_bytes_and_the_second_leaves_them_as_they_are(tm
     assert again.out.count("unchanged") == len(ALL_FILES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "variables",
     [

@@ -66,6 +66,7 @@ def _versions(folder: Path) -> list[tuple[Path, dict[str, bytes]]]:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda kind: kind.name)
 def test_an_export_cut_off_at_any_moment_leaves_whole_files(tmp_path: Path, kind: signal.Signals) -> None:
     versions = _versions(tmp_path)
@@ -105,6 +106,7 @@ def test_the_program_ends_in_good_order_when_it_is_told_to(tmp_path: Path, kind:
         assert {path.name for path in folder.iterdir()} == {f"{name}.urdf", f"{name}.xml", "scene.xml"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moment", [0.7, 1.5, 3.0])
 def test_an_interruption_during_a_long_validation_is_heeded_at_once(tmp_path: Path, moment: float) -> None:
     process = _start("-c", STARTED, "validate", "stanford", "--samples", "4000000", cwd=tmp_path)
@@ -119,6 +121,7 @@ def test_an_interruption_during_a_long_validation_is_heeded_at_once(tmp_path: Pa
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_an_interruption_while_the_program_starts_is_no_traceback(tmp_path: Path) -> None:
     rng = random.Random(0)
     for _ in range(8):

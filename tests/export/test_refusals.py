@@ -66,6 +66,7 @@ def test_without_verification_a_wrong_model_gets_through_so_verification_is_what
     assert dh2sim("validate", robot, "--dir", tmp_path / "made", "--samples", "3").status == 1
 
 
+@pytest.mark.slow
 def test_more_bodies_than_mujoco_reads_are_refused(tmp_path: Path) -> None:
     robot = write(tmp_path, snake(496))
     assert dh2sim("export", robot, "--out", tmp_path / "made") == Outcome(

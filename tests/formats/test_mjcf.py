@@ -144,6 +144,7 @@ def long(count: int) -> RobotModel:
     return build_model(RobotSpec(name="snake", rows=tuple(rows)))
 
 
+@pytest.mark.slow
 def test_the_longest_robot_that_is_written_is_read_by_mujoco() -> None:
     mj = in_mujoco(to_mjcf(long(495)))
     assert mj.body("link_495").id == mj.nbody - 1
@@ -158,6 +159,7 @@ def test_a_longer_robot_is_refused() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_body_that_a_site_needs_at_the_end_counts_too() -> None:
     last = Row(name="last", type=REVOLUTE, convention=STANDARD, alpha=1e-7)
     built = long(495)

@@ -42,6 +42,7 @@ def test_frames_of_both_formats_stand_where_the_table_says(name: str) -> None:
     assert_poses_are_the_tables(built, in_limits(built, 100, seed=6))
 
 
+@pytest.mark.slow
 @settings(max_examples=80)
 @given(robots_with_joint_vectors(max_rows=12, must_move=False))
 def test_frames_of_any_robot_stand_where_the_table_says(drawn: tuple[RobotSpec, Array]) -> None:

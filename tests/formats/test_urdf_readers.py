@@ -29,6 +29,7 @@ def test_every_reader_accepts_the_urdf(name: str) -> None:
     assert_every_reader_accepts(model(name))
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(robot_specs(must_move=False))
 def test_every_reader_accepts_the_urdf_of_any_robot(spec: RobotSpec) -> None:

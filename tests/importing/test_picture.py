@@ -35,6 +35,7 @@ def gantry(*limits: Limits) -> Imported:
     return made_of(*axes, tip=(0.4, 0.2, 0.6), limits=limits)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".svg", ".png", ".pdf"])
 def test_the_same_robot_gives_the_same_bytes(ending: str, tmp_path: Path) -> None:
     for name in ("one", "two"):
@@ -43,6 +44,7 @@ def test_the_same_robot_gives_the_same_bytes(ending: str, tmp_path: Path) -> Non
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"one{ending}", f"two{ending}"]
 
 
+@pytest.mark.slow
 def test_a_picture_is_of_the_kind_that_its_ending_says(tmp_path: Path) -> None:
     draw_assignment(puma(), tmp_path / "a.SVG")
     draw_assignment(puma(), tmp_path / "a.png")
@@ -52,6 +54,7 @@ def test_a_picture_is_of_the_kind_that_its_ending_says(tmp_path: Path) -> None:
     assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.slow
 def test_users_settings_of_matplotlib_neither_matter_nor_change(tmp_path: Path) -> None:
     draw_assignment(puma(), tmp_path / "plain.svg")
     with mpl.rc_context({"lines.linewidth": 9.0, "font.family": "serif", "text.color": "red"}):
@@ -87,6 +90,7 @@ def test_a_robot_made_of_a_table_has_no_axes_to_draw(tmp_path: Path) -> None:
         draw_assignment(imported, tmp_path / "a.svg")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", [STANDARD, MODIFIED])
 @pytest.mark.parametrize("seed", range(6))
 def test_any_robot_can_be_drawn(seed: int, convention: Convention, tmp_path: Path) -> None:

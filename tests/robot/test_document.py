@@ -184,6 +184,7 @@ def test_a_billion_laughs_end_at_once() -> None:
     assert time.perf_counter() - start < 1
 
 
+@pytest.mark.slow
 def test_too_many_values_are_refused() -> None:
     (message,) = complaints("a:\n" + "- []\n" * (MAX_NODES + 1))
     assert message.endswith(f"more than {MAX_NODES} values (aliases counted each time)")

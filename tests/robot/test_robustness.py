@@ -71,6 +71,7 @@ def test_a_file_with_odd_keys_is_read_or_refused(pairs: list[tuple[str, str]], l
     _read(f"name: r\nconvention: standard\njoints:\n- {joint}\n{keys}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [

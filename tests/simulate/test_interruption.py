@@ -102,6 +102,7 @@ def _finish(run: Path, *more: str) -> Outcome:
     return outcome
 
 
+@pytest.mark.slow
 def test_a_command_that_is_killed_again_and_again_ends_as_if_it_had_not_been(run: Path, undisturbed: Path) -> None:
     for threads in ("1", "2", "3"):
         before = _blocks(run)
@@ -115,6 +116,7 @@ def test_a_command_that_is_killed_again_and_again_ends_as_if_it_had_not_been(run
     _assert_same(run, undisturbed)
 
 
+@pytest.mark.slow
 def test_an_interrupt_finishes_the_block_at_hand_and_tells_how_to_carry_on(run: Path, undisturbed: Path) -> None:
     process = _start(run)
     _wait_for_another_block(run, 0)
@@ -135,6 +137,7 @@ def test_an_interrupt_finishes_the_block_at_hand_and_tells_how_to_carry_on(run: 
     _assert_same(run, undisturbed)
 
 
+@pytest.mark.slow
 def test_a_second_interrupt_ends_at_once_and_loses_no_committed_block(run: Path, undisturbed: Path) -> None:
     process = _start(run)
     _wait_for_another_block(run, 0)
@@ -148,6 +151,7 @@ def test_a_second_interrupt_ends_at_once_and_loses_no_committed_block(run: Path,
     _assert_same(run, undisturbed)
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_left_alone(run: Path, undisturbed: Path) -> None:
     _finish(run)
     before = contents(run)
@@ -155,6 +159,7 @@ def test_a_finished_run_is_left_alone(run: Path, undisturbed: Path) -> None:
     assert contents(run) == before
 
 
+@pytest.mark.slow
 def test_a_run_that_was_damaged_by_hand_is_mended(run: Path, undisturbed: Path) -> None:
     _finish(run)
     (run / "qpos" / "c.4.0.0").unlink()
@@ -236,6 +241,7 @@ rm filler
 """
 
 
+@pytest.mark.slow
 def test_on_a_full_disk_a_run_stops_and_carries_on_when_there_is_room(
     tmp_path: Path, run: Path, undisturbed: Path
 ) -> None:

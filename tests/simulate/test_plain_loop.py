@@ -115,6 +115,7 @@ def test_what_a_controller_did_is_recorded_so_that_the_plain_loop_can_do_it_agai
     plain.assert_equal(run, plain.expected(run, plain.replayed(run)))
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(
     spec=robot_specs(max_rows=5),

@@ -150,6 +150,7 @@ def test_blocks_are_filled_until_one_is_asked_to_stop(tmp_path: Path, monkeypatc
     assert (open_dataset(tmp_path / "run.zarr").status == 0).all()
 
 
+@pytest.mark.slow
 def test_memory_is_bounded_by_the_block_and_not_by_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dh2sim.simulate.prepare.BLOCK_BYTES", 2**21)
     monkeypatch.setattr("dh2sim.simulate.loops.SEGMENT_BYTES", 2**20)

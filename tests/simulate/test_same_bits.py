@@ -136,6 +136,7 @@ def digest() -> str:
     ).hexdigest()
 
 
+@pytest.mark.slow
 def test_another_process_gives_the_same_bits() -> None:
     for hash_seed in ("1", "2"):
         done = subprocess.run(

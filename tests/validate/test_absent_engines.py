@@ -32,6 +32,7 @@ def _without(package: str, *arguments: str | Path) -> Outcome:
     return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["pinocchio", "yourdfpy"])
 def test_an_engine_that_is_not_installed_is_null_with_the_reason(tmp_path: Path, engine: str) -> None:
     run = _without(engine, "validate", write(tmp_path, small()), "--samples", "3", "--json", "-")
@@ -48,6 +49,7 @@ def test_an_engine_that_is_not_installed_is_null_with_the_reason(tmp_path: Path,
     ]
 
 
+@pytest.mark.slow
 def test_a_person_is_told_that_an_engine_was_skipped(tmp_path: Path) -> None:
     run = _without("pinocchio", "validate", write(tmp_path, small()), "--samples", "3")
     lines = run.out.splitlines()

@@ -139,6 +139,7 @@ def test_a_nan_in_a_file_never_passes(exported: Path, attribute: str, monkeypatc
     assert {line.split()[0] for line in run.out.splitlines() if line.endswith("FAILED")} >= {"mujoco-mjcf"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", FILE_ENGINES)
 def test_no_damage_to_a_file_makes_a_traceback(
     exported: Path, file: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]

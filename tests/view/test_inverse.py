@@ -110,6 +110,7 @@ def test_limits_hold_for_any_pose_and_errors_are_those_of_the_solution(name: str
     assert found.rotation_error == pytest.approx(angle_between(T_found[:3, :3], T[:3, :3]), abs=1e-7)
 
 
+@pytest.mark.slow
 @given(robot_and_vectors=strategies.robots_with_joint_vectors(max_rows=7))
 @settings(max_examples=60)
 def test_any_robot_stays_within_its_limits_and_gets_no_farther_from_the_goal(

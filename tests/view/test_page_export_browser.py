@@ -130,6 +130,7 @@ def middle_is(channel: int) -> Callable[[NDArray[np.int64]], bool]:
     return lambda picture: most(picture, WIDTH // 2, HEIGHT // 2) == channel
 
 
+@pytest.mark.slow
 def test_a_robot_is_seen_without_server_or_network_and_the_console_is_clean(
     puma: RobotModel, tab: Tab, tmp_path: Path
 ) -> None:
@@ -148,6 +149,7 @@ def test_a_robot_is_seen_without_server_or_network_and_the_console_is_clean(
     assert tab.asked == []
 
 
+@pytest.mark.slow
 def test_the_eye_can_go_around_the_robot(puma: RobotModel, tab: Tab, tmp_path: Path) -> None:
     path = tmp_path / "puma.html"
     export_page(puma, puma.home, path)
@@ -165,6 +167,7 @@ def test_the_eye_can_go_around_the_robot(puma: RobotModel, tab: Tab, tmp_path: P
     assert tab.errors == []
 
 
+@pytest.mark.slow
 def test_solids_are_seen_where_they_are_in_the_colour_that_they_have(tab: Tab, tmp_path: Path) -> None:
     path = tmp_path / "boxes.html"
     scene: Scene = {
@@ -185,6 +188,7 @@ def test_solids_are_seen_where_they_are_in_the_colour_that_they_have(tab: Tab, t
     assert tab.errors == []
 
 
+@pytest.mark.slow
 def test_an_animation_plays_again_and_again_and_goes_to_any_time(tab: Tab, tmp_path: Path) -> None:
     path = tmp_path / "colours.html"
     moments = [(0.4 * k, {"/box": box(color)}) for k, color in enumerate((RED, GREEN, BLUE))]

@@ -21,6 +21,7 @@ def drawn() -> bool:
     return False
 
 
+@pytest.mark.slow
 def test_an_interruption_ends_a_program_that_simulates(window: BrowserContext) -> None:
     with serving("stanford", "--port", str(port := unused_port())) as process:
         found = re.search(r"http://\S+", first_line(process))

@@ -36,6 +36,7 @@ def press(page: Page, key: str, served: ServedPage, expected: list[float]) -> No
     )
 
 
+@pytest.mark.slow
 def test_each_of_seven_joints_has_a_key_for_less_and_one_for_more(serve: Serve) -> None:
     page, served = serve(open_state(SSRMS))
     expected = SSRMS.configurations["home"].tolist()
@@ -49,6 +50,7 @@ def test_each_of_seven_joints_has_a_key_for_less_and_one_for_more(serve: Serve) 
     wait_for_position(page, SSRMS, expected)
 
 
+@pytest.mark.slow
 def test_keys_typed_into_a_field_move_nothing(serve: Serve) -> None:
     page, served = serve(open_state(SSRMS))
     home = SSRMS.configurations["home"].tolist()
@@ -66,6 +68,7 @@ def test_keys_typed_into_a_field_move_nothing(serve: Serve) -> None:
     assert served.state.draft.complaints, "it is no number, and the robot is the one of before"
 
 
+@pytest.mark.slow
 def test_a_key_moves_a_sliding_joint_by_a_hundredth_of_its_travel(serve: Serve) -> None:
     page, served = serve(open_state(STANFORD))
     expected = STANFORD.configurations["home"].tolist()
@@ -78,6 +81,7 @@ def test_a_key_moves_a_sliding_joint_by_a_hundredth_of_its_travel(serve: Serve) 
     wait_for_position(page, STANFORD, expected)
 
 
+@pytest.mark.slow
 def test_an_arrow_held_at_a_slider_moves_the_joint_and_not_the_eye(serve: Serve) -> None:
     page, served = serve(open_state(STANFORD))
     camera = served.client.camera

@@ -64,6 +64,7 @@ def stand_at(page: Page, percent: int, rollout: int) -> float:
     return time
 
 
+@pytest.mark.slow
 def test_a_recording_is_paused_wound_exchanged_and_given_back(serve: Serve, run: Path) -> None:
     page, served = serve(open_state(STANFORD), run)
     open_tab(page, "Motion")
@@ -82,6 +83,7 @@ def test_a_recording_is_paused_wound_exchanged_and_given_back(serve: Serve, run:
     wait_until(lambda: shown(page, "motion") == "", "nothing is told of the recording any more")
 
 
+@pytest.mark.slow
 def test_the_way_of_the_tool_is_drawn_while_a_recording_plays(serve: Serve, run: Path) -> None:
     page, served = serve(open_state(STANFORD), run)
     open_tab(page, "Show")
@@ -104,6 +106,7 @@ def trace_sent(served: ServedPage) -> Array:
     return np.empty((0, 3)) if handle is None else np.asarray(handle.points).reshape(-1, 3)  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_a_base_that_floats_goes_away_and_comes_back(serve: Serve, tmp_path: Path) -> None:
     run = recorded(tmp_path, "--floating-base")
     page, served = serve(open_state(STANFORD), run)

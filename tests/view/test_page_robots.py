@@ -14,6 +14,7 @@ def drawn() -> bool:
     return False
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", builtin_robots())
 def test_every_robot_that_comes_with_dh2sim_opens_at_home(serve: Serve, robot: str) -> None:
     spec = load_robot(robot)

@@ -23,6 +23,7 @@ def drawn() -> bool:
     return False
 
 
+@pytest.mark.slow
 def test_the_table_is_written_in_radians_and_millimetres_and_the_robot_stays(serve: Serve) -> None:
     page, served = serve(open_state(STANFORD))
     open_tab(page, "Table")
@@ -44,6 +45,7 @@ def test_the_table_is_written_in_radians_and_millimetres_and_the_robot_stays(ser
     assert field(page, "joint_1 [°]").is_visible(), "the panel's own unit is another matter"
 
 
+@pytest.mark.slow
 def test_a_converted_table_is_another_one_of_the_same_robot(serve: Serve) -> None:
     page, served = serve(open_state(STANFORD))
     open_tab(page, "Table")
@@ -59,6 +61,7 @@ def test_a_converted_table_is_another_one_of_the_same_robot(serve: Serve) -> Non
     wait_for_position(page, STANFORD, HOME)
 
 
+@pytest.mark.slow
 def test_the_same_table_read_in_another_convention_is_another_robot(serve: Serve) -> None:
     page, served = serve(open_state(STANFORD))
     open_tab(page, "Table")
@@ -71,6 +74,7 @@ def test_the_same_table_read_in_another_convention_is_another_robot(serve: Serve
     wait_for_position(page, served.state.spec, HOME)
 
 
+@pytest.mark.slow
 def test_sliders_show_degrees_or_radians(serve: Serve) -> None:
     page, served = serve(open_state(STANFORD))
     wait_until(lambda: field(page, "joint_2 [°]").input_value() == f"{math.degrees(HOME[1]):g}", "degrees")

@@ -106,6 +106,7 @@ def test_a_file_that_is_too_large_is_refused_and_the_next_one_is_taken(open_page
     wait_until(lambda: shown(page, "notice") == "Opened next.yaml: mine, 2 joints.", "a file of two parts")
 
 
+@pytest.mark.slow
 def test_a_recording_is_played_with_the_robot_alone_that_it_is_of(
     window: BrowserContext, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

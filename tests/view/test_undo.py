@@ -96,6 +96,7 @@ def test_another_file_begins_anew() -> None:
     assert opened.earlier == ()
 
 
+@pytest.mark.slow
 def test_what_is_kept_is_bounded() -> None:
     state = STANFORD
     for k in range(MOST + 5):

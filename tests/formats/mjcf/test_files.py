@@ -274,6 +274,7 @@ def broken(rng: random.Random) -> str:
     return text
 
 
+@pytest.mark.slow
 def test_what_is_broken_is_refused_or_read_and_nothing_is_left_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -56,6 +56,7 @@ def _check(found: TableImport) -> None:
         assert row.limits.position is None or row.limits.position[0] < row.limits.position[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_broken_tables_are_read_or_refused(seed: int) -> None:
     rng = random.Random(seed)
@@ -88,6 +89,7 @@ def test_any_cells_are_read_or_refused(rows: list[list[str]]) -> None:
     _read((HEAD + "|-|-|-|-|\n" + "".join(f"|{'|'.join(row)}|\n" for row in rows)).encode("utf-8", "replace"), "t.md")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [

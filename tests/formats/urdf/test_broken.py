@@ -168,6 +168,7 @@ def outcome(data: bytes, tip: str | None, rng: Rng) -> str:
     return "refused"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("batch", range(BATCHES))
 def test_a_broken_file_is_read_or_refused(batch: int) -> None:
     rng = np.random.default_rng(batch)
@@ -208,6 +209,7 @@ HUGE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", list(HUGE))
 def test_a_huge_file_is_read_or_refused_in_short_words(kind: str) -> None:
     try:

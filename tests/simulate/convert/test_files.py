@@ -141,6 +141,7 @@ def test_a_disk_that_is_full_is_told_and_nothing_is_left(run: Path, tmp_path: Pa
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @both
 def test_a_file_system_without_room_is_told_and_nothing_is_left(run: Path, tmp_path: Path, kind: str) -> None:
     disk = tmp_path / "disk"
@@ -174,6 +175,7 @@ def test_a_folder_that_may_not_be_written_to_is_told(run: Path, tmp_path: Path, 
     assert str(caught.value) == f"cannot write to '{tmp_path}': Permission denied; nothing was changed"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("package", "kind", "message"),
     [

@@ -41,6 +41,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_run(tmp_path_factory.mktemp("large") / "run.zarr", layout, make_arrays(layout))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["parquet", "hdf5"])
 @pytest.mark.parametrize(("kill", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interruption_leaves_nothing(
@@ -73,6 +74,7 @@ def test_an_interruption_leaves_nothing(
     assert interrupted
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
 def test_memory_is_bounded_by_a_block_and_not_by_the_run(tmp_path: Path) -> None:
     peaks = []

@@ -54,6 +54,7 @@ def _concerned(file: str) -> tuple[int, ...]:
     return (int(name.split(".")[1]),) if folder in known and name.startswith("c.") else ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [_delete, _empty, _truncate, _flip, _lengthen])
 def test_whatever_file_is_damaged_the_run_is_mended_and_no_other_block_is_simulated(
     tmp_path: Path, damage: Callable[[Path], None]
@@ -70,6 +71,7 @@ def test_whatever_file_is_damaged_the_run_is_mended_and_no_other_block_is_simula
         (path / file).write_bytes(sound[file])  # nobody knows any more how long the block took
 
 
+@pytest.mark.slow
 def test_any_bit_of_the_root_may_flip(tmp_path: Path) -> None:
     path = make(tmp_path / "run.zarr", SMALL)
     root = path / "zarr.json"

@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from dh2sim.simulate.description import summarize
 from dh2sim.simulate.store.reader import open_dataset
@@ -39,6 +40,7 @@ def _as_read(path: Path, numbers: dict[str, np.ndarray]) -> int:
     return int(there.sum())
 
 
+@pytest.mark.slow
 def test_a_run_whose_writer_is_killed_again_and_again_becomes_what_it_would_have_become(tmp_path: Path) -> None:
     of = layout(rollouts=ROLLOUTS, block=1)
     path, numbers, rng = tmp_path / "run.zarr", whole(of), random.Random(0)

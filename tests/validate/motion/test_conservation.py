@@ -87,6 +87,7 @@ def spoilt(compiled: mujoco.MjModel, how: str) -> mujoco.MjModel:
     return compiled
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "how",
     ["damping", "gravity", "side wind", "mass", "inertia", "centre of mass", "armature", "joint"],

@@ -21,6 +21,7 @@ from tests.validate.motion.robots import LIFT, built, heavier
 QUANTITIES = ["energy order", "momentum", "rest", "tracking", "inverse dynamics", "self-contact"]
 
 
+@pytest.mark.slow
 def test_every_check_is_made_and_the_same_seed_finds_the_same() -> None:
     first, again, other = (check_motion(built("scara"), seed=seed) for seed in (4, 4, 5))
     assert [check.quantity.value for check in first] == QUANTITIES
@@ -31,6 +32,7 @@ def test_every_check_is_made_and_the_same_seed_finds_the_same() -> None:
     assert first != other
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(robot_specs(max_rows=5))
 def test_any_robot_moves_as_physics_has_it(spec: RobotSpec) -> None:
