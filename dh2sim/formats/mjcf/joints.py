@@ -207,7 +207,7 @@ def check_joints(tree: MjcfTree, selection: Selection, files: MjcfFiles) -> None
     problems: list[Problem] = []
     for joint in selection.joints:
         if joint.motion in (Motion.BALL, Motion.FREE):
-            message = f"a {joint.motion} joint has no row in a table. Choose --base or --tip so that it is left out"
+            message = f"a {joint.motion} joint has no row in a table; choose a base or tip that leaves it out"
             problems.append(_problem(joint, message, tree, files))
         elif not _usable([*joint.pos.tolist(), *joint.axis.tolist(), joint.ref]):
             problems.append(_problem(joint, _too_large("the joint"), tree, files))

@@ -1,10 +1,8 @@
-"""How the links of an MJCF's arm look: one mesh and one colour a link; what else is shown is noted.
-
-Mass, centre of mass and inertia of the links of an MJCF's arm, with those of all bodies that are fixed to them.
-"""
+"""The links of an MJCF's arm: from each body and all that is fixed to it its mass, its inertia and its appearance."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Final
 
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
     import mujoco
 
 
-def read_mass(compiled: Compiled, tree: MjcfTree, body: MjcfBody, name: str, notes: Notes) -> Inertial:
+def read_inertial(compiled: Compiled, tree: MjcfTree, body: MjcfBody, name: str, notes: Notes) -> Inertial:
     """Return the mass properties of a body and of all that is fixed to it, in the body's frame, as compiled.
 
     Args:
@@ -69,15 +67,11 @@ def _in_link(model: mujoco.MjModel, tree: MjcfTree, link: MjcfBody, part: int) -
     return own if part == link.id else in_frame(tree.drawn_pose(link.id, part), own)
 
 
-def weight_of(compiled: Compiled, tree: MjcfTree, bodies: tuple[int, ...]) -> str:
+def weight_of(compiled: Compiled, tree: MjcfTree, bodies: Sequence[int]) -> str:
     """Return words for some bodies and their mass, such as ``body 'finger' (0.1 kg)``."""
-    mass = sum(float(compiled.model.body_mass[body]) for body in bodies)
-    label = tree.bodies[bodies[0]].label
-    first = label if label.startswith("body ") else f"body {label}"
-    what = first if len(bodies) == 1 else f"{len(bodies)} bodies from {label} on"
-    if compiled.unknown_masses.intersection(bodies):
-        return f"{what} (mass not known)"
-    return f"{what} ({mass:.6g} kg)" if mass > 0.0 else what
+    unknown = compiled.unknown_masses.intersection(bodies)
+    mass = None if unknown else sum(float(compiled.model.body_mass[body]) for body in bodies)
+    return tree.links.weighed(bodies, mass)
 
 
 _SAME: Final = 1e-6

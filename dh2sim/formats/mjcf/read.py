@@ -1,24 +1,24 @@
-"""MJCF file -> SerialRobot: the arm of a model that somebody else described; MuJoCo itself reads the file.
+"""MJCF file -> SerialRobot, read by MuJoCo itself; what of the file has no place in a serial arm is noted.
 
-What ties an MJCF's bodies together besides joints: constraints and tendons; no table has such.
-
-What of an MJCF has no place in a serial arm, told in a few sentences.
+An arm whose bodies are tied together by constraints or tendons, besides its joints, is refused.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from dh2sim.errors import ImportedFileError, Problem
+from dh2sim.formats.arm import described, note_gravity, note_left_out
 from dh2sim.formats.mjcf.chain import Selection, names_of, select_chain
 from dh2sim.formats.mjcf.compile import Compiled, compile_mjcf
 from dh2sim.formats.mjcf.includes import MjcfFiles, look_through
 from dh2sim.formats.mjcf.joints import check_joints, joint_names, note_solver, read_drives, read_joints
-from dh2sim.formats.mjcf.links import read_look, read_mass, weight_of
-from dh2sim.formats.mjcf.tree import WORLD, MjcfBody, MjcfJoint, MjcfTree, tree_of
+from dh2sim.formats.mjcf.links import read_inertial, read_look, weight_of
+from dh2sim.formats.mjcf.tree import WORLD, MjcfBody, MjcfJoint, MjcfTree, read_tree
 from dh2sim.formats.serial_robot import GREATEST, SerialLink, SerialRobot
 from dh2sim.formats.xml_read import place
 from dh2sim.messages import Notes, listed, shown
@@ -27,7 +27,7 @@ from dh2sim.typing import Array, read_only
 if TYPE_CHECKING:
     import mujoco
 
-_ADVICE: Final = "no table has such. Choose --base or --tip so that the arm does without, or remove it"
+_ADVICE: Final = "no table can say that. Choose a base or tip that leaves it out, or remove it"
 
 
 def check_loops(model: mujoco.MjModel, tree: MjcfTree, selection: Selection, files: MjcfFiles, notes: Notes) -> None:
@@ -128,7 +128,7 @@ class _Loops:
 
     def _between(self, one: int, other: int) -> list[MjcfJoint]:
         """The joints on the way from one body to another."""
-        up, down = (set(self._tree.way(0, body) or ()) for body in (one, other))
+        up, down = (set(self._tree.links.way(WORLD, body) or ()) for body in (one, other))
         return self._tree.joints_of(sorted(up ^ down))
 
     def _of_tendon(self, tendon: int) -> list[MjcfJoint]:
@@ -148,10 +148,6 @@ class _Loops:
         for one, other in itertools.pairwise(bodies):
             found.update(dict.fromkeys(joint.id for joint in self._between(one, other)))
         return [self._arm[number] for number in found if number in self._arm]
-
-
-_MOST_BRANCHES: Final = 20
-"""Branches that are told one by one."""
 
 
 def note_leftovers(compiled: Compiled, tree: MjcfTree, selection: Selection, notes: Notes) -> None:
@@ -176,26 +172,26 @@ def note_leftovers(compiled: Compiled, tree: MjcfTree, selection: Selection, not
 def _note_branches(
     compiled: Compiled, tree: MjcfTree, selection: Selection, starts: Sequence[int], notes: Notes
 ) -> None:
-    base = selection.base.id
-    below = set(tree.below(base))
-    others = tuple(body.id for body in tree.bodies[1:] if body.id not in below)
-    if others:
+    if others := [body for body in tree.links.not_below(selection.base.id) if body != WORLD]:
         what = weight_of(compiled, tree, others)
         notes.add(f"What is not below the base {selection.base.label} is left out: {what}.")
     arm = {body.id for body in selection.bodies}
     rigid = {part for start in starts for part in tree.rigid(start)}
-    branches = [
-        child
-        for part in sorted(rigid)
-        for child in tree.bodies[part].children
-        if child not in arm and child not in rigid
-    ]
-    for child in branches[:_MOST_BRANCHES]:
+
+    def describe(child: int) -> str:
         body = tree.bodies[child]
-        by = f"with {names_of(body.joints)} " if body.joints else "as it is moved by others "
-        notes.add(f"Left out {by}on {_on(tree, body.parent)}: {weight_of(compiled, tree, tree.below(child))}.")
-    if len(branches) > _MOST_BRANCHES:
-        notes.add(f"Left out with all that they carry: {len(branches) - _MOST_BRANCHES} more bodies that move.")
+        how = f"with {names_of(body.joints)}" if body.joints else "as a mocap body"
+        return f"{how} on {_on(tree, body.parent)}: {weight_of(compiled, tree, tree.links.below(child))}"
+
+    note_left_out(
+        notes,
+        [
+            partial(describe, child)
+            for part in sorted(rigid)
+            for child in tree.links.children[part]
+            if child not in arm and child not in rigid
+        ],
+    )
 
 
 def _on(tree: MjcfTree, body: int) -> str:
@@ -251,7 +247,7 @@ def read_mjcf(path: Path, *, file: str, base: str | None = None, tip: str | None
     notes = Notes()
     files = look_through(path, file=file)
     compiled = compile_mjcf(files, notes)
-    tree = tree_of(compiled.model)
+    tree = read_tree(compiled.model)
     selection = select_chain(tree, base, tip, files, notes)
     check_joints(tree, selection, files)
     check_loops(compiled.model, tree, selection, files, notes)
@@ -264,7 +260,7 @@ def read_mjcf(path: Path, *, file: str, base: str | None = None, tip: str | None
     note_leftovers(compiled, tree, selection, notes)
     return SerialRobot(
         name=compiled.name or Path(file).name.partition(".")[0],
-        description=f"MJCF {Path(file).name}, from {_plain(links[0].name)} to {_plain(_tip(selection, links))}",
+        description=described("MJCF", file, links[0].name, _tip(selection, links)),
         chain=joints.chain,
         base=links[0],
         links=links[1:],
@@ -295,7 +291,7 @@ def _links(
 def _link(
     compiled: Compiled, tree: MjcfTree, body: MjcfBody, name: str, mass_notes: Notes, notes: Notes
 ) -> SerialLink:
-    weight = read_mass(compiled, tree, body, name, mass_notes)
+    weight = read_inertial(compiled, tree, body, name, mass_notes)
     look = read_look(compiled, tree, body, name, notes)
     return SerialLink(
         name=name, mass=weight.mass, com=weight.com, inertia=weight.inertia, mesh=look.mesh, color=look.color
@@ -318,8 +314,7 @@ def _gravity(compiled: Compiled, tree: MjcfTree, selection: Selection, files: Mj
             f"gravity has a number that is not finite, or greater than {GREATEST:g}", path="option.gravity"
         )
     if gravity != world:
-        words = ", ".join(f"{value:.6g}" for value in gravity)
-        notes.add(f"Gravity is ({words}) m/s² in the base {base.label}, as that stands in the world.")
+        note_gravity(notes, gravity, base.label, "the world")
     return read_only(gravity)
 
 
@@ -327,8 +322,3 @@ def _tip(selection: Selection, links: tuple[SerialLink, ...]) -> str:
     if selection.site is not None and selection.site.name:
         return selection.site.name
     return selection.tip.name or links[-1].name
-
-
-def _plain(name: str) -> str:
-    """A name as it is, if that is fit for a line of text."""
-    return name if name.isprintable() and len(name) <= 60 else shown(name)

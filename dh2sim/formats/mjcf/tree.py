@@ -1,4 +1,4 @@
-"""A compiled MJCF as a tree of bodies in plain numbers; whatever follows has no need of MuJoCo."""
+"""A compiled MJCF as a tree of bodies in plain numbers, which can be worked on without MuJoCo."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final
 
+from dh2sim.formats.arm import LinkTree
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.messages import shown
 from dh2sim.typing import Array, read_only
@@ -65,14 +66,13 @@ class MjcfBody:
     name: str
     """Empty where it has none."""
     parent: int
-    children: tuple[int, ...]
     T_parent_body: Array = field(repr=False)
     """Pose in the parent as the file draws it, shape (4, 4)."""
     joints: tuple[MjcfJoint, ...]
     """Between the parent and the body, in the order in which they move it."""
     sites: tuple[MjcfSite, ...]
     mocap: bool
-    """Whether somebody else moves it."""
+    """Whether it is moved from outside."""
 
     @property
     def label(self) -> str:
@@ -85,32 +85,15 @@ class MjcfTree:
     """All bodies, by number; a body comes after its parent."""
 
     bodies: tuple[MjcfBody, ...]
-
-    def way(self, base: int, tip: int) -> tuple[int, ...] | None:
-        """Return the bodies from a base, without it, down to a tip, or None where there is no way down."""
-        way: list[int] = []
-        body = tip
-        while body != base:
-            if body == WORLD:
-                return None
-            way.append(body)
-            body = self.bodies[body].parent
-        return tuple(reversed(way))
-
-    def below(self, body: int) -> tuple[int, ...]:
-        """Return a body and all bodies below it, branch by branch."""
-        found, waiting = [], [body]
-        while waiting:
-            found.append(waiting.pop())
-            waiting += reversed(self.bodies[found[-1]].children)
-        return tuple(found)
+    links: LinkTree[int] = field(repr=False)
+    """The same bodies, by number; free joints do not count."""
 
     def rigid(self, body: int) -> tuple[int, ...]:
         """Return a body and those below that are fixed to it, branch by branch."""
         found, waiting = [], [body]
         while waiting:
             found.append(waiting.pop())
-            fixed = [child for child in self.bodies[found[-1]].children if self.is_fixed(child)]
+            fixed = [child for child in self.links.children[found[-1]] if self.is_fixed(child)]
             waiting += reversed(fixed)
         return tuple(found)
 
@@ -125,12 +108,12 @@ class MjcfTree:
     def drawn_pose(self, ancestor: int, body: int) -> Array:
         """Return the pose of a body in one that it hangs on, as the file draws it, shape (4, 4)."""
         T = identity()
-        for step in self.way(ancestor, body) or ():
+        for step in self.links.way(ancestor, body) or ():
             T = compose(T, self.bodies[step].T_parent_body)
         return T
 
 
-def tree_of(model: mujoco.MjModel) -> MjcfTree:
+def read_tree(model: mujoco.MjModel) -> MjcfTree:
     """Return the bodies of a compiled model."""
     joints: list[list[MjcfJoint]] = [[] for _ in range(model.nbody)]
     for i in range(model.njnt):
@@ -141,24 +124,31 @@ def tree_of(model: mujoco.MjModel) -> MjcfTree:
         body = int(model.site_bodyid[i])
         T = pose(model.site_pos[i], model.site_quat[i])
         sites[body].append(MjcfSite(id=i, name=model.site(i).name, body=body, T_body_site=T))
-    children: list[list[int]] = [[] for _ in range(model.nbody)]
-    for i in range(1, model.nbody):
-        children[model.body_parentid[i]].append(i)
-    return MjcfTree(
-        bodies=tuple(
-            MjcfBody(
-                id=i,
-                name=model.body(i).name,
-                parent=int(model.body_parentid[i]),
-                children=tuple(children[i]),
-                T_parent_body=pose(model.body_pos[i], model.body_quat[i]),
-                joints=tuple(joints[i]),
-                sites=tuple(sites[i]),
-                mocap=int(model.body_mocapid[i]) >= 0,
-            )
-            for i in range(model.nbody)
+    bodies = tuple(
+        MjcfBody(
+            id=i,
+            name=model.body(i).name,
+            parent=int(model.body_parentid[i]),
+            T_parent_body=pose(model.body_pos[i], model.body_quat[i]),
+            joints=tuple(joints[i]),
+            sites=tuple(sites[i]),
+            mocap=int(model.body_mocapid[i]) >= 0,
         )
+        for i in range(model.nbody)
     )
+    children: dict[int, list[int]] = {body.id: [] for body in bodies}
+    for child in bodies[1:]:
+        children[child.parent].append(child.id)
+    links = LinkTree(
+        root=WORLD,
+        noun="body",
+        names={body.id: body.name for body in bodies},
+        parents={body.id: body.parent for body in bodies[1:]},
+        children=children,
+        moving={body.id: sum(joint.motion is not Motion.FREE for joint in body.joints) for body in bodies},
+        floating=frozenset(body.id for body in bodies if any(joint.motion is Motion.FREE for joint in body.joints)),
+    )
+    return MjcfTree(bodies=bodies, links=links)
 
 
 def _joint(model: mujoco.MjModel, i: int) -> MjcfJoint:

@@ -87,10 +87,10 @@ def _type(joint: UrdfJoint, report: XmlReport) -> JointType:
     mimic = joint.element.first("mimic")
     if mimic is not None:
         other = shown(mimic.attributes.get("joint", ""))
-        message = f"the joint mimics joint {other}; no table has such. Choose --base or --tip so that it is left out"
+        message = f"the joint mimics joint {other}, which no table can; choose a base or tip that leaves it out"
         report.add(mimic, f"{joint.path}.mimic", message)
     if joint.type in ("floating", "planar"):
-        message = f"a {joint.type} joint has no row in a table. Choose --base or --tip so that it is left out"
+        message = f"a {joint.type} joint has no row in a table; choose a base or tip that leaves it out"
         report.add(joint.element, f"{joint.path}.type", message)
         return JointType.CONTINUOUS
     return JointType(joint.type)

@@ -1,14 +1,9 @@
-"""How the links of a URDF's arm look: one mesh and one colour a link; what else is shown is noted.
-
-What hangs on a link of the arm: the links that are fixed to it, and the branches that move and are left out.
-
-Mass, centre of mass and inertia of the links of a URDF's arm, with those of all links that are fixed to them.
-"""
+"""The links of a URDF's arm: what is fixed to each, and from all of that its mass, its inertia and its appearance."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Final
@@ -36,7 +31,7 @@ class Part:
     T_link_part: Array = field(repr=False)
     """Its pose in the link of the arm, shape (4, 4)."""
     on_chain: bool
-    """Whether the way from base to tip leads over it."""
+    """Whether it lies between base and tip."""
 
     @property
     def path(self) -> str:
@@ -71,7 +66,7 @@ def read_bodies(tree: UrdfTree, selection: Selection, report: XmlReport, notes: 
 
 def _body(tree: UrdfTree, start: str, arm: frozenset[str], report: XmlReport, notes: Notes) -> Body:
     parts, branches = [], []
-    waiting = [Part(name=start, element=tree.links[start], T_link_part=identity(), on_chain=True)]
+    waiting = [Part(name=start, element=tree.elements[start], T_link_part=identity(), on_chain=True)]
     while waiting:
         part = waiting.pop()
         parts.append(part)
@@ -86,7 +81,7 @@ def _body(tree: UrdfTree, start: str, arm: frozenset[str], report: XmlReport, no
                 sentence = "Joints that cannot be read are left out with all that they carry: {}."
                 note_unreadable(off, sentence, joint.name, notes)
                 continue
-            element, on_chain = tree.links[joint.child], joint.name in arm
+            element, on_chain = tree.elements[joint.child], joint.name in arm
             fixed.append(Part(name=joint.child, element=element, T_link_part=T, on_chain=on_chain))
         waiting += reversed(fixed)
     return Body(parts=tuple(parts), branches=tuple(branches))
@@ -98,12 +93,9 @@ def note_unreadable(report: XmlReport, sentence: str, name: str, notes: Notes) -
     notes.group(sentence, name, f"line {problem.line}: {problem.message}")
 
 
-def weight_of(tree: UrdfTree, links: Iterable[str]) -> str:
-    """Return words for some links and their mass, such as ``'finger' (0.1 kg)`` or ``3 links (0.4 kg)``."""
-    names = list(links)
-    mass = sum(_mass(tree.links[name]) for name in names)
-    what = f"link {shown(names[0])}" if len(names) == 1 else f"{len(names)} links from {shown(names[0])} on"
-    return f"{what} ({mass:.6g} kg)" if mass > 0.0 else what
+def weight_of(tree: UrdfTree, links: Sequence[str]) -> str:
+    """Return words for some links and their mass, such as ``link 'finger' (0.1 kg)``."""
+    return tree.links.weighed(links, sum(_mass(tree.elements[name]) for name in links))
 
 
 def _mass(link: Element) -> float:

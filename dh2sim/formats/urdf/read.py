@@ -1,15 +1,14 @@
-"""URDF text -> SerialRobot: the arm of a robot that somebody else described.
-
-What of a URDF has no place in a serial arm, told in a few sentences.
-"""
+"""URDF text -> SerialRobot; what of the file has no place in a serial arm is noted."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
+from dh2sim.formats.arm import described, note_gravity, note_left_out
 from dh2sim.formats.mesh_paths import FindMesh
 from dh2sim.formats.serial_robot import SerialLink, SerialRobot
 from dh2sim.formats.urdf.chain import Selection, select_chain
@@ -21,15 +20,12 @@ from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.messages import Notes, listed, shown
 from dh2sim.typing import Array, read_only
 
-_MOST_BRANCHES: Final = 20
-"""Branches that are told one by one."""
-
 _CARRIED: Final = {
     "robot": ("link", "joint", "material", "mujoco"),
     "link": ("inertial", "visual", "collision"),
     "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
 }
-"""Elements that are read or told of elsewhere. ``mujoco`` only tells MuJoCo how to read the file."""
+"""Elements that are read, or noted elsewhere. ``mujoco`` only says how MuJoCo should read the file."""
 
 
 def note_leftovers(tree: UrdfTree, selection: Selection, bodies: Sequence[Body], notes: Notes) -> None:
@@ -47,16 +43,14 @@ def note_leftovers(tree: UrdfTree, selection: Selection, bodies: Sequence[Body],
 
 
 def _note_branches(tree: UrdfTree, selection: Selection, bodies: Sequence[Body], notes: Notes) -> None:
-    if selection.base != tree.root:
-        below = set(tree.descendants(selection.base))
-        others = weight_of(tree, [name for name in tree.descendants(tree.root) if name not in below])
-        notes.add(f"What is not below the base {shown(selection.base)} is left out: {others}.")
-    branches = [(body, joint) for body in bodies for joint in body.branches]
-    for _, joint in branches[:_MOST_BRANCHES]:
-        what = weight_of(tree, tree.descendants(joint.child))
-        notes.add(f"Left out with joint {shown(joint.name)} ({_kind(joint)}) on {shown(joint.parent)}: {what}.")
-    if len(branches) > _MOST_BRANCHES:
-        notes.add(f"Left out with {len(branches) - _MOST_BRANCHES} more joints: all that they carry.")
+    if others := tree.links.not_below(selection.base):
+        notes.add(f"What is not below the base {shown(selection.base)} is left out: {weight_of(tree, others)}.")
+
+    def describe(joint: UrdfJoint) -> str:
+        what = weight_of(tree, tree.links.below(joint.child))
+        return f"with joint {shown(joint.name)} ({_kind(joint)}) on {shown(joint.parent)}: {what}"
+
+    note_left_out(notes, [partial(describe, joint) for body in bodies for joint in body.branches])
 
 
 def _kind(joint: UrdfJoint) -> str:
@@ -107,7 +101,7 @@ def read_urdf(
     name = tree.robot.attributes.get("name", "") or Path(file).name.partition(".")[0]
     return SerialRobot(
         name=name,
-        description=f"URDF {Path(file).name}, from {_plain(selection.base)} to {_plain(selection.tip)}",
+        description=described("URDF", file, selection.base, selection.tip),
         chain=joints.chain,
         base=links[0],
         links=links[1:],
@@ -152,11 +146,5 @@ def _gravity(tree: UrdfTree, selection: Selection, notes: Notes) -> Array:
     gravity = [-9.81 * value + 0.0 for value in T_root_base[2, :3].tolist()]
     if unread.problems or gravity == [0.0, 0.0, -9.81]:
         return read_only([0, 0, -9.81])
-    words = ", ".join(f"{value:.6g}" for value in gravity)
-    notes.add(f"Gravity is ({words}) m/s² in the base {shown(selection.base)}, as that hangs on {shown(tree.root)}.")
+    note_gravity(notes, gravity, shown(selection.base), shown(tree.links.root))
     return read_only(gravity)
-
-
-def _plain(name: str) -> str:
-    """A link's name as it is, if that is fit for a line of text."""
-    return name if name.isprintable() and len(name) <= 60 else shown(name)

@@ -1,6 +1,7 @@
-"""A URDF's links and joints as a tree; the structure of the whole file is checked, whatever part of it is used.
+"""A URDF's links and joints as a tree, and its numbers, poses and axes, read strictly.
 
-Numbers, poses and axes of a URDF, read strictly: what is wrong is reported, and a harmless value comes back.
+The structure of the whole file is checked, whatever part of it is used. What is wrong with a number is reported, and
+a harmless value comes back.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+from dh2sim.formats.arm import LinkTree
 from dh2sim.formats.serial_robot import GREATEST
 from dh2sim.formats.xml_read import Element, XmlReport, place
 from dh2sim.kinematics.transforms import identity, pose_from_rpy
@@ -168,20 +170,14 @@ class UrdfTree:
     """All links and joints of a file: one root, one way to every link."""
 
     robot: Element = field(repr=False)
-    links: Mapping[str, Element] = field(repr=False)
-    root: str
+    links: LinkTree[str] = field(repr=False)
+    """By name."""
+    elements: Mapping[str, Element] = field(repr=False)
+    """Of the links."""
     above: Mapping[str, UrdfJoint] = field(repr=False)
     """The joint that carries a link; the root has none."""
     below: Mapping[str, tuple[UrdfJoint, ...]] = field(repr=False)
     """The joints on a link, in the order of the file."""
-
-    def descendants(self, link: str) -> list[str]:
-        """Return a link and all links below it, each after the one that it is on, branch by branch."""
-        found, waiting = [], [link]
-        while waiting:
-            found.append(waiting.pop())
-            waiting += [joint.child for joint in reversed(self.below[found[-1]])]
-        return found
 
 
 def read_tree(robot: Element, report: XmlReport) -> UrdfTree:
@@ -205,10 +201,19 @@ def read_tree(robot: Element, report: XmlReport) -> UrdfTree:
     below: dict[str, list[UrdfJoint]] = {name: [] for name in links}
     for joint in joints:
         below[joint.parent].append(joint)
+    tree = LinkTree(
+        root=root,
+        noun="link",
+        names={name: name for name in links},
+        parents={name: joint.parent for name, joint in above.items()},
+        children={name: tuple(joint.child for joint in on_it) for name, on_it in below.items()},
+        moving={name: int(name in above and above[name].moves) for name in links},
+        ends_at_frame=True,
+    )
     return UrdfTree(
         robot=robot,
-        links=links,
-        root=root,
+        links=tree,
+        elements=links,
         above=above,
         below={name: tuple(on_it) for name, on_it in below.items()},
     )

@@ -54,8 +54,8 @@ def test_a_base_that_floats_is_where_the_table_starts(tmp_path: Path) -> None:
     assert "The base 'hull' floats on a free joint; the table starts at the base." in robot.notes
     column = model_text(arm).index("<body") + 1
     assert refusal(tmp_path, model_text(arm), base="world") == (
-        f"robot.xml:1:{column}: body[hull].joint: a free joint has no row in a table. "
-        "Choose --base or --tip so that it is left out"
+        f"robot.xml:1:{column}: body[hull].joint: a free joint has no row in a table; "
+        "choose a base or tip that leaves it out"
     )
 
 
@@ -72,8 +72,8 @@ def test_bodies_that_only_float_are_no_arm(tmp_path: Path) -> None:
 def test_several_trees_are_a_choice(tmp_path: Path) -> None:
     text = model_text(f'<body name="base">{body("a", body("b"))}</body>{body("door")}')
     assert refusal(tmp_path, text) == (
-        "robot.xml:1:1: the file holds several trees with joints: choose an arm with --tip. "
-        "Possible tips: 'b' (2 joints), 'door' (1 joint)"
+        "robot.xml:1:1: the file has several trees with joints; choose one arm: "
+        "tip='b' (2 joints), tip='door' (1 joint)"
     )
     assert ends(read_text(tmp_path, text, tip="door")) == "world to door"
     assert ends(read_text(tmp_path, text, base="base")) == "base to b"
@@ -93,8 +93,7 @@ def test_two_sites_of_known_names_are_no_tip_unless_one_is_tool0(tmp_path: Path)
     robot = read_text(tmp_path, model_text(f'<body name="base">{body("a", inner)}</body>'))
     assert ends(robot) == "base to a"
     assert (
-        "The tip is the frame of body 'a'; the last link has 2 sites: 'tcp', 'ee_site'. "
-        "Name one with --tip to have it instead."
+        "The tip is the frame of body 'a'; the last link has 2 sites, which can be chosen instead: 'tcp', 'ee_site'."
     ) in robot.notes
     inner += '<site name="tool0"/>'
     assert ends(read_text(tmp_path, model_text(f'<body name="base">{body("a", inner)}</body>'))) == "base to tool0"
@@ -122,7 +121,7 @@ def test_an_arm_ends_at_its_hand(tmp_path: Path) -> None:
     assert residual(robot, mujoco.MjModel.from_xml_string(text), "base", ["a", "b", "c", "hand"]) < 1e-14
     assert (
         "The arm of 3 joints ends at 'hand', where it forks; taken for a hand and left out: "
-        "'f1' (1 joint), 'f2' (1 joint). Name another tip with --tip."
+        "'f1' (1 joint), 'f2' (1 joint). Another tip can be chosen."
     ) in robot.notes
     assert "Left out with 'F1' on 'hand': body 'f1' (4.18879 kg)." in robot.notes
     assert ends(read_text(tmp_path, text, tip="f2")) == "base to f2"
@@ -137,10 +136,10 @@ def test_the_only_site_of_a_hand_is_the_tip(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arm", "tips"),
     [
-        (body("a", body("b", FINGERS)), "'f1' (3 joints), 'f2' (3 joints)"),
+        (body("a", body("b", FINGERS)), "tip='f1' (3 joints), tip='f2' (3 joints)"),
         (
             body("a", body("b", body("c", body("x", body("y", body("z"))) + body("w")))),
-            "'z' (6 joints), 'w' (4 joints)",
+            "tip='z' (6 joints), tip='w' (4 joints)",
         ),
     ],
 )
@@ -148,16 +147,16 @@ def test_a_fork_that_is_no_hand_is_a_choice(arm: str, tips: str, tmp_path: Path)
     last = "b" if "FB" not in arm and '"c"' not in arm else "c"
     column = model_text(f'<body name="base">{arm}</body>').index(f'<body name="{last}"') + 1
     assert refusal(tmp_path, model_text(f'<body name="base">{arm}</body>')) == (
-        f"robot.xml:1:{column}: the robot forks at body '{last}': choose an arm with --tip. Possible tips: {tips}"
+        f"robot.xml:1:{column}: the robot forks at '{last}'; choose one arm: {tips}"
     )
 
 
 def test_unknown_names_are_guessed(tmp_path: Path) -> None:
     text = arm_text(2, '<site name="flange"/>')
     assert refusal(tmp_path, text, base="bose", tip="flnge") == (
-        "robot.xml:1:1: --base: the file has no body 'bose'. Did you mean 'base'? "
+        "robot.xml:1:1: base: the file has no body 'bose'. Did you mean 'base'? "
         "Its bodies: 'world', 'base', 'link_1', 'link_2'\n"
-        "robot.xml:1:1: --tip: the file has no site or body 'flnge'. Did you mean 'flange'? "
+        "robot.xml:1:1: tip: the file has no site or body 'flnge'. Did you mean 'flange'? "
         "Its bodies: 'world', 'base', 'link_1', 'link_2'; its sites: 'flange'"
     )
 
@@ -180,8 +179,7 @@ def test_a_ball_joint_on_the_arm_is_refused_and_one_beside_it_is_not(tmp_path: P
     text = model_text(f'<body name="base">{arm}</body>')
     column = text.index('<joint name="S"') + 1
     assert refusal(tmp_path, text) == (
-        f"robot.xml:1:{column}: joint[S]: a ball joint has no row in a table. "
-        "Choose --base or --tip so that it is left out"
+        f"robot.xml:1:{column}: joint[S]: a ball joint has no row in a table; choose a base or tip that leaves it out"
     )
     assert ends(read_text(tmp_path, text, tip="a")) == "base to a"
     assert ends(read_text(tmp_path, text, base="s")) == "s to b"
@@ -192,6 +190,6 @@ def test_a_place_in_an_included_file_is_named(tmp_path: Path) -> None:
     (tmp_path / "ball.xml").write_text(f"<x>\n{line}</x>")
     text = model_text('<body name="base"><include file="ball.xml"/></body>')
     assert refusal(tmp_path, text) == (
-        f"ball.xml:2:{line.index('<joint') + 1}: joint[S]: a ball joint has no row in a table. "
-        "Choose --base or --tip so that it is left out"
+        f"ball.xml:2:{line.index('<joint') + 1}: joint[S]: a ball joint has no row in a table; "
+        "choose a base or tip that leaves it out"
     )

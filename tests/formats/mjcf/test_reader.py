@@ -198,7 +198,7 @@ def test_gravity_is_turned_into_the_base(tmp_path: Path) -> None:
     text = model_text(f'<body name="base" euler="90 0 0">{arm}</body>', '<option gravity="0 0 -9.81"/>')
     robot = read_text(tmp_path, text)
     np.testing.assert_allclose(robot.gravity, [0.0, -9.81, 0.0], rtol=0, atol=1e-15)
-    assert "Gravity is (0, -9.81, 0) m/s² in the base 'base', as that stands in the world." in robot.notes
+    assert "Gravity is (0, -9.81, 0) m/s² in the base 'base', which is turned in the world." in robot.notes
     off = read_text(tmp_path, model_text(arm, '<option><flag gravity="disable"/></option>'))
     np.testing.assert_array_equal(off.gravity, [0, 0, 0])
     assert "The file switches gravity off." in off.notes

@@ -67,8 +67,7 @@ def test_tool0_is_not_the_tip_where_there_are_two_or_nothing_moves_it() -> None:
         joint("tb", "b", "b_tool0", "fixed"),
     )
     assert refusal(arms) == (
-        "arm.urdf:2:1: the robot forks at link 'l0': choose an arm with --tip. "
-        "Possible tips: 'a_tool0' (1 joint), 'b_tool0' (1 joint)"
+        "arm.urdf:2:1: the robot forks at 'l0'; choose one arm: tip='a_tool0' (1 joint), tip='b_tool0' (1 joint)"
     )
     assert ends(arms.replace("b_tool0", "tool0")) == "from l0 to tool0"
     assert ends(robot(links("l0", "tool0", "l1", "l2", "l3"), joint("t", "l0", "tool0", "fixed"), *THREE)) == (
@@ -90,7 +89,7 @@ def test_an_arm_ends_at_its_hand() -> None:
     assert found.description == "URDF arm.urdf, from l0 to hand"
     assert [note for note in found.notes if "hand" in note] == [
         "The arm of 3 joints ends at 'hand', where it forks; taken for a hand and left out: 'left' (1 joint), "
-        "'right' (2 joints). Name another tip with --tip.",
+        "'right' (2 joints). Another tip can be chosen.",
         "Links that are fixed to a link of the arm were merged into it: 'l3' (with 'hand', 'grasp').",
         "Left out with joint 'left_joint' (prismatic) on 'hand': link 'left'.",
         "Left out with joint 'right_joint' (prismatic, mimics 'left_joint') on 'hand': 2 links from 'right' on.",
@@ -106,8 +105,7 @@ def test_a_fork_behind_two_joints_or_into_a_branch_as_long_as_the_arm_is_no_hand
         joint("jy", "l2", "y"),
     )
     assert refusal(short) == (
-        "arm.urdf:2:35: the robot forks at link 'l2': choose an arm with --tip. "
-        "Possible tips: 'x' (3 joints), 'y' (3 joints)"
+        "arm.urdf:2:35: the robot forks at 'l2'; choose one arm: tip='x' (3 joints), tip='y' (3 joints)"
     )
     long = robot(
         links("l0", "l1", "l2", "l3", "x", "y", "y1", "y2", "y3", "f", "g"),
@@ -121,8 +119,7 @@ def test_a_fork_behind_two_joints_or_into_a_branch_as_long_as_the_arm_is_no_hand
         joint("jy3", "y2", "y3", "fixed"),
     )
     assert refusal(long) == (
-        "arm.urdf:2:52: the robot forks at link 'l3': choose an arm with --tip. "
-        "Possible tips: 'x' (4 joints), 'y2' (6 joints)"
+        "arm.urdf:2:52: the robot forks at 'l3'; choose one arm: tip='x' (4 joints), tip='y2' (6 joints)"
     )
     assert ends(long, tip="y2") == "from l0 to y2"
 
@@ -133,8 +130,7 @@ def test_a_branch_of_as_many_joints_as_the_arm_is_no_finger() -> None:
     assert ends(text) == "from l0 to l3"
     text = robot(links("l0", "l1", "l2", "l3", "x", "y", "y1", "y2"), *THREE, *tree, joint("jy2", "y1", "y2"))
     assert refusal(text) == (
-        "arm.urdf:2:52: the robot forks at link 'l3': choose an arm with --tip. "
-        "Possible tips: 'x' (4 joints), 'y2' (6 joints)"
+        "arm.urdf:2:52: the robot forks at 'l3'; choose one arm: tip='x' (4 joints), tip='y2' (6 joints)"
     )
 
 
@@ -148,7 +144,7 @@ def test_where_several_frames_are_fixed_to_the_last_link_that_link_is_the_tip_an
     found = read(text)
     assert found.description == "URDF arm.urdf, from l0 to l3"
     assert found.notes[0] == (
-        "The tip is 'l3'; 2 frames are fixed to it: 'flange', 'camera'. Name one with --tip to have it instead."
+        "The tip is 'l3'; 2 frames are fixed to it and can be chosen instead: 'flange', 'camera'."
     )
     assert not any("The tip is" in note for note in read(text, tip="camera").notes)
 
@@ -157,8 +153,8 @@ def test_a_base_and_a_tip_that_are_not_there_are_told_with_what_is() -> None:
     text = robot(links("l0", "l1", "l2", "l3"), *THREE)
     known = "Its links: 'l0', 'l1', 'l2', 'l3'"
     assert refusal(text, base="l9", tip="L3") == (
-        f"arm.urdf:1:1: --base: the file has no link 'l9'. {known}\n"
-        f"arm.urdf:1:1: --tip: the file has no link 'L3'. Did you mean 'l3'? {known}"
+        f"arm.urdf:1:1: base: the file has no link 'l9'. {known}\n"
+        f"arm.urdf:1:1: tip: the file has no link 'L3'. Did you mean 'l3'? {known}"
     )
 
 
@@ -184,8 +180,8 @@ def test_an_arm_without_a_joint_that_moves_is_refused() -> None:
 def test_a_joint_of_several_coordinates_is_refused_on_the_arm_and_told_off_it(kind: str) -> None:
     on = robot(links("world", "l0", "l1", "l2", "l3"), joint("free", "world", "l0", kind), *THREE)
     assert refusal(on) == (
-        f"arm.urdf:3:1: joint[free].type: a {kind} joint has no row in a table. "
-        "Choose --base or --tip so that it is left out"
+        f"arm.urdf:3:1: joint[free].type: a {kind} joint has no row in a table; "
+        "choose a base or tip that leaves it out"
     )
     assert ends(on, base="l0") == "from l0 to l3"
     off = robot(links("l0", "l1", "l2", "l3", "kite"), *THREE, joint("free", "l1", "kite", kind))
@@ -198,8 +194,8 @@ def test_a_joint_that_mimics_another_is_refused_on_the_arm() -> None:
         links("l0", "l1", "l2"), joint("a", "l0", "l1"), joint("b", "l1", "l2", inside='\n<mimic joint="a"/>')
     )
     assert refusal(text) == (
-        "arm.urdf:5:1: joint[b].mimic: the joint mimics joint 'a'; no table has such. "
-        "Choose --base or --tip so that it is left out"
+        "arm.urdf:5:1: joint[b].mimic: the joint mimics joint 'a', which no table can; "
+        "choose a base or tip that leaves it out"
     )
     assert ends(text, tip="l1") == "from l0 to l1"
 
@@ -237,7 +233,7 @@ def test_what_is_above_another_base_is_told_and_gravity_turns_with_the_base() ->
     found = read(text, base="l0")
     np.testing.assert_array_equal(found.gravity, [9.81, 0, 0])
     assert "What is not below the base 'l0' is left out: 3 links from 'world' on (2.5 kg)." in found.notes
-    assert "Gravity is (9.81, 0, 0) m/s² in the base 'l0', as that hangs on 'world'." in found.notes
+    assert "Gravity is (9.81, 0, 0) m/s² in the base 'l0', which is turned in 'world'." in found.notes
     straight = read(text.replace(mount, ""), base="l0")
     np.testing.assert_array_equal(straight.gravity, [0, 0, -9.81])
     assert not any("Gravity" in note for note in straight.notes)
@@ -252,7 +248,7 @@ def test_of_many_branches_the_first_are_told_one_by_one() -> None:
     told = [note for note in read(text, tip="l3").notes if note.startswith("Left out")]
     assert len(told) == 21
     assert told[19] == "Left out with joint 'jb19' (revolute) on 'l1': link 'b19'."
-    assert told[20] == "Left out with 5 more joints: all that they carry."
+    assert told[20] == "Left out: 5 more branches."
 
 
 def test_elements_that_have_no_place_are_told_in_one_sentence() -> None:
