@@ -7,14 +7,18 @@
 
 from __future__ import annotations
 
+import ast
+import re
+import shlex
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dh2sim.cli.common import choice, hand_over, require_free, tolerance_of
-from dh2sim.errors import MissingExtraError
+from dh2sim.errors import ImportedFileError, MissingExtraError
 
 if TYPE_CHECKING:
     from dh2sim.importing.result import Imported
@@ -80,8 +84,21 @@ def import_robot(
     )
     folder = Path.cwd() if out is None else out.resolve().parent
     data = sys.stdin.buffer.read() if file == STDIN else read_file(Path(file))
-    imported = import_data(data, file, options, folder=folder)
+    try:
+        imported = import_data(data, file, options, folder=folder)
+    except ImportedFileError as error:
+        raise ImportedFileError(
+            replace(problem, message=_with_options(problem.message)) for problem in error.problems
+        ) from error
     hand_over(imported.text, out, summary=summary(imported), notes=imported.notes, quiet=quiet)
+
+
+_ARGUMENT = re.compile(r"\b(tip|convention|angle|length)=('[^']*'|\"[^\"]*\")")
+
+
+def _with_options(message: str) -> str:
+    """Return a message of the library with options for its arguments: ``--tip hand`` for ``tip='hand'``."""
+    return _ARGUMENT.sub(lambda found: f"--{found[1]} {shlex.quote(ast.literal_eval(found[2]))}", message)
 
 
 def summary(imported: Imported) -> str:

@@ -281,7 +281,7 @@ def _read_mjcf(file: str, options: ImportOptions) -> SerialRobot:
 
 def _refuse_units(file: str, kind: str, options: ImportOptions) -> None:
     if options.angle is not None or options.length is not None:
-        raise Dh2simError(f"{file}: --angle and --length are for tables; this is {kind}, which has its own units")
+        raise Dh2simError(f"{file}: angle and length are units of tables; this is {kind}, which has its own units")
 
 
 def _serial(robot: SerialRobot, data: bytes, options: ImportOptions, folder: Path | None) -> Imported:
@@ -298,7 +298,9 @@ def _serial(robot: SerialRobot, data: bytes, options: ImportOptions, folder: Pat
 def _table(data: bytes, file: str, options: ImportOptions, folder: Path | None) -> Imported:
 
     if options.base is not None or options.tip is not None:
-        raise Dh2simError(f"{file}: --base and --tip are for URDF and MJCF; this is read as a table, without links")
+        raise Dh2simError(
+            f"{file}: base and tip are links of a URDF or an MJCF; this is read as a table, without links"
+        )
     return import_table(
         data,
         file=file,

@@ -101,7 +101,7 @@ def simpler_with(spec: RobotSpec, tolerance: float) -> str | None:
     wider = 10.0 ** math.ceil(math.log10(10.0 * gaps[where]))
     return (
         f"Angles look rounded in the source: {where} is {gaps[where]:.1e} rad off a multiple of 15 degrees. "
-        f"--tolerance {wider:.0e} makes such numbers simple, if a residual of that size is good enough."
+        f"A tolerance of {wider:.0e} makes such numbers simple, if a residual of that size is good enough."
     )
 
 
@@ -260,7 +260,7 @@ def import_serial(
     if not within(residual, tolerance, recovery.reach):
         raise MismatchError(
             f"{robot.description}: the table is off by {residual_text(residual)} at {residual.worst}; allowed is "
-            f"{tolerance!r}. Nothing was written. Allow more with --tolerance, if that is good enough"
+            f"{tolerance!r}. Nothing was written. A greater tolerance may be good enough"
         )
     spec = replace(spec, source=f"{origin}{'' if origin.endswith('.') else '.'} {residual_sentence(residual)}")
     text = robot_file_text(spec, header=comments, folder=folder)

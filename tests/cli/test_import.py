@@ -98,6 +98,22 @@ def test_an_unknown_tip_is_told_with_its_neighbours(urdf: Path) -> None:
     assert "Did you mean 'tool0'?" in run.err
 
 
+def test_the_command_line_names_options_where_the_library_names_arguments(tmp_path: Path) -> None:
+    path = tmp_path / "fork.urdf"
+    links = "".join(f'<link name="{name}"/>' for name in ("base", "left", "right arm"))
+    joints = "".join(
+        f'<joint name="{name}" type="continuous"><parent link="base"/><child link="{name}"/></joint>'
+        for name in ("left", "right arm")
+    )
+    path.write_text(f"<robot name='two'>{links}{joints}</robot>")
+    run = dh2sim("import", path)
+    assert (run.status, run.out) == (2, "")
+    assert run.err == (
+        f"{path}:1:19: the robot forks at 'base'; choose one arm: --tip left (1 joint), --tip 'right arm' (1 joint)\n"
+    )
+    assert dh2sim("import", path, "--tip", "right arm").status == 0
+
+
 def test_nothing_is_left_behind_where_the_folder_is_missing(urdf: Path, tmp_path: Path) -> None:
     out = tmp_path / "no" / "arm.yaml"
     run = dh2sim("import", urdf, "-o", out)

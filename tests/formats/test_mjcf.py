@@ -155,7 +155,7 @@ def test_a_longer_robot_is_refused() -> None:
         to_mjcf(long(496))
     assert str(caught.value) == (
         "snake: 496 rows make 497 nested bodies with base_link; MuJoCo reads at most 496. "
-        "Split the chain, or export it as URDF only (--format urdf)"
+        "Split the chain, or export it as URDF only"
     )
 
 
@@ -168,7 +168,7 @@ def test_a_body_that_a_site_needs_at_the_end_counts_too() -> None:
         to_mjcf(build_model(spec))
     assert str(caught.value) == (
         "snake: 495 rows make 497 nested bodies with base_link; MuJoCo reads at most 496. "
-        "Split the chain, or export it as URDF only (--format urdf)"
+        "Split the chain, or export it as URDF only"
     )
     shorter = dataclasses.replace(spec, rows=spec.rows[1:])
     in_mujoco(to_mjcf(build_model(shorter)))

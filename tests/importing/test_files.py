@@ -128,10 +128,10 @@ def test_other_formats_are_refused(data: str, expected: str) -> None:
 
 def test_what_is_for_tables_is_refused_for_a_urdf_and_the_other_way_round() -> None:
     assert _refused(ARM, ImportOptions(angle=AngleUnit.DEG)) == (
-        "arm.urdf: --angle and --length are for tables; this is URDF, which has its own units"
+        "arm.urdf: angle and length are units of tables; this is URDF, which has its own units"
     )
     assert _refused("theta,d,a,alpha\n", ImportOptions(tip="hand"), "t.csv") == (
-        "t.csv: --base and --tip are for URDF and MJCF; this is read as a table, without links"
+        "t.csv: base and tip are links of a URDF or an MJCF; this is read as a table, without links"
     )
 
 

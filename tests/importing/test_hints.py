@@ -18,7 +18,7 @@ def _with_alpha(alpha: float) -> RobotSpec:
 def test_an_angle_that_looks_rounded_is_told_with_the_tolerance_that_helps() -> None:
     assert simpler_with(_with_alpha(-1.5708), 1e-9) == (
         "Angles look rounded in the source: alpha of joint_1 is 3.7e-06 rad off a multiple of 15 degrees. "
-        "--tolerance 1e-04 makes such numbers simple, if a residual of that size is good enough."
+        "A tolerance of 1e-04 makes such numbers simple, if a residual of that size is good enough."
     )
 
 

@@ -110,7 +110,7 @@ def to_mjcf(model: ModelLike, options: MjcfOptions = EXPORTED) -> str:
     if nested > MOST_BODIES:
         raise ModelError(
             f"{model.name}: {len(model.links)} rows make {nested} nested bodies with base_link; MuJoCo "
-            f"reads at most {MOST_BODIES}. Split the chain, or export it as URDF only (--format urdf)"
+            f"reads at most {MOST_BODIES}. Split the chain, or export it as URDF only"
         )
     mujoco = ET.Element("mujoco", model=model.name)
     child(mujoco, "compiler", angle="radian", autolimits="true", meshdir="meshes")

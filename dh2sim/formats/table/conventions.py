@@ -33,8 +33,8 @@ _WORDS: Final = {
 }
 """Words that decide by themselves, and words that do in a line about DH tables."""
 _HOW: Final = (
-    "add '--convention standard' or '--convention modified'. Headings a_(i-1), alpha_(i-1) would say modified; "
-    "docs/conventions.md tells how to find out"
+    "pass convention='standard' or convention='modified'. Headings a_(i-1), alpha_(i-1) would say modified; "
+    "docs/conventions.md shows how to find out"
 )
 
 
@@ -69,7 +69,7 @@ def decide(
     said = [] if printed is None else [Said(printed, "the printout's first line")]
     said += _by_headings(columns, findings)
     said += [] if printed is not None else _by_words(lines, table)
-    wanted = [Said(option, f"--convention {option}")] if option in (Convention.STANDARD, Convention.MODIFIED) else []
+    wanted = [Said(option, f"convention='{option}'")] if option in (Convention.STANDARD, Convention.MODIFIED) else []
     for one, other in itertools.pairwise([*wanted, *said]):
         if one.convention is not other.convention:
             message = f"{one.by} says {one.convention}, but {other.by} says {other.convention}"
@@ -79,8 +79,8 @@ def decide(
         return (wanted or said)[0].convention
     if _indexed_throughout(columns):
         findings.note(
-            "nothing but the headings' index i says the convention: it was read as standard; for a table after Craig "
-            "add '--convention modified'"
+            "nothing but the headings' index i says the convention: it was read as standard; a table after Craig is "
+            "modified"
         )
         return Convention.STANDARD
     findings.wrong(first, "", f"nothing says which convention the table is in; {_HOW}")

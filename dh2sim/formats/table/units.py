@@ -31,8 +31,8 @@ class Kind:
 
     units: type[AngleUnit] | type[LengthUnit]
     what: str
-    options: str
-    """The options that say the unit."""
+    arguments: str
+    """The arguments of an import that say the unit."""
     of_heading: Callable[[Heading], Unit | None]
     fits: Callable[[Unit, float], bool]
     """Whether a number without a unit may well be in the unit that other cells are marked with."""
@@ -57,14 +57,14 @@ class Number:
 ANGLES: Final = Kind(
     units=AngleUnit,
     what="an angle",
-    options="'--angle deg' or '--angle rad'",
+    arguments="angle='deg' or angle='rad'",
     of_heading=lambda heading: heading.angle,
     fits=lambda unit, value: (abs(value) > _TURN) is (unit is AngleUnit.DEG),
 )
 LENGTHS: Final = Kind(
     units=LengthUnit,
     what="a length",
-    options="'--length m' or '--length mm'",
+    arguments="length='m' or length='mm'",
     of_heading=lambda heading: heading.length,
     fits=lambda unit, value: unit is (LengthUnit.MM if abs(value) >= _LARGE else LengthUnit.M),
 )
@@ -136,7 +136,7 @@ def _by_themselves(kind: Kind, unmarked: Sequence[Number], marked: set[Unit], fi
         return LengthUnit.M
     first = unmarked[0]
     number = f"{shown(first.reading.cell.text)} is {kind.what}"
-    message = f"{number}, and nothing says in which unit; write the unit in the heading, or add {kind.options}"
+    message = f"{number}, and nothing says in which unit; write the unit in the heading, or pass {kind.arguments}"
     findings.wrong(first.reading.cell, first.path, message)
     return None
 
@@ -158,4 +158,4 @@ def _check(number: Number, option: Unit | None, findings: Findings) -> None:
     elif unit is not None and over not in (None, unit) and number.reading.value != 0.0:
         findings.wrong(cell, number.path, f"{shown(cell.text)} is in {unit}, but the heading {heading} says {over}")
     if option is not None and over not in (None, option):
-        findings.note(f"the heading {heading} says {over}; the option says {option}, and that was used")
+        findings.note(f"the heading {heading} says {over}; {option} was asked for, and used")

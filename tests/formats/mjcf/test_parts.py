@@ -225,7 +225,7 @@ def test_limits_dynamics_and_forces_are_carried_over(tmp_path: Path) -> None:
         assert note in robot.notes
 
 
-ADVICE = "no table has such. Choose --base or --tip so that the arm does without, or remove it"
+ADVICE = "no table can say that. Choose a base or tip that leaves it out, or remove it"
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ PLAIN = "| θ | d | a | α |\n" + ROWS
 CRAIG = "| θ_i | d_i | a_{i-1} | α_{i-1} |\n" + ROWS
 INDEXED = "| θ_i | d_i | a_i | α_i |\n" + ROWS
 UNKNOWN = (
-    "nothing says which convention the table is in; add '--convention standard' or '--convention modified'. Headings "
-    "a_(i-1), alpha_(i-1) would say modified; docs/conventions.md tells how to find out"
+    "nothing says which convention the table is in; pass convention='standard' or convention='modified'. Headings "
+    "a_(i-1), alpha_(i-1) would say modified; docs/conventions.md shows how to find out"
 )
 
 
@@ -66,8 +66,8 @@ def test_headings_of_index_i_throughout_are_read_as_standard_and_told() -> None:
     found = imported(INDEXED)
     assert found.spec.convention is Convention.STANDARD
     assert found.notes[-1] == (
-        "nothing but the headings' index i says the convention: it was read as standard; for a table after Craig add "
-        "'--convention modified'"
+        "nothing but the headings' index i says the convention: it was read as standard; a table after Craig is "
+        "modified"
     )
     assert imported(INDEXED, convention=Convention.MODIFIED).spec.convention is Convention.MODIFIED
     assert imported(f"After Craig\n\n{INDEXED}").spec.convention is Convention.MODIFIED
@@ -81,10 +81,10 @@ def test_the_option_says_it(convention: Convention) -> None:
 def test_what_contradicts_itself_is_refused_with_both_sides() -> None:
     end = "; correct the one that is wrong"
     assert complaints(CRAIG, convention=Convention.STANDARD) == [
-        f"t.md:1:3: --convention standard says standard, but the heading 'a_{{i-1}}' says modified{end}"
+        f"t.md:1:3: convention='standard' says standard, but the heading 'a_{{i-1}}' says modified{end}"
     ]
     assert complaints(f"Modified DH\n\n{PLAIN}", convention=Convention.STANDARD) == [
-        f"t.md:3:3: --convention standard says standard, but 'Modified' on line 1 says modified{end}"
+        f"t.md:3:3: convention='standard' says standard, but 'Modified' on line 1 says modified{end}"
     ]
     assert complaints(f"Standard DH\n\n{CRAIG}") == [
         f"t.md:3:3: the heading 'a_{{i-1}}' says modified, but 'Standard' on line 1 says standard{end}"

@@ -206,7 +206,7 @@ def test_the_tool_matrix_of_an_older_matlab_toolbox_is_read_in_the_unit_of_the_t
 def test_a_printout_in_centimetres_asks_for_the_unit() -> None:
     assert complaints(PINCHER_MATLAB) == [
         "t.md:6:27: row 1, d: '14' is a length, and nothing says in which unit; write the unit in the heading, or "
-        "add '--length m' or '--length mm'"
+        "pass length='m' or length='mm'"
     ]
 
 
@@ -226,6 +226,6 @@ def test_a_printout_that_lost_a_row_is_refused() -> None:
 
 def test_an_option_against_the_printout_is_refused() -> None:
     assert complaints(PUMA_MATLAB, convention=Convention.MODIFIED) == [
-        "t.md:6:3: --convention modified says modified, but the printout's first line says standard; correct the one "
+        "t.md:6:3: convention='modified' says modified, but the printout's first line says standard; correct the one "
         "that is wrong"
     ]

@@ -133,8 +133,9 @@ def test_the_ur5_of_its_maker_has_no_variables_marked_and_is_all_revolute() -> N
 
 def test_a_table_of_numbers_asks_for_its_convention() -> None:
     assert complaints(UR5, "ur5.csv") == [
-        "ur5.csv:1:1: nothing says which convention the table is in; add '--convention standard' or '--convention "
-        "modified'. Headings a_(i-1), alpha_(i-1) would say modified; docs/conventions.md tells how to find out"
+        "ur5.csv:1:1: nothing says which convention the table is in; pass convention='standard' or "
+        "convention='modified'. Headings a_(i-1), alpha_(i-1) would say modified; docs/conventions.md shows how to "
+        "find out"
     ]
 
 
@@ -169,8 +170,8 @@ def test_a_scara_between_tabs_with_q3_in_the_column_of_d() -> None:
     _check(SCARA, rows, q, "scara.tsv")
     assert imported(SCARA, "scara.tsv").notes == (
         "no unit of lengths is given: they were read in m",
-        "nothing but the headings' index i says the convention: it was read as standard; for a table after Craig add "
-        "'--convention modified'",
+        "nothing but the headings' index i says the convention: it was read as standard; a table after Craig is "
+        "modified",
     )
 
 
@@ -193,9 +194,9 @@ def test_a_kuka_in_mm_and_degrees_with_semicolons_and_decimal_commas() -> None:
 def test_a_students_table_without_units_asks_for_both() -> None:
     assert complaints(STUDENT) == [
         "t.md:4:24: row 1, d: '243.3' is a length, and nothing says in which unit; write the unit in the heading, or "
-        "add '--length m' or '--length mm'",
+        "pass length='m' or length='mm'",
         "t.md:5:14: row 2, theta: '90 + \\\\theta_2' is an angle, and nothing says in which unit; write the unit in "
-        "the heading, or add '--angle deg' or '--angle rad'",
+        "the heading, or pass angle='deg' or angle='rad'",
     ]
 
 

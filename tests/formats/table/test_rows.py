@@ -149,8 +149,8 @@ def test_an_offset_adds_to_the_coordinate() -> None:
     text = "theta,d,a,alpha,offset\n0,q1 + 0.1,1,0,0.2\n0,0,1,0,0.3\n"
     assert complaints(text, "t.csv", **STANDARD) == [
         "t.csv:3:9: row 2, offset: '0.3' is an angle, and nothing says in which unit; write the unit in the "
-        "heading, or add "
-        "'--angle deg' or '--angle rad'",
+        "heading, or pass "
+        "angle='deg' or angle='rad'",
         "t.csv:3:9: row 2, offset: an offset belongs to a joint's coordinate; this row is fixed",
     ]
     assert imported(text.replace("0.3", "0"), "t.csv", **STANDARD).spec.rows[0].d == pytest.approx(0.3)

@@ -42,7 +42,7 @@ def test_an_angle_without_a_unit_asks_for_it(alpha: str) -> None:
     assert complaints(_table(alpha), **STANDARD) == [
         f"t.md:3:16: row 1, alpha: '{alpha}' is an angle, and nothing says in which unit; write the unit in "
         "the heading, "
-        "or add '--angle deg' or '--angle rad'"
+        "or pass angle='deg' or angle='rad'"
     ]
 
 
@@ -50,8 +50,8 @@ def test_an_angle_without_a_unit_asks_for_it(alpha: str) -> None:
 def test_a_length_of_ten_and_more_without_a_unit_asks_for_it(a: str) -> None:
     assert complaints(_table("0", a), **STANDARD) == [
         f"t.md:3:12: row 1, a: '{a}' is a length, and nothing says in which unit; write the unit in the "
-        "heading, or add "
-        "'--length m' or '--length mm'"
+        "heading, or pass "
+        "length='m' or length='mm'"
     ]
 
 
@@ -74,8 +74,8 @@ def test_headings_say_the_unit_and_an_option_goes_before_them_and_is_told() -> N
     found = imported(text, **STANDARD, angle=RAD, length=M)
     assert numbers(found.spec) == [(0, 0, 400, 90)]
     assert found.notes == (
-        "the heading 'α (deg)' says deg; the option says rad, and that was used",
-        "the heading 'a [mm]' says mm; the option says m, and that was used",
+        "the heading 'α (deg)' says deg; rad was asked for, and used",
+        "the heading 'a [mm]' says mm; m was asked for, and used",
     )
 
 
@@ -92,7 +92,7 @@ def test_marked_cells_speak_for_the_others_where_these_fit() -> None:
         assert complaints(_table(alpha, theta=theta), **STANDARD) == [
             f"t.md:3:{len(theta) + 14}: row 1, alpha: '{alpha}' is an angle, and nothing says in which unit; "
             "write the unit "
-            "in the heading, or add '--angle deg' or '--angle rad'"
+            "in the heading, or pass angle='deg' or angle='rad'"
         ]
 
 
