@@ -21,7 +21,7 @@ from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
-from dh2sim.model.robot_model import RobotModel
+from dh2sim.model.robot_model import FilledIn, RobotModel
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Dynamics
 
 
@@ -232,6 +232,10 @@ class ExportReport:
     """Empty without verification."""
     losses: tuple[Loss, ...]
     """What the robot file says and the formats cannot hold."""
+    estimates: tuple[FilledIn, ...]
+    """Masses and inertias that were estimated from the shapes."""
+    assumptions: tuple[FilledIn, ...]
+    """Limits that were assumed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -287,6 +291,8 @@ def export_robot(
         ),
         verified=tuple(checks),
         losses=tuple(losses(model, formats)),
+        estimates=model.estimates,
+        assumptions=model.assumptions,
     )
 
 
