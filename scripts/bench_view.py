@@ -235,7 +235,7 @@ def _chain(joints: int) -> str:
 
 
 def _row(what: str, times: list[float], target: float | None) -> Row:
-    """Tell times, ms."""
+    """Notify times, ms."""
     middle, most = statistics.median(times), statistics.quantiles(times, n=10)[-1]
     met = None if target is None else middle <= target
     return what, f"{middle:.0f} ms (90 %: {most:.0f} ms)", "" if target is None else f"{target:.0f} ms", met

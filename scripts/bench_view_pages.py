@@ -96,9 +96,9 @@ def click(page: Page, rng: random.Random, seconds: float) -> int:
                 _choose(page, "convention[₀-₉]", rng.randrange(3))
             case _:
                 _tab(page, "Motion")
-                _choose(page, "Moved by", 1)
+                _choose(page, "Mode", 1)
                 time.sleep(rng.uniform(0.0, 1.0))
-                _choose(page, "Moved by", 0)
+                _choose(page, "Mode", 0)
     return count
 
 

@@ -18,32 +18,32 @@ if TYPE_CHECKING:
 
 DEFAULT_PORT = 8080
 NEVER = "never"
-"""When pages are shared over the open net."""
+"""The only value of --share."""
 
 
 def view(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file, or the name of a built-in robot.")],
     run: Annotated[
         Path | None,
-        typer.Argument(metavar="RUN.zarr", help="A run of that robot, to be played.", show_default=False),
+        typer.Argument(metavar="RUN.zarr", help="A run of that robot to play.", show_default=False),
     ] = None,
     port: Annotated[
-        int, typer.Option(min=1, max=65535, metavar="N", help="Port, or the next that is free.")
+        int, typer.Option(min=1, max=65535, metavar="N", help="Port, or the next free one.")
     ] = DEFAULT_PORT,
-    host: Annotated[str, typer.Option(help="Address to listen at. The default is this machine only.")] = "127.0.0.1",
-    share: Annotated[
-        str, typer.Option(metavar="never", help="Pages are never shared over the open net; viser's tunnel is off.")
-    ] = NEVER,
+    host: Annotated[
+        str, typer.Option(help="Address to listen at; by default only this machine can reach it.")
+    ] = "127.0.0.1",
+    share: Annotated[str, typer.Option(metavar="never", help="Pages are never shared over the internet.")] = NEVER,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
     export: Annotated[
-        Path | None, typer.Option(metavar="PAGE.html", help="Write a page that needs no server, and end.")
+        Path | None, typer.Option(metavar="PAGE.html", help="Write a page that needs no server, and exit.")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Let --export write over a file that exists.")] = False,
-    rollout: Annotated[int, typer.Option(help="Which rollout of the run is exported, from 0.")] = 0,
+    force: Annotated[bool, typer.Option("--force", help="Let --export replace an existing file.")] = False,
+    rollout: Annotated[int, typer.Option(help="Rollout of the run to export, from 0.")] = 0,
 ) -> None:
-    """See a robot in the browser: move its joints, edit its table, read its poses.
+    """Show a robot in the browser: move its joints, edit its table, read its poses.
 
-    Every page has a state of its own. Edits never touch the robot file; they can be saved as another. Ctrl-C ends it.
+    Every page has its own state. Edits never change the robot file, but can be saved as a new one. Stop with Ctrl-C.
 
     \b
     Examples:
@@ -55,12 +55,14 @@ def view(
     gc.enable()
     if share != NEVER:
         raise typer.BadParameter(
-            "pages are never shared over the open net; 'never' is all there is", param_hint="--share"
+            f"must be 'never', got {share!r}; pages are never shared over the internet", param_hint="--share"
         )
     if force and export is None:
-        raise typer.BadParameter("only with --export: nothing else is written", param_hint="--force")
+        raise typer.BadParameter("needs --export", param_hint="--force")
     if rollout != 0 and (export is None or run is None):
-        raise typer.BadParameter("only with a run and --export: the page lets one choose", param_hint="--rollout")
+        raise typer.BadParameter(
+            "needs a run and --export; a page lets you choose the rollout", param_hint="--rollout"
+        )
     require_free(export, force=force)
     from dh2sim.robot.read import load_robot
     from dh2sim.view.initial_state import folder_of, open_state
@@ -73,18 +75,18 @@ def view(
 
 
 def _serve(state: ViewState, run: Path | None, *, host: str, port: int, browser: bool) -> None:
-    """Serve pages until somebody ends it."""
-    from dh2sim.view.server import EVERY_ADDRESS, Viewer, free_port, is_private
+    """Serve pages until the program is interrupted."""
+    from dh2sim.view.server import ANY_ADDRESS, Viewer, free_port, is_local_only
 
     chosen = free_port(host, port)
     if chosen != port:
-        print(f"dh2sim: port {port} is taken; the page is at {chosen}", file=sys.stderr)
-    if not is_private(host):
-        where = "any of its addresses" if host in EVERY_ADDRESS else host
-        print(f"dh2sim: anyone who can reach this machine at {where} can open the page", file=sys.stderr)
+        print(f"dh2sim: port {port} is taken; using {chosen}", file=sys.stderr)
+    if not is_local_only(host):
+        address = "any of its addresses" if host in ANY_ADDRESS else host
+        print(f"dh2sim: anyone who can reach this machine at {address} can open the page", file=sys.stderr)
     viewer = Viewer(state, host=host, port=chosen, run=run)
     try:
-        print(f"{state.spec.name}: {viewer.url}  (Ctrl-C ends it)", flush=True)
+        print(f"{state.spec.name}: {viewer.url}  (stop with Ctrl-C)", flush=True)
         if browser:
             _open_browser(viewer)
         viewer.wait()
@@ -106,7 +108,7 @@ def _export(state: ViewState, run: Path | None, rollout: int, page: Path) -> Non
 
 
 def _open_browser(viewer: Viewer) -> None:
-    """Open the page, where there is a screen: else Python would start a browser in the terminal."""
+    """Open the page if there is a screen; without one, Python would start a browser in the terminal."""
     import webbrowser
 
     screen = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")

@@ -176,6 +176,22 @@ def joint_vectors(chain: KinematicChain, q: ArrayLike) -> tuple[Array, tuple[int
     return array.reshape(math.prod(batch), n), batch
 
 
+def joint_vector(chain: KinematicChain, q: ArrayLike) -> Array:
+    """Check a single joint vector.
+
+    Args:
+        chain: The robot.
+        q: Joint coordinates, rad and m, shape (n,).
+
+    Raises:
+        ConfigurationError: ``q`` has the wrong shape or is not finite.
+    """
+    vectors, batch = joint_vectors(chain, q)
+    if batch:
+        raise ConfigurationError(f"expected one joint vector of shape ({chain.n},), got shape {np.shape(q)}")
+    return np.asarray(vectors[0])
+
+
 def _numbers(q: ArrayLike) -> Array:
     """Return ``q`` as doubles; complex numbers, text and lists of unequal length are refused."""
     try:

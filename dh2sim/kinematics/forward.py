@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.errors import ConfigurationError, UnknownFrameError
+from dh2sim.errors import UnknownFrameError
 from dh2sim.kinematics.batch_frame import (
     BLOCK,
     BlockFrame,
@@ -23,7 +23,7 @@ from dh2sim.kinematics.batch_frame import (
     sines_and_cosines,
     write_column,
 )
-from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vectors
+from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vector, joint_vectors
 from dh2sim.kinematics.transforms import compose, identity, joint_part
 from dh2sim.typing import Array
 
@@ -109,10 +109,7 @@ def reference_joint_poses(chain: KinematicChain, q: ArrayLike) -> tuple[Array, .
     Raises:
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
-    vectors, batch = joint_vectors(chain, q)
-    if batch:
-        raise ConfigurationError(f"expected one joint vector of shape ({chain.n},), got shape {np.shape(q)}")
-    coordinates = iter(vectors[0].tolist())
+    coordinates = iter(joint_vector(chain, q).tolist())
     poses: list[Array] = []
     for joint in chain.joints:
         pose = compose(poses[-1], joint.T_parent_joint) if poses else joint.T_parent_joint

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
-from dh2sim.view.scene.pinhole import Sight
-from dh2sim.view.state import Ghost, Matrix, Mode, Part, Pull
+from dh2sim.view.scene.pinhole import Pinhole
+from dh2sim.view.state import Ghost, LinkDrag, Matrix, Mode, Part
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveJoint:
-    """Bring a joint to a coordinate, or as near as its limits allow."""
+    """Move a joint to a coordinate, as far as its limits allow."""
 
     joint: int
     """Of the moving joints, from 0."""
@@ -23,7 +23,7 @@ class MoveJoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetJoints:
-    """Bring all joints somewhere, or as near as their limits allow."""
+    """Move all joints, as far as their limits allow."""
 
     q: tuple[float, ...]
     """rad and m."""
@@ -31,7 +31,7 @@ class SetJoints:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nudge:
-    """Move a joint a step: 3 degrees, or 1 % of a sliding joint's travel."""
+    """Move a joint by a step: 3 degrees, or 1 % of a prismatic joint's travel."""
 
     joint: int
     """Of the moving joints, from 0."""
@@ -40,59 +40,59 @@ class Nudge:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetConfiguration:
-    """Take a configuration by its name: home, zero, or one of the robot file's."""
+    """Go to a configuration by its name: home, zero, or one of the robot file's."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RandomConfiguration:
-    """Take any configuration inside the limits."""
+    """Go to a random configuration inside the limits."""
 
     seed: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Follow:
-    """Show where a simulation or a recording has the joints; it may have passed their limits a little."""
+    """Show the joints where a simulation or a recording has them, perhaps slightly beyond their limits."""
 
     q: tuple[float, ...]
     """rad and m."""
     T_world_base_link: Matrix | None = None
-    """Where a recording has base_link; None where that stands still."""
-    leaps: bool = False
-    """Whether the way from where the joints were is left out: a recording begins, ends or is wound."""
+    """Pose of base_link in a recording; None if it does not move."""
+    jumps: bool = False
+    """Whether it is no motion from where the joints were: a recording starts, starts again or is searched."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetMode:
-    """Let somebody else move the joints."""
+    """Choose what moves the joints."""
 
     mode: Mode
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pause:
-    """Let the simulation or the recording stand, or go on."""
+    """Pause or continue the simulation or the recording."""
 
     on: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """Make a single time step of the simulation, or go to the recording's next instant; then stand."""
+    """Simulate one time step, or go to the recording's next time; then pause."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PullLink:
-    """Pull at a link of a simulated robot with the mouse, or go on so with the mouse elsewhere."""
+class DragLink:
+    """Drag a link of a simulated robot with the mouse."""
 
-    pull: Pull
+    drag: LinkDrag
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LetGo:
-    """Pull no more."""
+class ReleaseLink:
+    """Stop dragging."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +109,7 @@ class EditCell:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetConvention:
-    """Read the same numbers in another convention: the robot becomes another one."""
+    """Read the same numbers in another convention, which makes another robot of them."""
 
     row: int | None
     """From 0; None for all rows."""
@@ -118,14 +118,14 @@ class SetConvention:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConvertTable:
-    """Write the same robot's table in another convention: the numbers become others."""
+    """Write the table of the same robot in another convention, with other numbers."""
 
     convention: Convention
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetUnits:
-    """Write the table in other units; the robot stays the same."""
+    """Write the table of the same robot in other units."""
 
     angle: AngleUnit
     length: LengthUnit
@@ -133,31 +133,31 @@ class SetUnits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplaceText:
-    """Take another text for the robot file: the one opened at first, or one taken back."""
+    """Replace the text of the robot file, as by an earlier one."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpenText:
-    """Open another robot file, one that was uploaded or the one opened at first; its robot is at home."""
+    """Open another robot file, with its robot at home."""
 
     text: str | bytes = field(repr=False)
     """The file's content."""
     file: str
     """Its name, for messages."""
     folder: Path | None = None
-    """Where paths in it start; None of a file that was uploaded, which may name no files."""
+    """Where paths in it start; None for an uploaded file, which may name no files."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Undo:
-    """Take the last edit of the table back."""
+    """Undo the last edit of the table."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SelectRow:
-    """Choose the row that is edited, and explained."""
+    """Select the row that is edited and explained."""
 
     row: int
     """From 0."""
@@ -165,7 +165,7 @@ class SelectRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Show:
-    """Show or hide something."""
+    """Show or hide a part of the scene."""
 
     part: Part
     on: bool
@@ -187,11 +187,12 @@ class ChooseFrame:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveTool:
-    """Want the tool somewhere; ``q`` is what inverse kinematics found."""
+    """Move the tool towards a goal; ``q`` is the result of inverse kinematics."""
 
     T_base_link_tool0: Matrix
+    """The goal."""
     q: tuple[float, ...] | None
-    """rad and m; None where the robot stays as it is."""
+    """rad and m; None to leave the robot as it is."""
     reached: bool
 
 
@@ -203,20 +204,20 @@ class Compare:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CompareReading:
-    """Draw what the same table is in the other convention, or what an edit makes of it, beside the robot."""
+class CompareMisread:
+    """Draw the robot that the same table describes in the other convention."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Look:
-    """See the scene from elsewhere."""
+class SetCamera:
+    """Look at the scene from elsewhere."""
 
-    sight: Sight
+    pinhole: Pinhole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tell:
-    """Tell the user something; with an empty text, nothing any more."""
+class Notify:
+    """Show the user a notice; an empty one removes the last."""
 
     notice: str
 
@@ -231,8 +232,8 @@ Event: TypeAlias = (
     | SetMode
     | Pause
     | Step
-    | PullLink
-    | LetGo
+    | DragLink
+    | ReleaseLink
     | EditCell
     | SetConvention
     | ConvertTable
@@ -246,7 +247,7 @@ Event: TypeAlias = (
     | ChooseFrame
     | MoveTool
     | Compare
-    | CompareReading
-    | Look
-    | Tell
+    | CompareMisread
+    | SetCamera
+    | Notify
 )

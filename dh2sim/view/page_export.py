@@ -1,11 +1,7 @@
-"""A robot, still or moving, as one HTML file that opens without a server and without a network.
+"""A robot, still or moving, as one HTML file that needs neither a server nor a network.
 
-How much room scenes take.
-
-Scenes as one HTML page: viser's own page with what viser would have sent to it inside.
-
-viser's page is one file without references to others; a recording of what a server sends goes into it as
-base64, and is played back by the same code that draws for a server.
+viser's page is one file without references to others. A recording of what a server would send is embedded in it, and
+played back by the same code that draws for a server.
 """
 
 from __future__ import annotations
@@ -27,11 +23,11 @@ from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.messages import listed
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
-from dh2sim.view.scene.items import Arrow, Item, Label, Placed, Polyline, Quaternion, Scene, Solid, Triad, Vector
+from dh2sim.view.scene.items import Arrow, Item, Label, Placed, Polyline, Scene, Solid, Triad, Vector
+from dh2sim.view.scene.link_poses import triad_length
 from dh2sim.view.scene.painter import Painter
-from dh2sim.view.scene.robot_size import triad_length
-from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids
-from dh2sim.view.server import server_for_nobody
+from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids, rotation_matrix
+from dh2sim.view.server import recording_server
 
 if TYPE_CHECKING:
     import viser
@@ -40,8 +36,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Extent:
-    """A ball."""
+class BoundingSphere:
+    """A sphere."""
 
     centre: Vector
     """m."""
@@ -49,11 +45,11 @@ class Extent:
     """m, positive."""
 
 
-def extent_of(scenes: Iterable[Scene]) -> Extent:
-    """Return a ball around all that scenes hold; its centre is that of the box along base_link's axes.
+def bounding_sphere(scenes: Iterable[Scene]) -> BoundingSphere:
+    """Return a sphere around all items of scenes, with the centre of their box along base_link's axes.
 
     Args:
-        scenes: At least one, with at least one item; what carries others comes before them.
+        scenes: At least one, with at least one item; parents come before their children.
     """
     boxes: dict[int, Array] = {}
     corners = []
@@ -65,14 +61,14 @@ def extent_of(scenes: Iterable[Scene]) -> Extent:
     points = np.concatenate(corners)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     x, y, z = (float(value) for value in centre)
-    return Extent(centre=(x, y, z), radius=float(np.linalg.norm(points - centre, axis=1).max()) or 1.0)
+    return BoundingSphere(centre=(x, y, z), radius=float(np.linalg.norm(points - centre, axis=1).max()) or 1.0)
 
 
 def _box(item: Item, boxes: dict[int, Array]) -> Array:
-    """Return the corners of a box around an item, in its own frame, shape (8, 3)."""
+    """Return the corners of a box around an item in its own frame, shape (8, 3)."""
     match item:
         case Solid():
-            if id(item.vertices) not in boxes:  # solids share them from scene to scene
+            if id(item.vertices) not in boxes:  # scenes share them
                 boxes[id(item.vertices)] = _corners(np.array(item.vertices))
             return boxes[id(item.vertices)]
         case Polyline():
@@ -92,74 +88,60 @@ def _corners(points: Array) -> Array:
 
 def _pose(item: Item) -> Array:
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = _rotation(item.orientation), item.position
+    T[:3, :3], T[:3, 3] = rotation_matrix(item.orientation), item.position
     return T
 
 
-def _rotation(quaternion: Quaternion) -> Array:
-    """Return the rotation of a unit quaternion, shape (3, 3)."""
-    w, x, y, z = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
-_FIELD: Final = math.radians(40.0)
-"""How wide the camera sees, up and down."""
-_FROM: Final = (1.0, -1.25, 0.7)
-"""Where the camera is, seen from the middle."""
-_ROOM: Final = 1.05
-"""Around the extent."""
-_LAST: Final = 1.0 / 30.0
-"""s: how long the end of an animation stands, before it begins again."""
+_FIELD_OF_VIEW: Final = math.radians(40.0)
+"""From top to bottom, rad."""
+_DIRECTION: Final = (1.0, -1.25, 0.7)
+"""From the middle of the scene to the camera."""
+_MARGIN: Final = 1.05
+_LAST_FRAME: Final = 1.0 / 30.0
+"""s that the end of an animation is shown before it starts again."""
 _TITLE: Final = "<title>Viser</title>"
 
 
-def page_html(moments: Sequence[tuple[float, Scene]], *, title: str, extent: Extent) -> str:
-    """Return a page that needs nothing but a browser.
+def page_html(keyframes: Sequence[tuple[float, Scene]], *, title: str, bounds: BoundingSphere) -> str:
+    """Return scenes as an HTML page that needs nothing but a browser.
 
     Args:
-        moments: Times, s, ascending from 0, and what is seen then; a single one stands still, more are played again
-            and again, with a time slider.
+        keyframes: Times, s, ascending from 0, and scenes; more than one are played in a loop, with a time slider.
         title: Of the page.
-        extent: What the camera looks at first.
+        bounds: What the camera looks at first.
     """
-    with server_for_nobody() as server:
-        _look_at(server, extent)
-        _add_ground(server, extent)
+    with recording_server() as server:
+        _look_at(server, bounds)
+        _add_ground(server, bounds)
         painter = Painter(server.scene)
-        painter.draw(moments[0][1])
+        painter.draw(keyframes[0][1])
         recording = server.get_scene_serializer()
-        now = moments[0][0]
-        for time, scene in moments[1:]:
+        now = keyframes[0][0]
+        for time, scene in keyframes[1:]:
             recording.insert_sleep(time - now)
             painter.draw(scene)
             now = time
-        if len(moments) > 1:
-            recording.insert_sleep(_LAST)
+        if len(keyframes) > 1:
+            recording.insert_sleep(_LAST_FRAME)
         page = recording.as_html()
     return page.replace(_TITLE, f"<title>{html.escape(title)}</title>", 1)
 
 
-def _look_at(server: viser.ViserServer, extent: Extent) -> None:
-    distance = _ROOM * extent.radius / math.sin(0.5 * _FIELD)
-    direction = np.array(_FROM) / np.linalg.norm(_FROM)
+def _look_at(server: viser.ViserServer, bounds: BoundingSphere) -> None:
+    distance = _MARGIN * bounds.radius / math.sin(0.5 * _FIELD_OF_VIEW)
+    direction = np.array(_DIRECTION) / np.linalg.norm(_DIRECTION)
     camera = server.initial_camera
-    camera.look_at = extent.centre
-    camera.position = np.array(extent.centre) + distance * direction
-    camera.fov = _FIELD
+    camera.look_at = bounds.centre
+    camera.position = np.array(bounds.centre) + distance * direction
+    camera.fov = _FIELD_OF_VIEW
     camera.near, camera.far = 0.01 * distance, 100.0 * distance
 
 
-def _add_ground(server: viser.ViserServer, extent: Extent) -> None:
-    """Add a grid of a round number of metres on the ground, below the middle of what is seen."""
-    cell = _round_length(extent.radius / 4.0)
+def _add_ground(server: viser.ViserServer, bounds: BoundingSphere) -> None:
+    """Add a grid of a round number of metres on the ground, below the middle of the scene."""
+    cell = _round_length(bounds.radius / 4.0)
     side = 20.0 * cell
-    x, y = (5.0 * cell * round(value / (5.0 * cell)) for value in extent.centre[:2])
+    x, y = (5.0 * cell * round(value / (5.0 * cell)) for value in bounds.centre[:2])
     server.scene.add_grid(
         "/ground", width=side, height=side, cell_size=cell, section_size=5.0 * cell, position=(x, y, 0.0)
     )
@@ -171,35 +153,35 @@ def _round_length(length: float) -> float:
     return max(step for step in (1.0, 2.0, 5.0) if step * unit <= length) * unit
 
 
-RATE = 30.0
-"""Pictures a second of an animation, at most."""
-MOST_PICTURES = 1800
-"""Longer animations have fewer pictures a second."""
-_MEASURED = 60
-"""Pictures that the extent of an animation is measured in."""
+MAX_FRAME_RATE = 30.0
+"""Of an animation, 1/s."""
+MAX_FRAMES = 1800
+"""Longer animations have a lower frame rate."""
+_FRAMES_MEASURED = 60
+"""Frames that the bounds of an animation are computed from."""
 _ROBOT = "/robot"
 
 
 def export_page(model: RobotModel, q: ArrayLike, path: Path, *, rollout: RolloutData | None = None) -> None:
-    """Write a page that shows a robot with its DH frames; the eye can go around it, and parts can be hidden.
+    """Write a page that shows a robot with its DH frames, from all sides and with a list of parts to hide.
 
     Args:
         model: The robot.
-        q: Where it stands, rad and m, shape (n,).
-        path: Of the file; one that stands there is replaced.
-        rollout: Shown instead of ``q``, again and again, with a time slider, a pause and a choice of speeds.
+        q: Joint vector, rad and m, shape (n,).
+        path: Of the file, which is replaced if it exists.
+        rollout: Shown instead of ``q``, in a loop, with a time slider, a pause and a choice of speeds.
 
     Raises:
-        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
-        PictureError: Positions were not recorded in the rollout, or it is one of a robot with other joints.
-        OutputError: The file cannot be written; what stood there before stands untouched.
+        ConfigurationError: ``q`` has the wrong shape or is not finite.
+        PictureError: Positions were not recorded in the rollout, or it is of a robot with other joints.
+        OutputError: The file cannot be written; one that existed is unchanged.
     """
-    moments = [(0.0, robot_page_scene(model, q))] if rollout is None else list(rollout_moments(model, rollout))
-    chosen = {round(k) for k in np.linspace(0, len(moments) - 1, min(len(moments), _MEASURED))}
-    extent = extent_of([moments[k][1] for k in sorted(chosen)])
-    html = page_html(moments, title=model.name, extent=extent)
-    with atomic_file(path) as draft:
-        draft.write_text(html, encoding="utf-8")
+    keyframes = [(0.0, robot_page_scene(model, q))] if rollout is None else list(rollout_keyframes(model, rollout))
+    chosen = {round(k) for k in np.linspace(0, len(keyframes) - 1, min(len(keyframes), _FRAMES_MEASURED))}
+    bounds = bounding_sphere([keyframes[k][1] for k in sorted(chosen)])
+    html = page_html(keyframes, title=model.name, bounds=bounds)
+    with atomic_file(path) as temporary:
+        temporary.write_text(html, encoding="utf-8")
 
 
 def robot_page_scene(model: RobotModel, q: ArrayLike, base: Placed | None = None) -> Scene:
@@ -208,24 +190,24 @@ def robot_page_scene(model: RobotModel, q: ArrayLike, base: Placed | None = None
     Args:
         model: The robot.
         q: Joint vector, rad and m, shape (n,).
-        base: Where base_link is.
+        base: Pose of base_link.
 
     Raises:
-        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
+        ConfigurationError: ``q`` has the wrong shape or is not finite.
     """
     items: dict[str, Item] = {**robot_solids(model, q, _ROBOT), _ROBOT: base or Placed()}
     length = triad_length(model)
     for number, (link, frame, text, T) in enumerate(_carried(model.chain)):
         name = f"{_ROBOT}/{link}/{frame}"
         items[name] = Triad(position=position_of(T), orientation=orientation_of(T), length=length)
-        # beyond the end of z, where frames with a common origin are apart; neighbours may have z in common too
+        # beyond the end of z, where frames of one origin are apart; neighbours may share z, too
         height = (1.15 + 0.3 * (number % 2)) * length
         items[f"{name}/name"] = Label(text=text, position=(0.0, 0.0, height))
     return items
 
 
 def _carried(chain: KinematicChain) -> list[tuple[str, str, str, Array]]:
-    """Return the frames that are shown: the link that carries each, its name, its label, and its pose in the link."""
+    """Return for each frame the link that carries it, its name, its label, and its pose in the link."""
     carried = [("base_link", "dh_0", "dh_0", chain.T_base_link_dh0)]
     carried += [
         (f"link_{i}", f"dh_{i}", f"dh_{i}", joint.T_joint_dh) for i, joint in enumerate(chain.joints, start=1)
@@ -236,13 +218,13 @@ def _carried(chain: KinematicChain) -> list[tuple[str, str, str, Array]]:
     return [*carried, (link, "tool0", "tool0", compose(T, chain.T_dhn_tool0))]
 
 
-def rollout_moments(model: RobotModel, rollout: RolloutData) -> Iterator[tuple[float, Scene]]:
-    """Yield times, s, from 0, and scenes of a rollout: some of what was recorded, and nothing in between."""
+def rollout_keyframes(model: RobotModel, rollout: RolloutData) -> Iterator[tuple[float, Scene]]:
+    """Yield times, s, from 0, and scenes of a rollout at recorded times."""
     rollout.require("qpos", what="a page")
-    here, there = [joint.name for joint in model.moving_joints], rollout.names("joint")
-    if here != there:
+    own, recorded = [joint.name for joint in model.moving_joints], rollout.names("joint")
+    if own != recorded:
         raise PictureError(
-            f"{rollout.label} is of a robot with the joints {listed(there)}; {model.name} has {listed(here)}"
+            f"{rollout.label} is of a robot with the joints {listed(recorded)}; {model.name} has {listed(own)}"
         )
     time, qpos = rollout.values("time"), rollout.values("qpos")
     bases = rollout.values("base_pose") if "base_pose" in rollout.data else None
@@ -252,9 +234,9 @@ def rollout_moments(model: RobotModel, rollout: RolloutData) -> Iterator[tuple[f
 
 
 def shown_records(time: Array) -> list[int]:
-    """Return which records are shown, of those at ``time``, s, ascending, shape (count,): first and last at least."""
+    """Return which of the records at ``time``, s, ascending, shape (count,), are shown, including first and last."""
     duration = float(time[-1] - time[0])
-    count = min(math.ceil(duration * RATE) + 1, MOST_PICTURES, len(time))
+    count = min(math.ceil(duration * MAX_FRAME_RATE) + 1, MAX_FRAMES, len(time))
     places = np.interp(np.linspace(time[0], time[-1], count), time, np.arange(len(time)))
     return sorted({round(place) for place in places.tolist()} | {0, len(time) - 1})
 

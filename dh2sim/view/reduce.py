@@ -1,9 +1,4 @@
-"""What comes of a page when something happens: a pure function, which never raises.
-
-Edits of the table can be taken back, one after the other.
-
-Where tool0 has been.
-"""
+"""The next state of a page after an event: a pure function, which never raises."""
 
 from __future__ import annotations
 
@@ -20,69 +15,69 @@ from dh2sim.messages import shown as shown_word
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.view import events
 from dh2sim.view.events import EditCell, Event, OpenText, Undo
+from dh2sim.view.initial_state import open_text
 from dh2sim.view.scene.items import Vector
 from dh2sim.view.scene.solids import position_of
-from dh2sim.view.state import IDENTITY, Goal, Matrix, Mode, Part, Pull, ViewState, configurations, within
-from dh2sim.view.table_edits import reading_of, replaced, table_changed
-from dh2sim.view.uploads import opened
+from dh2sim.view.state import IDENTITY, Goal, LinkDrag, Matrix, Mode, Part, ViewState, configurations, within
+from dh2sim.view.table_edits import misread_ghost, replaced, table_changed
 
-MOST: Final = 100
-"""Edits that can be taken back."""
-MOST_LETTERS: Final = 4_000_000
-"""Of all the robot files that are kept for that."""
+MAX_UNDO: Final = 100
+"""Edits that can be undone."""
+MAX_UNDO_LENGTH: Final = 4_000_000
+"""Characters of all texts that are kept for that."""
 
 
-def remembered(before: ViewState, event: Event, after: ViewState) -> ViewState:
-    """Return the state ``after`` an event, from which one can return to the robot file of ``before``.
+def with_undo(before: ViewState, event: Event, after: ViewState) -> ViewState:
+    """Return the state ``after`` an event, in which the edit can be undone.
 
-    What is typed into one cell, letter by letter, is one edit. Another file begins anew.
+    All typing into one cell is one edit. Opening a file is no edit.
     """
     if isinstance(event, Undo | OpenText) or after.text == before.text:
         return after
     cell = (event.row, event.column) if isinstance(event, EditCell) else None
-    if cell is not None and cell == before.typed:
+    if cell is not None and cell == before.edited_cell:
         return after
-    return replace(after, earlier=_bounded((*before.earlier, before.text)), typed=cell)
+    return replace(after, undo_texts=_bounded((*before.undo_texts, before.text)), edited_cell=cell)
 
 
-def undone(state: ViewState) -> ViewState:
-    """Return the state with the robot file of before the last edit, if there is one."""
-    if not state.earlier:
-        return replace(state, notice="There is no edit to take back.")
-    after = replaced(state, state.earlier[-1])
-    return after if after.text == state.text else replace(after, earlier=state.earlier[:-1], typed=None)
+def undo(state: ViewState) -> ViewState:
+    """Return the state with the robot file before the last edit, if there is one."""
+    if not state.undo_texts:
+        return replace(state, notice="Nothing to undo.")
+    after = replaced(state, state.undo_texts[-1])
+    return after if after.text == state.text else replace(after, undo_texts=state.undo_texts[:-1], edited_cell=None)
 
 
 def _bounded(texts: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the last of the texts, as many as are kept."""
-    kept = texts[-MOST:]
-    while len(kept) > 1 and sum(map(len, kept)) > MOST_LETTERS:
+    """Return the last texts, as many as are kept."""
+    kept = texts[-MAX_UNDO:]
+    while len(kept) > 1 and sum(map(len, kept)) > MAX_UNDO_LENGTH:
         kept = kept[1:]
     return kept
 
 
-LONGEST: Final = 2000
-"""Points: older ones are forgotten."""
+MAX_TRACE_POINTS: Final = 2000
+"""Older points are dropped."""
 _NEAR: Final = 1e-3
-"""Points nearer to the last one than this share of the reach are left out."""
+"""Points nearer to the last one than this share of the reach are not added."""
 
 
-def traced(before: ViewState, after: ViewState) -> ViewState:
-    """Return the state ``after`` with the way of tool0, in the world, since ``before``; none where it is not shown.
+def with_trace(before: ViewState, after: ViewState) -> ViewState:
+    """Return the state ``after`` with the path of tool0 in the world extended, or empty while it is not shown.
 
-    Another robot begins another trace, and so does a base that goes where it was before a recording.
+    Another robot starts another trace, and so does a floating base that returns from a recording.
     """
     moved = after.T_world_base_link != before.T_world_base_link
-    brought_back = moved and after.mode is not before.mode
-    if Part.TRACE not in after.shown or after.model is not before.model or brought_back:
+    returned = moved and after.mode is not before.mode
+    if Part.TRACE not in after.shown or after.model is not before.model or returned:
         return replace(after, trace=()) if after.trace else after
     if after.q == before.q and not moved and after.trace:
         return after
     points = after.trace or (_tool(before),)
-    place = _tool(after)
-    if math.dist(points[-1], place) <= _NEAR * (after.model.reach or 1.0):
+    position = _tool(after)
+    if math.dist(points[-1], position) <= _NEAR * (after.model.reach or 1.0):
         return after if after.trace else replace(after, trace=points)
-    return replace(after, trace=(*points, place)[-LONGEST:])
+    return replace(after, trace=(*points, position)[-MAX_TRACE_POINTS:])
 
 
 def _tool(state: ViewState) -> Vector:
@@ -92,22 +87,22 @@ def _tool(state: ViewState) -> Vector:
     return position_of(compose(np.array(state.T_world_base_link), T_base_tool))
 
 
-TURN_STEP = math.radians(3.0)
-"""rad: of a nudge."""
-SLIDE_STEP = 0.01
-"""Of a nudge, as a share of the travel."""
+NUDGE_ANGLE = math.radians(3.0)
+"""rad."""
+NUDGE_SHARE = 0.01
+"""Of a prismatic joint's travel."""
 
 
 def reduce(state: ViewState, event: events.Event) -> ViewState:
-    """Return the state after an event; what is impossible changes nothing but the notice and the marks of cells.
+    """Return the state after an event; an impossible one changes nothing but the notice and the errors of cells.
 
     Args:
-        state: What the page shows.
-        event: What happens. Numbers may be anything, rows and joints may not exist.
+        state: The state before.
+        event: Its numbers may be anything; its rows and joints need not exist.
     """
-    after = remembered(state, event, _reduced(state, event))
-    leaps = isinstance(event, events.Follow) and event.leaps
-    return traced(after, replace(after, trace=())) if leaps else traced(state, after)
+    after = with_undo(state, event, _reduced(state, event))
+    jumps = isinstance(event, events.Follow) and event.jumps
+    return with_trace(after, replace(after, trace=())) if jumps else with_trace(state, after)
 
 
 def _reduced(state: ViewState, event: events.Event) -> ViewState:
@@ -117,40 +112,40 @@ def _reduced(state: ViewState, event: events.Event) -> ViewState:
         case events.ReplaceText(text=text):
             return replaced(state, text)
         case events.Undo():
-            return undone(state)
+            return undo(state)
         case events.OpenText():
-            return opened(state, event)
+            return open_text(state, event)
         case events.Show(part=part, on=on):
-            goal = None if part is Part.HANDLE else state.goal  # a handle appears at tool0
+            goal = None if part is Part.HANDLE else state.goal  # a new handle is at tool0
             return replace(state, shown=state.shown | {part} if on else state.shown - {part}, goal=goal)
         case events.ShowAngles(unit=unit):
             return replace(state, angle=unit)
         case events.SelectRow(row=row):
-            return replace(state, selected_row=row) if 0 <= row < len(state.draft.rows) else state
+            return replace(state, selected_row=row) if 0 <= row < len(state.table.rows) else state
         case events.ChooseFrame(name=name):
             return replace(state, frame=name) if name in frame_names(state.model.chain) else state
         case events.Compare(ghost=ghost):
             return replace(state, ghost=ghost)
-        case events.CompareReading():
-            return replace(state, ghost=reading_of(state.model))
-        case events.Look(sight=sight):
-            return replace(state, sight=sight) if sight.is_usable else state
-        case events.Tell(notice=notice):
+        case events.CompareMisread():
+            return replace(state, ghost=misread_ghost(state.model))
+        case events.SetCamera(pinhole=pinhole):
+            return replace(state, pinhole=pinhole) if pinhole.is_usable else state
+        case events.Notify(notice=notice):
             return replace(state, notice=notice)
         case events.SetMode(mode=mode):
-            # a simulation may have left the limits by a hair
+            # a simulation may have left the limits slightly
             q = within(state.model, state.q)
             target = q if mode is Mode.PHYSICS else None
-            begun = replace(state, mode=mode, q=q, target=target, goal=None, paused=False, steps=0, pull=None)
-            return replace(begun, T_world_base_link=IDENTITY)
+            started = replace(state, mode=mode, q=q, target=target, goal=None, paused=False, steps=0, drag=None)
+            return replace(started, T_world_base_link=IDENTITY)
         case events.Pause(on=on):
-            return state if state.mode is Mode.STILL else replace(state, paused=on)
+            return state if state.mode is Mode.MANUAL else replace(state, paused=on)
         case events.Step():
-            return state if state.mode is Mode.STILL else replace(state, paused=True, steps=state.steps + 1)
-        case events.PullLink(pull=pull):
-            return replace(state, pull=pull) if _can_be_pulled(state, pull) else state
-        case events.LetGo():
-            return replace(state, pull=None)
+            return state if state.mode is Mode.MANUAL else replace(state, paused=True, steps=state.steps + 1)
+        case events.DragLink(drag=drag):
+            return replace(state, drag=drag) if _can_be_dragged(state, drag) else state
+        case events.ReleaseLink():
+            return replace(state, drag=None)
         case _:
             return _moved(state, event)
 
@@ -167,27 +162,27 @@ _Motion = (
 
 
 def _moved(state: ViewState, event: _Motion) -> ViewState:
-    model, q = state.model, state.wanted
+    model, q = state.model, state.commanded
     match event:
         case events.MoveJoint(joint=joint, value=value):
             return _at(state, _exchanged(q, joint, value))
-        case events.SetJoints(q=wanted):
-            return _at(state, wanted)
+        case events.SetJoints(q=given):
+            return _at(state, given)
         case events.Nudge(joint=joint, direction=direction):
             return _at(state, _nudged(state, joint, direction))
         case events.SetConfiguration(name=name):
             named = configurations(model)
             if name in named:
                 return _at(state, named[name])
-            return replace(state, notice=f"There is no configuration {shown_word(name)}.")
+            return replace(state, notice=f"Unknown configuration {shown_word(name)}.")
         case events.RandomConfiguration(seed=seed):
             (drawn,) = random_configurations(*model.travel, 1, abs(seed)).tolist()
             return _at(state, tuple(drawn))
-        case events.Follow(q=seen, T_world_base_link=base):
-            usable = state.mode is not Mode.STILL and _fits(model, seen)
-            return replace(state, q=tuple(seen), T_world_base_link=_base(state, base)) if usable else state
+        case events.Follow(q=shown, T_world_base_link=base):
+            usable = state.mode is not Mode.MANUAL and _fits(model, shown)
+            return replace(state, q=tuple(shown), T_world_base_link=_base(state, base)) if usable else state
         case events.MoveTool(T_base_link_tool0=T, q=found, reached=reached):
-            if state.mode is not Mode.STILL:
+            if state.mode is not Mode.MANUAL:
                 return state
             moved = state if found is None else _at(state, found, keep_goal=True)
             return replace(moved, goal=Goal(T_base_link_tool0=T, reached=reached))
@@ -196,7 +191,7 @@ def _moved(state: ViewState, event: _Motion) -> ViewState:
 
 
 def _at(state: ViewState, q: tuple[float, ...], *, keep_goal: bool = False) -> ViewState:
-    """Return the state with the joints somewhere; a simulation is told to bring them there, a recording is not."""
+    """Return the state with the joints at ``q``, which is the target of a simulation; a recording is not changed."""
     if state.mode is Mode.REPLAY or not _fits(state.model, q):
         return state
     if state.mode is Mode.PHYSICS:
@@ -204,11 +199,11 @@ def _at(state: ViewState, q: tuple[float, ...], *, keep_goal: bool = False) -> V
     return replace(state, q=within(state.model, q), goal=state.goal if keep_goal else None, notice="")
 
 
-def _can_be_pulled(state: ViewState, pull: Pull) -> bool:
-    """Whether a robot is simulated that has the link, and all numbers are finite."""
+def _can_be_dragged(state: ViewState, drag: LinkDrag) -> bool:
+    """Return whether a robot with that link is simulated, and all numbers are finite."""
     links = {link.name for link in state.model.links}
-    finite = all(math.isfinite(value) for value in (*pull.point_in_link, *pull.target))
-    return state.mode is Mode.PHYSICS and pull.link in links and finite
+    finite = all(math.isfinite(value) for value in (*drag.point_in_link, *drag.target))
+    return state.mode is Mode.PHYSICS and drag.link in links and finite
 
 
 def _fits(model: RobotModel, q: tuple[float, ...]) -> bool:
@@ -216,7 +211,7 @@ def _fits(model: RobotModel, q: tuple[float, ...]) -> bool:
 
 
 def _base(state: ViewState, T: Matrix | None) -> Matrix:
-    """Return where base_link is, given where a recording has it; nobody else can move it."""
+    """Return the pose of base_link, which only a recording can move."""
     if T is None or state.mode is not Mode.REPLAY:
         return IDENTITY
     return T if all(math.isfinite(value) for row in T for value in row) else state.T_world_base_link
@@ -228,8 +223,8 @@ def _exchanged(q: tuple[float, ...], joint: int, value: float) -> tuple[float, .
 
 def _nudged(state: ViewState, joint: int, direction: int) -> tuple[float, ...]:
     if not 0 <= joint < len(state.q):
-        return state.wanted
+        return state.commanded
     moving = state.model.moving_joints[joint]
     lower, upper = moving.travel
-    step = TURN_STEP if moving.joint.type.turns else SLIDE_STEP * (upper - lower)
-    return _exchanged(state.wanted, joint, state.wanted[joint] + math.copysign(step, direction))
+    step = NUDGE_ANGLE if moving.joint.type.turns else NUDGE_SHARE * (upper - lower)
+    return _exchanged(state.commanded, joint, state.commanded[joint] + math.copysign(step, direction))

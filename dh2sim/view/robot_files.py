@@ -1,7 +1,4 @@
-"""What a page does with files: opens and compares robots, and hands out what was made of them.
-
-Files that a page hands out; models are compared with the table first, as in any export.
-"""
+"""What a page does with files: it opens robots, compares them, and offers models for download."""
 
 from __future__ import annotations
 
@@ -14,46 +11,45 @@ from pathlib import Path
 
 from dh2sim.export import Format, render, verify
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.view.events import Compare, Event, OpenText, ReplaceText, Tell
-from dh2sim.view.initial_state import builtin_ghost, is_same_file
+from dh2sim.view.events import Compare, Event, Notify, OpenText, ReplaceText
+from dh2sim.view.initial_state import builtin_ghost, is_same_file, uploaded_ghost
 from dh2sim.view.state import ViewState
-from dh2sim.view.uploads import uploaded_ghost
 
-_ENDINGS = {Format.URDF: "urdf", Format.MJCF: "xml"}
+_SUFFIXES = {Format.URDF: "urdf", Format.MJCF: "xml"}
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-"""The least time that a ZIP archive can hold: the same robot gives the same bytes."""
+"""The earliest time that a ZIP archive can hold, so that the same robot gives the same bytes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Download:
-    """A file for the user to keep."""
+    """A file for download."""
 
     name: str
     data: bytes = field(repr=False)
     summary: str
-    """What was found when it was compared with the table."""
+    """Result of the comparison with the table."""
 
 
-def model_file(model: RobotModel, wanted: Format) -> Download:
-    """Return a robot's URDF or MJCF, compared with its table; in an archive where there are meshes with it.
+def model_file(model: RobotModel, kind: Format) -> Download:
+    """Return a robot's URDF or MJCF, verified against its table; in an archive if it has meshes.
 
     Args:
         model: The robot.
-        wanted: Which.
+        kind: Which of them.
 
     Raises:
         ModelError: The format cannot hold the robot.
         EngineError: MuJoCo refuses the file.
         MismatchError: The file's poses differ from the table's.
     """
-    files = render(model, [wanted])
+    files = render(model, [kind])
     with tempfile.TemporaryDirectory() as folder:
         write_files(files, Path(folder))
-        (result,) = verify(model, Path(folder), [wanted])
-    summary = f"off the table by at most {result.position_error:.1e} m and {result.rotation_error:.1e} rad"
-    name = f"{model.name}.{_ENDINGS[wanted]}"
+        (result,) = verify(model, Path(folder), [kind])
+    summary = f"largest difference to the table {result.position_error:.1e} m, {result.rotation_error:.1e} rad"
+    name = f"{model.name}.{_SUFFIXES[kind]}"
     if any(link.mesh is not None for link in model.all_links):
-        return Download(name=f"{model.name}-{wanted.value}.zip", data=_archive(files), summary=summary)
+        return Download(name=f"{model.name}-{kind.value}.zip", data=_archive(files), summary=summary)
     return Download(name=name, data=files[name], summary=summary)
 
 
@@ -74,76 +70,76 @@ def _archive(files: dict[str, bytes]) -> bytes:
 
 
 class RobotFiles:
-    """Each call in its turn, on the page's own thread."""
+    """The file actions of a page; used on the page's thread alone."""
 
     def __init__(
         self,
         state: Callable[[], ViewState],
         apply: Callable[[Event], None],
-        hand_out: Callable[[str, bytes], None],
-        exchanged: Callable[[], None],
+        download: Callable[[str, bytes], None],
+        on_open: Callable[[], None],
     ) -> None:
-        """Keep what is needed.
+        """Remember the robot file that was opened first.
 
         Args:
-            state: Returns the page's state; that of now is what can be returned to.
-            apply: Lets an event happen now.
-            hand_out: Gives the user a file, by its name and its content.
-            exchanged: Called when another robot file is shown.
+            state: Returns the page's state.
+            apply: Applies an event at once.
+            download: Offers a file for download, given its name and content.
+            on_open: Called when another robot file is shown.
         """
         self._state = state
         self._apply = apply
-        self._hand_out = hand_out
-        self._exchanged = exchanged
-        self._opened = state()
+        self._download = download
+        self._on_open = on_open
+        self._initial = state()
 
     def save(self) -> None:
-        """Hand out the robot file as it is edited."""
+        """Offer the robot file as edited."""
         state = self._state()
-        self._hand_out(f"{state.spec.name}.yaml", state.text.encode())
+        self._download(f"{state.spec.name}.yaml", state.text.encode())
 
-    def export(self, wanted: Format) -> None:
-        """Hand out a model, compared with the table before.
+    def export(self, kind: Format) -> None:
+        """Offer a model that was verified against the table.
 
         Raises:
             Dh2simError: It cannot be made, or does not match.
         """
-        made = model_file(self._state().model, wanted)
-        self._hand_out(made.name, made.data)
-        self._apply(Tell(notice=f"{made.name}: {made.summary}."))
+        made = model_file(self._state().model, kind)
+        self._download(made.name, made.data)
+        self._apply(Notify(notice=f"{made.name}: {made.summary}."))
 
     def open(self, text: bytes, file: str) -> None:
-        """Open a robot file that was uploaded, given its content and its name."""
-        self._exchange(OpenText(text=text, file=file))
+        """Open an uploaded robot file, given its content and its name."""
+        self._open(OpenText(text=text, file=file))
 
-    def back(self) -> None:
-        """Return to the robot file that was opened at first."""
-        opened = self._opened
-        if is_same_file(self._state(), opened):
-            self._apply(ReplaceText(text=opened.text))
+    def reopen(self) -> None:
+        """Return to the robot file that was opened first."""
+        initial = self._initial
+        if is_same_file(self._state(), initial):
+            self._apply(ReplaceText(text=initial.text))
         else:
-            self._exchange(OpenText(text=opened.text, file=opened.file, folder=opened.folder))
+            self._open(OpenText(text=initial.text, file=initial.file, folder=initial.folder))
 
     def compare(self, robot: str) -> None:
-        """Draw a robot that comes with dh2sim, given its name, beside the one that is shown.
+        """Draw a built-in robot, given its name, as the ghost.
 
         Raises:
-            Dh2simError: There is no such robot.
+            Dh2simError: The robot is unknown.
         """
         self._apply(Compare(ghost=builtin_ghost(robot)))
 
     def compare_uploaded(self, text: bytes, file: str) -> None:
-        """Draw the robot of a file that was uploaded beside the one that is shown.
+        """Draw the robot of an uploaded file as the ghost.
 
         Raises:
-            Dh2simError: The file is wrong.
+            Dh2simError: The file is invalid.
         """
         self._apply(Compare(ghost=uploaded_ghost(text, file)))
-        self._apply(Tell(notice=""))
+        self._apply(Notify(notice=""))
 
-    def _exchange(self, event: OpenText) -> None:
-        """Show another robot, unless its file is wrong."""
+    def _open(self, event: OpenText) -> None:
+        """Show another robot, unless its file is invalid."""
         before = self._state().model
         self._apply(event)
         if self._state().model is not before:
-            self._exchanged()
+            self._on_open()

@@ -1,6 +1,6 @@
-"""The web server: a page for every browser that comes, each with a state of its own.
+"""The web server: a page for every browser that connects, each with its own state.
 
-viser's server, without its own words, and without its way to the open net.
+It is viser's, without its messages, and without its tunnel to the internet.
 """
 
 from __future__ import annotations
@@ -31,54 +31,50 @@ if TYPE_CHECKING:
 
     from dh2sim.view.motion.replay import Replay
 
+LOOPBACK: Final = ("127.0.0.1", "localhost", "::1")
+ANY_ADDRESS: Final = ("0.0.0.0", "::")
+"""Listening at these means at all addresses of this machine."""
+PORTS_TRIED: Final = 100
+STOP_TIMEOUT: Final = 5.0
+"""s that a page may take to end."""
 
-def quiet_server(host: str, port: int) -> viser.ViserServer:
-    """Start a server; viser's own words about it are dropped."""
+
+def start_server(host: str, port: int) -> viser.ViserServer:
+    """Start a viser server that prints nothing and never shares its pages."""
     import viser
-    from viser import _messages
 
-    # pages notice by themselves that their browser is gone
+    # pages detect by themselves that their browser is gone
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection", category=UserWarning)
-    logging.getLogger("websockets.server").addFilter(_is_worth_telling)
-    with contextlib.redirect_stdout(io.StringIO()):  # it tells its address, whether it is asked to or not
+    logging.getLogger("websockets.server").addFilter(_is_worth_logging)
+    with contextlib.redirect_stdout(io.StringIO()):  # it prints its address even if it is not verbose
         server = viser.ViserServer(host=host, port=port, verbose=False)
     server.request_share_url = _refuse_to_share  # type: ignore[method-assign]
-    for message in (_messages.FileTransferStartUpload, _messages.FileTransferPart):
-        server.gui._websock_interface.unregister_handler(message)  # every page takes its own files
     return server
 
 
-def stop_quietly(server: viser.ViserServer) -> None:
-    """Stop a server; viser's last words are dropped."""
+def stop_server(server: viser.ViserServer) -> None:
+    """Stop a server; it prints nothing."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
 
 
 @contextlib.contextmanager
-def server_for_nobody() -> Iterator[viser.ViserServer]:
-    """Give a server that nobody is told of: viser records only what a server sends."""
-    server = quiet_server("127.0.0.1", 0)
+def recording_server() -> Iterator[viser.ViserServer]:
+    """Start a server without an audience: viser can only record what a server sends."""
+    server = start_server("127.0.0.1", 0)
     try:
         yield server
     finally:
-        stop_quietly(server)
+        stop_server(server)
 
 
-def _is_worth_telling(record: logging.LogRecord) -> bool:
-    """Whether a message is not only of somebody who connected and asked nothing, as browsers do ahead of time."""
+def _is_worth_logging(record: logging.LogRecord) -> bool:
+    """Return whether a message is about more than a browser that connects ahead of time and asks nothing."""
     return record.getMessage() != "opening handshake failed"
 
 
 def _refuse_to_share(*_arguments: object, **_options: object) -> None:
-    """A page of this machine stays on it: viser's tunnel to the open net is never dug."""
-
-
-LOOPBACK: Final = ("127.0.0.1", "localhost", "::1")
-EVERY_ADDRESS: Final = ("0.0.0.0", "::")
-"""Of this machine; a browser on it is told another."""
-PORTS_TRIED: Final = 100
-PATIENCE: Final = 5.0
-"""s that a page is given to end what it does."""
+    """Refuse viser's tunnel to the internet."""
 
 
 class Viewer:
@@ -87,84 +83,85 @@ class Viewer:
     def __init__(
         self, state: ViewState, *, host: str = "127.0.0.1", port: int = 0, run: FilePath | None = None
     ) -> None:
-        """Begin to serve.
+        """Start to serve.
 
         Args:
-            state: What every page begins with.
+            state: Initial state of every page.
             host: Address to listen at; by default only this machine can reach it.
-            port: Port to listen at, 0 for any that is free; see ``free_port``.
-            run: A run of the same robot, that pages can play.
+            port: Port to listen at, 0 for any free one; see ``free_port``.
+            run: A run of the same robot that pages can play.
 
         Raises:
-            RunError: The run cannot be read, or is one of another robot.
+            RunError: The run cannot be read, or is of a robot with other joints.
         """
         self._state = state
         self._host = host
         self._run = run
-        self._replay()
+        self._open_replay()  # raises early
         self._pages: dict[int, Page] = {}
         self._leaving: list[Page] = []
-        """Pages whose browser is gone, and which may still do something."""
+        """Pages whose browser is gone, and whose thread may still run."""
         self._lock = threading.Lock()
-        self._server = quiet_server(host, port)
+        self._server = start_server(host, port)
         self.port: int = self._server.get_port()
-        _dress(self._server, state)
-        self._warm_up = threading.Thread(target=_warm_up, name="warm-up", daemon=True)
-        self._warm_up.start()
-        self._server._websock_server.on_client_connect(self._check)
+        _configure(self._server, state)
+        self._preload = threading.Thread(target=_preload, name="preload", daemon=True)
+        self._preload.start()
+        self._server._websock_server.on_client_connect(self._check_origin)
         self._server.on_client_connect(self._open)
         self._server.on_client_disconnect(self._close)
 
     @property
     def url(self) -> str:
-        """Where a browser on this machine finds it."""
-        name = "127.0.0.1" if self._host in EVERY_ADDRESS else self._host
+        """Address for a browser on this machine."""
+        name = "127.0.0.1" if self._host in ANY_ADDRESS else self._host
         return f"http://{f'[{name}]' if ':' in name else name}:{self.port}"
 
     @property
     def pages(self) -> tuple[Page, ...]:
-        """The pages that are open."""
+        """The open pages."""
         with self._lock:
             return tuple(self._pages.values())
 
     def wait(self) -> None:
-        """Return never, but let signals through."""
+        """Wait for a signal; does not return."""
         while True:
             time.sleep(3600)
 
     def stop(self) -> None:
-        """Close all pages, and end."""
+        """Close all pages, and stop the server."""
         pages = self.pages
         for page in pages:
             page.close()
-        for page in (*pages, *self._leaving):  # what is sent to a server that has ended makes it complain
-            page.join(PATIENCE)
-        stop_quietly(self._server)
-        self._warm_up.join()  # Python must not end while a library is loaded: that is a crash
+        for page in (*pages, *self._leaving):  # a stopped server complains about what is sent to it
+            page.join(STOP_TIMEOUT)
+        stop_server(self._server)
+        self._preload.join()  # Python crashes if it ends while a library is being loaded
 
-    async def _check(self, connection: infra.WebsockClientConnection) -> None:
-        """Turn away whoever comes from elsewhere, before anything is told."""
+    async def _check_origin(self, connection: infra.WebsockClientConnection) -> None:
+        """Close a connection from another site's page before anything is sent to it."""
+        # viser has no public access to the request's headers
         live = self._server._websock_server._live_connections.get(connection.client_id)
         if live is not None and live.request is not None and self._is_foreign(live.request.headers):
             await live.close(1008, "not a page of this server")
 
+    def _is_foreign(self, headers: Mapping[str, str]) -> bool:
+        """Return whether another site's page, open in a browser on this machine, made a request."""
+        origin = headers.get("Origin")
+        if origin is None:  # no browser
+            return False
+        site = urlsplit(origin)
+        local = self._host not in LOOPBACK or site.hostname in LOOPBACK
+        return site.netloc != headers.get("Host") or not local
+
     async def _open(self, client: viser.ClientHandle) -> None:
-        page = Page(client, self._state, self._replay)
+        page = Page(client, self._state, self._open_replay)
         with self._lock:
             self._pages[client.client_id] = page
         page.start()
 
-    def _is_foreign(self, headers: Mapping[str, str]) -> bool:
-        """Whether a web page of somebody else, open in a browser on this machine, asks for a page."""
-        origin = headers.get("Origin")
-        if origin is None:  # no browser
-            return False
-        ours = urlsplit(origin)
-        local = self._host not in LOOPBACK or ours.hostname in LOOPBACK
-        return ours.netloc != headers.get("Host") or not local
-
-    def _replay(self) -> Replay | None:
-        """Open the run, once for every page: one keeps what it has read, and is not for two threads."""
+    def _open_replay(self) -> Replay | None:
+        """Open the run; every page has its own, which caches rollouts and is not thread-safe."""
         if self._run is None:
             return None
         from dh2sim.view.motion.replay import open_replay
@@ -176,14 +173,14 @@ class Viewer:
             page = self._pages.pop(client.client_id, None)
         if page is not None:
             page.close()
-            self._leaving = [*(left for left in self._leaving if left.works), page]
+            self._leaving = [*(left for left in self._leaving if left.is_alive), page]
 
 
 def free_port(host: str, port: int) -> int:
-    """Return a port, or the next one after it that nobody listens at.
+    """Return a port, or the next free one after it.
 
     Raises:
-        Dh2simError: Nobody can listen at this address, or all of a hundred ports are taken.
+        Dh2simError: The address is not one of this machine, or 100 ports in a row are taken.
     """
     for candidate in range(port, min(port + PORTS_TRIED, 65536)):
         try:
@@ -192,27 +189,27 @@ def free_port(host: str, port: int) -> int:
                 trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 trial.bind((host, candidate))
                 return int(trial.getsockname()[1])
-        except UnicodeError as error:  # of a name that cannot be one
-            raise Dh2simError(f"cannot listen at {host}, port {candidate}: that is no address") from error
+        except UnicodeError as error:  # a host name with empty or very long parts
+            raise Dh2simError(f"cannot listen at {host}, port {candidate}: invalid address") from error
         except OSError as error:
             if error.errno != errno.EADDRINUSE:
                 raise Dh2simError(f"cannot listen at {host}, port {candidate}: {error.strerror or error}") from error
     raise Dh2simError(f"cannot listen at {host}: ports {port} to {candidate} are all taken")
 
 
-def is_private(host: str) -> bool:
-    """Whether only this machine can reach a server at an address; ``host`` is one that can be listened at."""
+def is_local_only(host: str) -> bool:
+    """Return whether only this machine can reach a server at a valid address."""
     addresses = [str(info[4][0]) for info in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)]
     return all(ipaddress.ip_address(address).is_loopback for address in addresses)
 
 
-def _warm_up() -> None:
-    """Import what the first page will need, while its browser still starts."""
+def _preload() -> None:
+    """Import what the first page will need while its browser starts."""
     importlib.import_module("dh2sim.engines.mujoco_engine")
 
 
-def _dress(server: viser.ViserServer, state: ViewState) -> None:
-    """Set what all pages have in common: colours, light, and where the eye begins."""
+def _configure(server: viser.ViserServer, state: ViewState) -> None:
+    """Set what all pages have in common: theme, light and initial camera."""
     server.gui.configure_theme(
         control_width="large",
         dark_mode=False,
@@ -222,6 +219,6 @@ def _dress(server: viser.ViserServer, state: ViewState) -> None:
     )
     server.gui.main_panel.dock_right()
     server.scene.set_up_direction("+z")
-    # shadows of links on links tell nothing, and cost a browser without a graphics card two thirds of its time
+    # shadows of links on links are no help, and take two thirds of the time of a browser without a graphics card
     server.scene.configure_default_lights(cast_shadow=False)
     aim(server.initial_camera, state.model)

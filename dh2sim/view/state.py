@@ -1,4 +1,4 @@
-"""What one page shows: one immutable value, of which the scene and the panel are derived."""
+"""The state of a page: one immutable value, from which the scene and the panel are derived."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ import numpy as np
 from dh2sim.model.robot_model import JointModel, RobotModel
 from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Units
 from dh2sim.view.scene.items import Vector
-from dh2sim.view.scene.pinhole import Sight
+from dh2sim.view.scene.pinhole import Pinhole
 
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 """A pose of shape (4, 4), as tuples, so that states compare by value."""
 IDENTITY: Final[Matrix] = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))
 
 COLUMNS: Final = ("a", "alpha", "d", "theta", "beta")
-"""Columns of numbers of the table."""
+"""The table's columns of numbers."""
 CONVENTION: Final = "convention"
-"""The column that names a row's convention."""
+"""The table's column of conventions."""
 
 
 class Mode(StrEnum):
-    """Who moves the joints."""
+    """What moves the joints."""
 
-    STILL = "still"
+    MANUAL = "manual"
     """The user."""
     PHYSICS = "physics"
     REPLAY = "replay"
@@ -45,18 +45,18 @@ class Part(StrEnum):
     GHOST = "ghost"
     GRID = "grid"
     SHADING = "shading"
-    """Surfaces with soft lights, rather than in a few steps, which a browser without a graphics card draws faster."""
+    """Soft shading of surfaces, instead of a few steps, which a browser without a graphics card draws faster."""
     HANDLE = "handle"
-    """To drag tool0 by."""
+    """That tool0 is dragged by."""
 
 
 INITIALLY: Final = frozenset({Part.SHAPES, Part.FRAMES, Part.FRAME_NAMES, Part.GRID, Part.GHOST, Part.SHADING})
-"""What a page shows at first."""
+"""Parts that a page shows at first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Complaint:
-    """What is wrong with a cell of the table."""
+class CellError:
+    """An error in a cell of the table."""
 
     row: int
     """From 0."""
@@ -65,12 +65,12 @@ class Complaint:
     text: str
     """As typed."""
     message: str
-    """In the words of the robot file's reader."""
+    """Of the robot file's reader."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DraftRow:
-    """A row of the table as it is typed."""
+class TableRow:
+    """A row of the table as typed."""
 
     name: str
     type: JointType
@@ -80,38 +80,38 @@ class DraftRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Draft:
-    """The table as it is typed; where it is wrong, the robot is the one of before."""
+class TableState:
+    """The table as typed; while it has errors, the robot does not change."""
 
-    rows: tuple[DraftRow, ...]
+    rows: tuple[TableRow, ...]
     convention: Convention
     """Of rows that name none."""
     units: Units
-    complaints: tuple[Complaint, ...] = ()
+    errors: tuple[CellError, ...] = ()
 
-    def complaint(self, row: int, column: str) -> Complaint | None:
-        """Return what is wrong with a cell, or None."""
-        return next((found for found in self.complaints if (found.row, found.column) == (row, column)), None)
+    def error(self, row: int, column: str) -> CellError | None:
+        """Return the error in a cell, or None."""
+        return next((found for found in self.errors if (found.row, found.column) == (row, column)), None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goal:
-    """Where the tool is wanted."""
+    """The pose that the user has dragged the tool's handle to."""
 
     T_base_link_tool0: Matrix
     reached: bool
-    """Whether the robot can bring tool0 there, and did."""
+    """Whether tool0 is there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pull:
-    """A link that the mouse pulls at, in a simulation."""
+class LinkDrag:
+    """A link that the mouse drags in a simulation."""
 
     link: str
     point_in_link: Vector
     """Where it was grabbed, in the link's frame, m."""
     target: Vector
-    """Where the mouse is, in base_link, m."""
+    """Position of the mouse in base_link, m."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,8 +120,8 @@ class Ghost:
 
     model: RobotModel = field(repr=False)
     label: str
-    reading: bool = False
-    """Whether it is the first robot's own table in the other convention, and changes with it."""
+    misread: bool = False
+    """Whether it is the first robot's table in the other convention, and changes with it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,54 +129,54 @@ class ViewState:
     """Everything that a page shows."""
 
     model: RobotModel = field(repr=False)
-    """Of the last table that was right."""
+    """The robot of the last table without errors."""
     text: str = field(repr=False)
     """The robot file that ``model`` was read from."""
     file: str
     """Name of that file, for messages."""
     folder: Path | None
-    """Where paths in it start; None of a file that was uploaded."""
-    draft: Draft
+    """Where paths in it start; None for an uploaded file."""
+    table: TableState
     q: tuple[float, ...]
     """Joint coordinates, rad and m."""
-    earlier: tuple[str, ...] = field(default=(), repr=False)
-    """Robot files of before the last edits, the newest at the end."""
-    typed: tuple[int, str] | None = None
-    """Row and column of the cell that the last edit was typed into."""
+    undo_texts: tuple[str, ...] = field(default=(), repr=False)
+    """Texts of the robot file before the last edits, the newest last."""
+    edited_cell: tuple[int, str] | None = None
+    """Row and column of the cell that the last edit was in."""
     target: tuple[float, ...] | None = None
-    """Where a simulation's actuators hold the joints; None where there is no simulation."""
+    """Targets of a simulation's actuators; None without a simulation."""
     shown: frozenset[Part] = INITIALLY
     selected_row: int = 0
-    """Row of the table that is explained, from 0."""
+    """Row of the table that is edited and explained, from 0."""
     angle: AngleUnit = AngleUnit.DEG
-    """Unit that angles are shown in, outside of the table."""
+    """Unit of angles outside of the table."""
     frame: str = "tool0"
-    """Whose pose is shown; one of ``frame_names``."""
+    """Frame whose pose is shown, one of ``frame_names``."""
     ghost: Ghost | None = None
     trace: tuple[Vector, ...] = ()
-    """Where tool0 was since ``Part.TRACE`` is shown, m."""
+    """Path of tool0 in the world since ``Part.TRACE`` is shown, m."""
     goal: Goal | None = None
-    mode: Mode = Mode.STILL
+    mode: Mode = Mode.MANUAL
     paused: bool = False
-    """Whether the simulation or the recording stands."""
+    """Whether the simulation or the recording is paused."""
     T_world_base_link: Matrix = IDENTITY
-    """Where base_link is: elsewhere than at the world's origin only in a recording in which it floats."""
-    sight: Sight | None = None
-    """How the page's eye sees the scene; None where the browser has not told yet."""
+    """Pose of base_link; not the identity only in a recording with a floating base."""
+    pinhole: Pinhole | None = None
+    """The page's camera; None before the browser has reported it."""
     steps: int = 0
-    """Single steps that were asked for since it began."""
-    pull: Pull | None = None
+    """Single steps requested since the simulation or the recording was started."""
+    drag: LinkDrag | None = None
     notice: str = ""
-    """What the user is told, in a sentence or two; empty where there is nothing to tell."""
+    """A message to the user, a sentence or two; may be empty."""
 
     @property
-    def wanted(self) -> tuple[float, ...]:
-        """Where the user wants the joints: what sliders show."""
+    def commanded(self) -> tuple[float, ...]:
+        """Joint coordinates that the user has set, rad and m, which the sliders show."""
         return self.q if self.target is None else self.target
 
     @property
     def floats(self) -> bool:
-        """Whether base_link is elsewhere than at the world's origin."""
+        """Whether base_link is not at the world's origin."""
         return self.T_world_base_link != IDENTITY
 
     @property
@@ -186,7 +186,7 @@ class ViewState:
 
 
 def within(model: RobotModel, q: tuple[float, ...]) -> tuple[float, ...]:
-    """Return joint coordinates moved inside the limits; those of continuous joints are turned whole turns.
+    """Return joint coordinates moved inside the limits, and continuous joints by whole turns.
 
     Args:
         model: The robot.
@@ -203,7 +203,7 @@ def _within(joint: JointModel, value: float) -> float:
 
 
 def configurations(model: RobotModel) -> dict[str, tuple[float, ...]]:
-    """Return the configurations that have a name, rad and m, inside the limits: home, zero and the file's."""
+    """Return the named configurations inside the limits, rad and m: home, zero and the robot file's."""
     zero = (0.0,) * model.chain.n
     named = {name: tuple(np.asarray(vector).tolist()) for name, vector in model.spec.configurations.items()}
     return {

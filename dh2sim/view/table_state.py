@@ -1,4 +1,4 @@
-"""The table as it is typed, and the robot that its text describes."""
+"""The table as typed, and the robot that its text describes."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from dh2sim.robot.edit import Cell, can_be_edited, unit_words, with_cells, writt
 from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import AngleUnit, LengthUnit, RobotSpec, Units
 from dh2sim.robot.write import robot_file_text
-from dh2sim.view.state import COLUMNS, CONVENTION, Complaint, Draft, DraftRow
+from dh2sim.view.state import COLUMNS, CONVENTION, CellError, TableRow, TableState
 
-LONGEST_CELL: Final = 200
+MAX_CELL_LENGTH: Final = 200
 """Characters that may be typed into a cell."""
-GREATEST_REACH: Final = 1e6
+MAX_REACH: Final = 1e6
 """m: larger robots cannot be drawn in single precision."""
-MOST_UPLOADED: Final = 200
-"""Joints, and configurations that have names, of a robot whose file was uploaded."""
+MAX_UPLOADED: Final = 200
+"""Joints, and named configurations, of an uploaded robot file."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Source:
-    """What a robot file's text needs besides itself to be read."""
+    """Where a robot file's text comes from."""
 
     file: str
     """Its name, for messages."""
     folder: Path | None
-    """Where paths in it start; None where it has no folder: then it may name no files."""
+    """Where paths in it start; None without a folder: then it may name no files."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Wrong:
-    """Why a text describes no robot: a message for each place, such as ``joints[2].alpha``."""
+class Invalid:
+    """The errors of a text that describes no robot: a message for each place, such as ``joints[2].alpha``."""
 
     messages: Mapping[str, str]
     lines: tuple[str, ...] = ()
-    """All of them as the reader tells them, with lines and columns, where it is the reader who complains."""
+    """All messages of the robot file's reader with lines and columns; empty for other errors."""
 
     @property
-    def told(self) -> str:
-        """All that is wrong, a line for each."""
+    def text(self) -> str:
+        """All messages, a line each."""
         return "\n".join(self.lines) or self.first
 
     @property
@@ -53,37 +53,37 @@ class Wrong:
         return next((f"{path}: {message}" if path else message for path, message in self.messages.items()), "")
 
 
-def read(text: str | bytes, source: Source) -> RobotModel | Wrong:
-    """Return the robot that a text describes, or why it describes none that can be shown."""
+def read(text: str | bytes, source: Source) -> RobotModel | Invalid:
+    """Return the robot that a text describes, or the errors if it describes none that can be shown."""
     try:
         spec = parse_robot(text, file=source.file, directory=source.folder, mesh_files=source.folder is not None)
         if source.folder is None and (long := _too_much(spec)):
-            return Wrong(messages={"": f"{source.file}: {long}"})
+            return Invalid(messages={"": f"{source.file}: {long}"})
         model = build_model(spec)
     except RobotFileError as error:
         messages = {problem.path: problem.message for problem in reversed(error.problems)}
-        return Wrong(messages=messages, lines=tuple(str(problem) for problem in error.problems))
+        return Invalid(messages=messages, lines=tuple(str(problem) for problem in error.problems))
     except Dh2simError as error:
-        return Wrong(messages={"": str(error)})
+        return Invalid(messages={"": str(error)})
     except (OverflowError, ZeroDivisionError, ValueError):
-        return Wrong(messages={"": "numbers so large that nothing can be computed with them"})
-    if not model.reach <= GREATEST_REACH:
-        return Wrong(
-            messages={"": f"the robot would reach {model.reach:.3g} m; at most {GREATEST_REACH:g} m are shown"}
+        return Invalid(messages={"": "the numbers are too large to compute with"})
+    if not model.reach <= MAX_REACH:
+        return Invalid(
+            messages={"": f"the robot's reach is {model.reach:.3g} m; at most {MAX_REACH:g} m can be shown"}
         )
     return model
 
 
 def _too_much(spec: RobotSpec) -> str:
-    """Return why a robot of somebody else is not even built: it would keep this machine busy for long."""
+    """Return why an uploaded robot is not even built: it would keep this machine busy for long."""
     for what, count in {"joints": len(spec.rows), "configurations": len(spec.configurations)}.items():
-        if count > MOST_UPLOADED:
-            return f"the robot has {count} {what}; at most {MOST_UPLOADED} are shown of one that was uploaded"
+        if count > MAX_UPLOADED:
+            return f"the robot has {count} {what}; at most {MAX_UPLOADED} are allowed in an uploaded file"
     return ""
 
 
 def editable_text(spec: RobotSpec, source: Source) -> str:
-    """Return a robot's own text, or where cells of that do not stand for themselves, one written anew."""
+    """Return a robot's own text, or a newly written one if cells of that cannot be edited."""
     own = None if spec.source_file is None else spec.source_file.text
     if own is not None and can_be_edited(own):
         return own
@@ -92,16 +92,16 @@ def editable_text(spec: RobotSpec, source: Source) -> str:
 
 
 def units_of(text: str) -> Units:
-    """Return the units of a robot file's text that is right."""
+    """Return the units of a valid robot file's text."""
     words = unit_words(text)
     return Units(angle=AngleUnit(words.get("angle", "rad")), length=LengthUnit(words.get("length", "m")))
 
 
-def draft_of(text: str, spec: RobotSpec, complaints: tuple[Complaint, ...] = ()) -> Draft:
-    """Return the table of a text, with what is typed into cells that are wrong in their places."""
-    typed = {(found.row, found.column): found.text for found in complaints}
+def table_state_of(text: str, spec: RobotSpec, errors: tuple[CellError, ...] = ()) -> TableState:
+    """Return the table of a text; cells with errors show what was typed."""
+    typed = {(found.row, found.column): found.text for found in errors}
     rows = tuple(
-        DraftRow(
+        TableRow(
             name=row.name,
             type=row.type,
             convention=row.convention,
@@ -109,39 +109,39 @@ def draft_of(text: str, spec: RobotSpec, complaints: tuple[Complaint, ...] = ())
         )
         for i, (row, written) in enumerate(zip(spec.rows, written_cells(text), strict=True))
     )
-    return Draft(rows=rows, convention=spec.convention, units=units_of(text), complaints=complaints)
+    return TableState(rows=rows, convention=spec.convention, units=units_of(text), errors=errors)
 
 
-def too_long(cells: Mapping[Cell, str]) -> Wrong | None:
-    """Return what is wrong where a text is too long to be looked at."""
+def too_long(cells: Mapping[Cell, str]) -> Invalid | None:
+    """Return the errors of cells that are too long to be read."""
     messages = {
-        path_of_cell(cell): f"{len(text)} characters; at most {LONGEST_CELL} are allowed"
+        path_of_cell(cell): f"{len(text)} characters; at most {MAX_CELL_LENGTH} are allowed"
         for cell, text in cells.items()
-        if len(text) > LONGEST_CELL
+        if len(text) > MAX_CELL_LENGTH
     }
-    return Wrong(messages=messages) if messages else None
+    return Invalid(messages=messages) if messages else None
 
 
-def try_cells(text: str, cells: Mapping[Cell, str | None], source: Source) -> tuple[str, RobotModel] | Wrong:
-    """Return the text with other cells and the robot that it describes, or what is wrong."""
+def try_cells(text: str, cells: Mapping[Cell, str | None], source: Source) -> tuple[str, RobotModel] | Invalid:
+    """Return the text with other cells and the robot that it describes, or the errors."""
     changed = with_cells(text, cells)
     result = read(changed, source)
-    return result if isinstance(result, Wrong) else (changed, result)
+    return result if isinstance(result, Invalid) else (changed, result)
 
 
-def complaints_of(cells: Mapping[Cell, str], wrong: Wrong) -> tuple[Complaint, ...]:
-    """Return a complaint for each of the cells that messages are about; for all of them where they are about none."""
-    found = {cell: wrong.messages.get(path_of_cell(cell)) for cell in cells if cell[0] is not None}
+def cell_errors(cells: Mapping[Cell, str], invalid: Invalid) -> tuple[CellError, ...]:
+    """Return the errors of those cells that messages are about; if they are about none, of all cells."""
+    found = {cell: invalid.messages.get(path_of_cell(cell)) for cell in cells if cell[0] is not None}
     if not any(found.values()):
-        found = dict.fromkeys(found, wrong.first)
+        found = dict.fromkeys(found, invalid.first)
     return tuple(
-        Complaint(row=row, column=column, text=cells[row, column], message=message)
+        CellError(row=row, column=column, text=cells[row, column], message=message)
         for (row, column), message in found.items()
         if message and row is not None and column in (*COLUMNS, CONVENTION)
     )
 
 
 def path_of_cell(cell: Cell) -> str:
-    """Return how messages name the place of a cell."""
+    """Return the place of a cell as in messages."""
     row, column = cell
     return f"joints[{row}].{column}" if row is not None else column

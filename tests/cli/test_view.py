@@ -1,4 +1,4 @@
-"""``dh2sim view`` as a whole process, and what every robot that comes with dh2sim opens with."""
+"""``dh2sim view`` as a whole process, and the initial state of every built-in robot."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.read import builtin_robots, load_robot
 from dh2sim.view.initial_state import folder_of, open_state
 from dh2sim.view.scene.scene import scene_of
-from dh2sim.view.server import is_private
+from dh2sim.view.server import is_local_only
 from tests.program import dh2sim, dh2sim_process, environment
 
 ADDRESS = "127.0.0.1"
@@ -57,7 +57,7 @@ main()
 
 @contextlib.contextmanager
 def serving(*arguments: str | Path, program: Sequence[str] = ("-m", "dh2sim")) -> Iterator[subprocess.Popen[str]]:
-    """A viewer in a process of its own, which has not printed anything yet; ended with its context."""
+    """A viewer in a process of its own, which has not printed anything yet; killed with its context."""
     # not through a shell's '&': what that starts ignores SIGINT
     process = subprocess.Popen(
         [sys.executable, *program, "view", *map(str, arguments), "--no-browser"],
@@ -86,7 +86,7 @@ def unused_port() -> int:
 
 @contextlib.contextmanager
 def taken_port() -> Iterator[int]:
-    """A port at which somebody listens, and behind which there are others."""
+    """A taken port, with others after it."""
     while True:
         with socket.socket() as listener:
             listener.bind((ADDRESS, 0))
@@ -115,24 +115,26 @@ def page_of(url: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "status", "told"),
+    ("kind", "status", "message"),
     [(signal.SIGINT, 130, "dh2sim: interrupted\n"), (signal.SIGTERM, 143, "")],
     ids=["SIGINT", "SIGTERM"],
 )
-def test_it_serves_a_page_where_it_says_until_it_is_ended(kind: signal.Signals, status: int, told: str) -> None:
+def test_it_serves_a_page_at_the_printed_address_until_it_is_stopped(
+    kind: signal.Signals, status: int, message: str
+) -> None:
     port = unused_port()
     with serving("stanford", "--port", str(port)) as process:
-        assert first_line(process) == f"stanford: http://{ADDRESS}:{port}  (Ctrl-C ends it)\n"
+        assert first_line(process) == f"stanford: http://{ADDRESS}:{port}  (stop with Ctrl-C)\n"
         assert page_of(f"http://{ADDRESS}:{port}").lstrip().lower().startswith("<!doctype html")
         process.send_signal(kind)
         started = time.monotonic()
         out, err = process.communicate(timeout=TIMEOUT)
         assert time.monotonic() - started < 20.0
-    assert (process.returncode, out, err) == (status, "", told)
+    assert (process.returncode, out, err) == (status, "", message)
     assert is_free(port)
 
 
-def test_it_ends_at_once_though_a_page_is_open() -> None:
+def test_it_stops_at_once_with_a_page_open() -> None:
     client = pytest.importorskip("websockets.sync.client")
     import viser
 
@@ -181,40 +183,40 @@ def test_a_signal_that_a_callback_swallows_still_wakes_and_ends_the_viewer(
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere 127.0.0.1 alone is this machine's own address")
-def test_it_can_only_be_reached_from_this_machine_unless_it_is_told_otherwise() -> None:
+def test_by_default_only_this_machine_can_reach_it() -> None:
     with serving("stanford", "--port", str(port := unused_port())) as process:
         first_line(process)
         # every address in 127.0.0.0/8 is this machine's; one that was not asked for is not listened at
         with socket.socket() as other:
             assert other.connect_ex(("127.0.0.2", port)) != 0
     with serving("stanford", "--port", str(port := unused_port()), "--host", "0.0.0.0") as process:
-        assert first_line(process) == f"stanford: http://{ADDRESS}:{port}  (Ctrl-C ends it)\n"
+        assert first_line(process) == f"stanford: http://{ADDRESS}:{port}  (stop with Ctrl-C)\n"
         with socket.socket() as other:
             assert other.connect_ex(("127.0.0.2", port)) == 0
         process.send_signal(signal.SIGINT)
-        told = "dh2sim: anyone who can reach this machine at any of its addresses can open the page\n"
-        assert process.communicate(timeout=TIMEOUT)[1] == f"{told}dh2sim: interrupted\n"
+        warning = "dh2sim: anyone who can reach this machine at any of its addresses can open the page\n"
+        assert process.communicate(timeout=TIMEOUT)[1] == f"{warning}dh2sim: interrupted\n"
 
 
 @pytest.mark.parametrize(
     ("host", "private"),
     [("127.0.0.1", True), ("127.8.0.1", True), ("localhost", True), ("0.0.0.0", False), ("192.0.2.1", False)],
 )
-def test_it_is_known_whether_others_can_reach_an_address(host: str, private: bool) -> None:
-    assert is_private(host) is private
+def test_whether_others_can_reach_an_address_is_known(host: str, private: bool) -> None:
+    assert is_local_only(host) is private
 
 
-def test_of_an_address_of_this_machine_alone_nothing_is_told() -> None:
+def test_an_address_that_only_this_machine_can_reach_gives_no_warning() -> None:
     with serving("stanford", "--port", str(unused_port()), "--host", "localhost", "--share", "never") as process:
         first_line(process)
         process.send_signal(signal.SIGINT)
         assert process.communicate(timeout=TIMEOUT)[1] == "dh2sim: interrupted\n"
 
 
-def test_of_a_taken_port_it_takes_the_next_that_is_free_and_says_so() -> None:
+def test_the_next_free_port_is_used_and_printed_if_a_port_is_taken() -> None:
     with taken_port() as port, serving("stanford", "--port", str(port)) as process:
         found = re.fullmatch(
-            rf"stanford: http://{re.escape(ADDRESS)}:(\d+)  \(Ctrl-C ends it\)\n", first_line(process)
+            rf"stanford: http://{re.escape(ADDRESS)}:(\d+)  \(stop with Ctrl-C\)\n", first_line(process)
         )
         assert found is not None
         chosen = int(found.group(1))
@@ -222,26 +224,26 @@ def test_of_a_taken_port_it_takes_the_next_that_is_free_and_says_so() -> None:
         assert "<html" in page_of(f"http://{ADDRESS}:{chosen}")
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=TIMEOUT)
-    assert err == f"dh2sim: port {port} is taken; the page is at {chosen}\ndh2sim: interrupted\n"
+    assert err == f"dh2sim: port {port} is taken; using {chosen}\ndh2sim: interrupted\n"
     assert process.returncode == 130
 
 
 @pytest.mark.slow
-def test_a_second_viewer_stands_beside_the_first() -> None:
+def test_two_viewers_run_side_by_side() -> None:
     port = unused_port()
     with serving("stanford", "--port", str(port)) as first:
         first_line(first)
         with serving("scara", "--port", str(port)) as second:
-            assert first_line(second) != f"scara: http://{ADDRESS}:{port}  (Ctrl-C ends it)\n"
+            assert first_line(second) != f"scara: http://{ADDRESS}:{port}  (stop with Ctrl-C)\n"
 
 
-def test_a_robot_that_there_is_not_is_refused() -> None:
+def test_an_unknown_robot_is_refused() -> None:
     done = dh2sim("view", "stanfrod", "--no-browser")
     assert (done.status, done.out) == (2, "")
     assert done.err.startswith("dh2sim: there is no file and no robot named 'stanfrod'. Did you mean 'stanford'?")
 
 
-def test_an_address_that_nobody_can_listen_at_is_refused() -> None:
+def test_an_address_of_another_machine_is_refused() -> None:
     # an address that is set aside for documentation, RFC 5737: no machine has it
     done = dh2sim_process("view", "stanford", "--no-browser", "--host", "192.0.2.1")
     why = os.strerror(errno.EADDRNOTAVAIL)
@@ -250,7 +252,7 @@ def test_an_address_that_nobody_can_listen_at_is_refused() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("host", ["256.0.0.1", "a..b", "x" * 64])
-def test_a_host_that_is_no_address_is_refused(host: str) -> None:
+def test_an_invalid_host_is_refused(host: str) -> None:
     done = dh2sim_process("view", "stanford", "--no-browser", "--host", host)
     assert (done.status, done.out) == (2, "")
     assert done.err.startswith(f"dh2sim: cannot listen at {host}, port 8080: ")
@@ -258,7 +260,7 @@ def test_a_host_that_is_no_address_is_refused(host: str) -> None:
 
 
 @pytest.mark.parametrize("port", ["0", "65536", "-1", "eighty"])
-def test_a_number_that_is_no_port_is_refused(port: str) -> None:
+def test_an_invalid_port_is_refused(port: str) -> None:
     done = dh2sim("view", "stanford", "--no-browser", "--port", port)
     assert (done.status, done.out) == (2, "")
     assert "Invalid value for '--port'" in done.err
@@ -273,13 +275,13 @@ def test_a_page_is_exported_as_one_file_and_nothing_else(tmp_path: Path) -> None
     assert not re.findall(r'(?:src|href)="https?:', text), "it needs no network"
 
 
-def test_an_exported_page_replaces_another_only_where_it_is_asked_to(tmp_path: Path) -> None:
+def test_an_exported_page_replaces_another_only_with_force(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     assert dh2sim("view", "scara", "--export", page).status == 0
     scara = page.read_bytes()
     done = dh2sim("view", "stanford", "--export", page)
-    told = f"dh2sim: '{page}' exists already; choose another name, or write over it with --force\n"
-    assert (done.status, done.out, done.err) == (2, "", told)
+    message = f"dh2sim: '{page}' exists already; choose another name, or write over it with --force\n"
+    assert (done.status, done.out, done.err) == (2, "", message)
     assert page.read_bytes() == scara
     assert dh2sim("view", "stanford", "--export", page, "--force").status == 0
     assert page.read_bytes() != scara
@@ -287,38 +289,38 @@ def test_an_exported_page_replaces_another_only_where_it_is_asked_to(tmp_path: P
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 
-def test_a_page_that_cannot_be_written_is_told_of(tmp_path: Path) -> None:
+def test_a_page_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     done = dh2sim_process("view", "stanford", "--export", "nowhere/page.html", cwd=tmp_path)
     assert (done.status, done.out) == (2, "")
     assert done.err == "dh2sim: cannot write 'nowhere/page.html': there is no folder 'nowhere'\n"
     assert not list(tmp_path.iterdir())
 
 
-def test_nothing_is_written_over_where_nothing_is_exported() -> None:
+def test_force_needs_export() -> None:
     done = dh2sim("view", "stanford", "--no-browser", "--force")
     assert (done.status, done.out) == (2, "")
-    assert done.err.endswith("Invalid value for --force: only with --export: nothing else is written\n")
+    assert done.err.endswith("Invalid value for --force: needs --export\n")
 
 
 @pytest.mark.parametrize("word", ["public", "always", "", "Never"])
-def test_pages_are_never_shared_over_the_open_net(word: str) -> None:
+def test_pages_are_never_shared_over_the_internet(word: str) -> None:
     done = dh2sim("view", "stanford", "--no-browser", "--share", word)
     assert (done.status, done.out) == (2, "")
     assert done.err.endswith(
-        "Invalid value for --share: pages are never shared over the open net; 'never' is all there is\n"
+        f"Invalid value for --share: must be 'never', got {word!r}; pages are never shared over the internet\n"
     )
 
 
-def test_a_run_that_there_is_not_is_refused_before_anything_is_served(tmp_path: Path) -> None:
+def test_a_missing_run_is_refused_before_anything_is_served(tmp_path: Path) -> None:
     done = dh2sim_process("view", "stanford", "run.zarr", "--no-browser", cwd=tmp_path)
     assert (done.status, done.out, done.err) == (2, "", "dh2sim: there is no 'run.zarr'\n")
 
 
 @pytest.mark.parametrize("robot", builtin_robots())
-def test_every_robot_that_comes_with_dh2sim_opens_at_home_where_its_table_has_it(robot: str) -> None:
+def test_every_built_in_robot_opens_at_home_where_its_table_has_it(robot: str) -> None:
     spec = load_robot(robot)
     state = open_state(spec, folder_of(robot))
-    assert (state.spec.name, state.draft.complaints, state.notice) == (spec.name, (), "")
+    assert (state.spec.name, state.table.errors, state.notice) == (spec.name, (), "")
     scene = scene_of(state)
     assert {f"/robot/link_{i}" for i in range(1, len(spec.rows) + 1)} <= set(scene)
     expected = table_tool_pose(spec, state.model.home)

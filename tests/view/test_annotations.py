@@ -120,14 +120,14 @@ def test_an_angle_of_several_turns_is_drawn_as_one_turn_and_the_rest() -> None:
 
 def test_labels_carry_name_index_value_and_a_star_where_the_joint_moves() -> None:
     scene = explained(robot("puma560_standard"), 1, np.radians([10.0, 35.0, 20.0, 0.0, 0.0, 0.0]))
-    texts = {name: label(scene, name) for name in ("theta", "d", "a", "alpha", "axis_before", "axis_behind")}
+    texts = {name: label(scene, name) for name in ("theta", "d", "a", "alpha", "axis_before", "axis_after")}
     assert texts == {
         "theta": "θ₂* = 35.0°",
         "d": "d₂ = 0",
         "a": "a₂ = 0.4318 m",
         "alpha": "α₂ = 0",
         "axis_before": "z₁",
-        "axis_behind": "z₂",
+        "axis_after": "z₂",
     }
     assert "/row/alpha" not in scene
 
@@ -142,7 +142,7 @@ def test_a_hayati_row_tells_beta_and_rows_have_more_than_one_figure() -> None:
     rows = [row(f"j{i}", d=0.1) for i in range(11)]
     spec = RobotSpec(name="r", rows=(*rows, row("last", convention=HAYATI, a=0.5, beta=math.radians(2.5))))
     scene = explained(spec, 11, np.zeros(12))
-    texts = [label(scene, name) for name in ("theta", "d", "a", "alpha", "beta", "axis_before", "axis_behind")]
+    texts = [label(scene, name) for name in ("theta", "d", "a", "alpha", "beta", "axis_before", "axis_after")]
     assert texts == ["θ₁₂* = 0.0°", "d₁₂ = 0", "a₁₂ = 0.5 m", "α₁₂ = 0", "β₁₂ = 2.5°", "z₁₁", "z₁₂"]
 
 
@@ -175,7 +175,7 @@ def test_every_quantity_and_both_axes_have_a_label_beside_them(
         elif isinstance(item, Polyline):
             points = np.array(item.points)
             assert np.linalg.norm(points - labels[f"/row/{name}_label"], axis=1).min() < 0.5 * SIZE
-    for name in ("axis_before", "axis_behind"):
+    for name in ("axis_before", "axis_after"):
         line = scene[f"/row/{name}"]
         assert isinstance(line, Polyline)
         assert np.linalg.norm(labels[f"/row/{name}_label"] - np.array(line.points[1])) < 0.5 * SIZE
@@ -186,7 +186,7 @@ def test_the_axes_are_those_of_the_two_frames_and_pass_through_both_ends_of_the_
     frames = table_frame_poses(spec, q)
     for number in range(6):
         scene = explained(spec, number, q)
-        for name, T in (("axis_before", frames[number]), ("axis_behind", frames[number + 1])):
+        for name, T in (("axis_before", frames[number]), ("axis_after", frames[number + 1])):
             line = scene[f"/row/{name}"]
             assert isinstance(line, Polyline)
             ends = np.array(line.points) - T[:3, 3]

@@ -7,9 +7,9 @@ from typing import TypeAlias
 
 import pytest
 
-from dh2sim.view.events import Tell
+from dh2sim.view.events import Notify
 from dh2sim.view.panel.bound import Bound, bind
-from dh2sim.view.server import quiet_server, stop_quietly
+from dh2sim.view.server import start_server, stop_server
 from tests.view.on_page import wait_until
 from tests.view.without_browser import speaking
 
@@ -19,16 +19,16 @@ Field: TypeAlias = "tuple[Bound[str], Callable[[str], None], list[Callable[[], N
 @pytest.fixture
 def typed() -> Iterator[Field]:
     """A field of a server, what types into it from a page, and what says that an event was worked through."""
-    server = quiet_server("127.0.0.1", 0)
+    server = start_server("127.0.0.1", 0)
     events: list[Callable[[], None]] = []
     try:
         field = server.gui.add_text("field", "before")
 
-        def send(task: object, *, seen: Callable[[], None] | None = None) -> None:
-            assert seen is not None
-            events.append(seen)
+        def send(task: object, *, on_start: Callable[[], None] | None = None) -> None:
+            assert on_start is not None
+            events.append(on_start)
 
-        bound = bind(field, send, lambda text: Tell(notice=text))
+        bound = bind(field, send, lambda text: Notify(notice=text))
         with speaking(f"http://127.0.0.1:{server.get_port()}") as say:
 
             def type_in(text: str) -> None:
@@ -39,7 +39,7 @@ def typed() -> Iterator[Field]:
             wait_until(lambda: len(server.get_clients()) == 1, "the page")
             yield bound, type_in, events
     finally:
-        stop_quietly(server)
+        stop_server(server)
 
 
 def test_what_was_typed_since_is_not_undone(typed: Field) -> None:

@@ -18,9 +18,9 @@ from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.robot.read import builtin_robots, load_robot, parse_robot
 from dh2sim.typing import Array
 from dh2sim.view.initial_state import open_state
+from dh2sim.view.scene.camera import FIELD_OF_VIEW, Viewpoint, viewpoint_of
 from dh2sim.view.scene.items import Label
 from dh2sim.view.scene.labels import HEIGHT, width
-from dh2sim.view.scene.robot_size import FIELD, Eye, eye_of
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import ViewState
 from tests.view.on_page import choose, open_tab, pixel, wait_until
@@ -48,10 +48,10 @@ def origins(state: ViewState) -> Array:
 @given(st.sampled_from(builtin_robots()), st.floats(0.2, 4.0))
 def test_the_robot_at_home_is_seen_in_pictures_of_every_shape(robot: str, aspect: float) -> None:
     state = open_state(load_robot(robot))
-    assert is_in_picture(origins(state), eye_of(state.model, aspect), aspect)
+    assert is_in_picture(origins(state), viewpoint_of(state.model, aspect), aspect)
 
 
-def is_in_picture(points: Array, eye: Eye, aspect: float) -> bool:
+def is_in_picture(points: Array, eye: Viewpoint, aspect: float) -> bool:
     """Whether points, m, are in a picture."""
     ahead = np.subtract(eye.look_at, eye.position)
     ahead /= np.linalg.norm(ahead)
@@ -60,7 +60,7 @@ def is_in_picture(points: Array, eye: Eye, aspect: float) -> bool:
     seen = points - eye.position
     depth = seen @ ahead
     sideways, up = seen @ right / depth, seen @ np.cross(right, ahead) / depth
-    reach = math.tan(0.5 * FIELD)
+    reach = math.tan(0.5 * FIELD_OF_VIEW)
     return bool((depth > 0.0).all() and (np.abs(up) < reach).all() and (np.abs(sideways) < aspect * reach).all())
 
 
@@ -71,8 +71,8 @@ def test_a_link_shown_by_a_large_mesh_is_seen_too(tmp_path: Path) -> None:
     state = open_state(load_robot(file), tmp_path)
     T = table_frame_poses(state.spec, [0.0])[1]
     ends = np.array([T[:3, 3] + sign * 1.5 * T[:3, 1] for sign in (-1.0, 1.0)])
-    assert is_in_picture(ends, eye_of(state.model, 1.0), 1.0)
-    assert not is_in_picture(ends, eye_of(open_state(parse_robot(MESHED.split(", link")[0] + "}")).model), 1.0)
+    assert is_in_picture(ends, viewpoint_of(state.model, 1.0), 1.0)
+    assert not is_in_picture(ends, viewpoint_of(open_state(parse_robot(MESHED.split(", link")[0] + "}")).model), 1.0)
 
 
 def is_seen(page: Page, served: ServedPage) -> bool:
@@ -146,10 +146,10 @@ def test_the_labels_of_a_row_can_be_read_wherever_the_user_moves_the_eye(
     choose(page, "Edit row", "2: joint_2")
     page.get_by_text("Explain in scene").click()
     wait_until(lambda: "/row/a_label" in served._painter._drawn, "the row is explained")
-    before = served.state.sight
+    before = served.state.pinhole
     for pixels in (90.0, -170.0):
         move_the_eye(page, served, pixels)
-        assert served.state.sight not in (None, before)
+        assert served.state.pinhole not in (None, before)
         wait_until(lambda: not covered(page, served), f"{covered(page, served)} cover each other")
 
 

@@ -1,4 +1,4 @@
-"""A recording in which base_link floats is shown in the world, as MuJoCo has it; and only a recording is."""
+"""A recording in which base_link floats is shown in the world, where MuJoCo has it; and only in a recording."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ import xarray as xr
 
 from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
-from dh2sim.view.events import CompareReading, Event, Follow, SetMode, Show
+from dh2sim.view.events import CompareMisread, Event, Follow, SetMode, Show
 from dh2sim.view.initial_state import open_state
-from dh2sim.view.motion.motion import Recording, Simulation
+from dh2sim.view.motion.motion_source import Recording, Simulation
 from dh2sim.view.motion.replay import open_replay
-from dh2sim.view.panel.pose import whose_pose
+from dh2sim.view.panel.pose import frame_title
 from dh2sim.view.reduce import reduce
 from dh2sim.view.scene.items import Polyline as Line
 from dh2sim.view.scene.items import Scene
@@ -30,7 +30,7 @@ STANFORD = open_state(load_robot("stanford"))
 ELSEWHERE: Matrix = ((0.0, -1.0, 0.0, 0.5), (1.0, 0.0, 0.0, -2.0), (0.0, 0.0, 1.0, 3.0), (0.0, 0.0, 0.0, 1.0))
 """A pose of base_link: a quarter of a turn about z, and away."""
 FOLLOW = Follow(q=STANFORD.q, T_world_base_link=ELSEWHERE)
-EVERYTHING: tuple[Event, ...] = (CompareReading(), *(Show(part=part, on=True) for part in Part))
+EVERYTHING: tuple[Event, ...] = (CompareMisread(), *(Show(part=part, on=True) for part in Part))
 
 
 def after(state: ViewState, *happened: Event) -> ViewState:
@@ -123,19 +123,19 @@ def test_whoever_takes_the_joints_back_takes_base_link_back_too() -> None:
         back = after(floating, SetMode(mode=mode))
         assert back.T_world_base_link == IDENTITY
         assert not back.floats
-    assert scene_of(after(floating, SetMode(mode=Mode.STILL))) == scene_of(STANFORD)
+    assert scene_of(after(floating, SetMode(mode=Mode.MANUAL))) == scene_of(STANFORD)
 
 
 def test_a_trace_ends_where_the_recording_does() -> None:
-    traced = after(STANFORD, Show(part=Part.TRACE, on=True), SetMode(mode=Mode.REPLAY), FOLLOW)
-    assert len(traced.trace) == 2
-    assert after(traced, SetMode(mode=Mode.STILL)).trace == ()
+    with_trace = after(STANFORD, Show(part=Part.TRACE, on=True), SetMode(mode=Mode.REPLAY), FOLLOW)
+    assert len(with_trace.trace) == 2
+    assert after(with_trace, SetMode(mode=Mode.MANUAL)).trace == ()
 
 
 def test_a_trace_goes_on_though_only_base_link_moves() -> None:
-    traced = after(STANFORD, SetMode(mode=Mode.REPLAY), Show(part=Part.TRACE, on=True), FOLLOW)
+    with_trace = after(STANFORD, SetMode(mode=Mode.REPLAY), Show(part=Part.TRACE, on=True), FOLLOW)
     x, y, z = state_tool(STANFORD)
-    assert np.allclose(traced.trace, [(x, y, z), (0.5 - y, x - 2.0, z + 3.0)], rtol=0, atol=1e-12)
+    assert np.allclose(with_trace.trace, [(x, y, z), (0.5 - y, x - 2.0, z + 3.0)], rtol=0, atol=1e-12)
 
 
 def test_only_a_recording_moves_base_link_and_only_to_a_place() -> None:
@@ -157,6 +157,6 @@ def test_a_base_that_is_fixed_has_no_pose_of_its_own(tmp_path: Path) -> None:
 
 
 def test_the_pose_that_is_told_is_called_one_in_base_link_whatever_that_does() -> None:
-    assert whose_pose(STANFORD) == "<b>tool0</b> in base_link"
+    assert frame_title(STANFORD) == "<b>tool0</b> in base_link"
     floating = after(STANFORD, SetMode(mode=Mode.REPLAY), FOLLOW)
-    assert whose_pose(floating) == "<b>tool0</b> in base_link (which floats in the scene)"
+    assert frame_title(floating) == "<b>tool0</b> in base_link (which floats in the scene)"

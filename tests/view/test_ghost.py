@@ -14,13 +14,13 @@ from dh2sim.model.build import build_model
 from dh2sim.robot.spec import Limits, RobotSpec, Row
 from dh2sim.typing import Array
 from dh2sim.view.scene.ghost import (
-    Gap,
+    ToolOffset,
     ghost_configuration,
     ghost_scene,
-    other_reading,
-    reading_gap,
-    told_ghost,
-    told_reading,
+    ghost_text,
+    misread,
+    misread_offset,
+    misread_text,
 )
 from dh2sim.view.scene.items import Placed, Solid
 from tests.kinematics.robots import HAYATI, MODIFIED, ODD_ARM, STANDARD, row
@@ -69,7 +69,7 @@ def test_joints_are_matched_by_order_where_no_name_is_the_same_and_the_rest_stay
     )
     found = ghost_configuration(there, here, [0.1, 0.2])
     assert found.q.tolist() == [0.1, 0.2, 0.7]
-    assert found.notes == ("there has joints that here does not have, which stay at home: three.",)
+    assert found.notes == ("Joints of there that here does not have, shown at home: three.",)
 
 
 def test_an_angle_is_never_taken_for_a_length() -> None:
@@ -77,7 +77,7 @@ def test_an_angle_is_never_taken_for_a_length() -> None:
     there = build_model(arm("there", row("a", "prismatic", a=0.4), row("b", "prismatic", a=0.1)))
     found = ghost_configuration(there, here, [1.5, 0.1])
     assert found.q.tolist() == [there.home[0], 0.1]
-    assert found.notes == ("there has joints that here does not have, which stay at home: a.",)
+    assert found.notes == ("Joints of there that here does not have, shown at home: a.",)
 
 
 def test_a_ghost_stops_at_its_limits() -> None:
@@ -87,7 +87,7 @@ def test_a_ghost_stops_at_its_limits() -> None:
     )
     found = ghost_configuration(there, here, [2.0, -2.0, 9.0])
     assert found.q.tolist() == [0.5, -0.5, 9.0]
-    assert found.notes == ("there stops at the limits of: a, b.",)
+    assert found.notes == ("Joints of there at their limits: a, b.",)
 
 
 def test_another_robot_is_told_by_where_its_tool_is_and_by_what_it_cannot_do() -> None:
@@ -97,14 +97,14 @@ def test_another_robot_is_told_by_where_its_tool_is_and_by_what_it_cannot_do() -
     ours, theirs = table_tool_pose(robot("puma560"), q), table_tool_pose(robot("planar_2r"), stands.q)
     distance = np.linalg.norm(theirs[:3, 3] - ours[:3, 3])
     angle = np.degrees(np.arccos(0.5 * (np.trace(ours[:3, :3].T @ theirs[:3, :3]) - 1.0)))
-    assert told_ghost(there, here, q) == (f"planar_2r puts tool0 {distance:.3g} m away and turned by {angle:.3g}°.")
+    assert ghost_text(there, here, q) == (f"planar_2r has tool0 {distance:.3g} m away and turned by {angle:.3g}°.")
     limited_there = build_model(arm("there", limited(row("a", a=0.3), -1.0, 0.5)))
     wide = build_model(arm("here", limited(row("a", a=0.3), -1.0, 2.5)))
-    assert told_ghost(limited_there, wide, [2.0]).endswith(" there stops at the limits of: a.")
+    assert ghost_text(limited_there, wide, [2.0]).endswith(" Joints of there at their limits: a.")
 
 
 def test_the_other_reading_has_the_same_numbers_in_the_other_convention() -> None:
-    read = other_reading(ODD_ARM)
+    read = misread(ODD_ARM)
     assert [entry.convention for entry in read.rows] == [
         STANDARD if entry.convention is MODIFIED else MODIFIED for entry in ODD_ARM.rows
     ]
@@ -116,59 +116,59 @@ def test_the_other_reading_has_the_same_numbers_in_the_other_convention() -> Non
 
 
 def test_reading_twice_in_the_other_convention_is_reading_in_the_right_one() -> None:
-    back = other_reading(other_reading(ODD_ARM))
+    back = misread(misread(ODD_ARM))
     assert [entry.convention for entry in back.rows] == [entry.convention for entry in ODD_ARM.rows]
 
 
 def test_hayati_rows_have_no_other_reading() -> None:
     mixed = RobotSpec(name="m", rows=(row("one", convention=HAYATI, beta=0.1), row("two", a=0.1)))
-    assert [entry.convention for entry in other_reading(mixed).rows] == [HAYATI, MODIFIED]
+    assert [entry.convention for entry in misread(mixed).rows] == [HAYATI, MODIFIED]
     pure = RobotSpec(name="h", rows=(row("one", convention=HAYATI, a=0.3, beta=0.1),))
-    assert told_reading(pure, [0.3]) == "All rows are Hayati rows, which have no other reading."
+    assert misread_text(pure, [0.3]) == "All rows are Hayati rows, which have no other reading."
 
 
 @given(robots_with_joint_vectors(max_rows=6))
 def test_the_gap_is_the_one_between_the_tables_themselves(drawn: tuple[RobotSpec, Array]) -> None:
     spec, vectors = drawn
-    gap = reading_gap(spec, vectors[0])
-    here, there = table_tool_pose(spec, vectors[0]), table_tool_pose(other_reading(spec), vectors[0])
-    assert gap.distance == pytest.approx(np.linalg.norm(there[:3, 3] - here[:3, 3]), rel=1e-9, abs=1e-12)
+    offset = misread_offset(spec, vectors[0])
+    here, there = table_tool_pose(spec, vectors[0]), table_tool_pose(misread(spec), vectors[0])
+    assert offset.distance == pytest.approx(np.linalg.norm(there[:3, 3] - here[:3, 3]), rel=1e-9, abs=1e-12)
     cosine = 0.5 * (np.trace(here[:3, :3].T @ there[:3, :3]) - 1.0)
-    assert math.cos(gap.angle) == pytest.approx(cosine, abs=1e-12)
+    assert math.cos(offset.angle) == pytest.approx(cosine, abs=1e-12)
 
 
 def test_the_puma_misread_is_told_in_metres_and_degrees() -> None:
     q = np.radians([10.0, -40.0, 20.0, 30.0, 50.0, 60.0])
     spec = robot("puma560")
-    here, there = table_tool_pose(spec, q), table_tool_pose(other_reading(spec), q)
+    here, there = table_tool_pose(spec, q), table_tool_pose(misread(spec), q)
     distance = np.linalg.norm(there[:3, 3] - here[:3, 3])
     angle = np.degrees(np.arccos(0.5 * (np.trace(here[:3, :3].T @ there[:3, :3]) - 1.0)))
-    assert told_reading(spec, q) == (
-        f"Read as standard, this table puts tool0 {distance:.3g} m away and turned by {angle:.3g}°."
+    assert misread_text(spec, q) == (
+        f"Read as standard, this table has tool0 {distance:.3g} m away and turned by {angle:.3g}°."
     )
 
 
 def test_mixed_conventions_are_swapped() -> None:
-    assert told_reading(ODD_ARM, np.zeros(5)).startswith(
-        "Read with standard and modified swapped, this table puts tool0 "
+    assert misread_text(ODD_ARM, np.zeros(5)).startswith(
+        "Read with standard and modified swapped, this table has tool0 "
     )
 
 
 @pytest.mark.parametrize(
-    ("gap", "sentence"),
+    ("offset", "text"),
     [
-        (Gap(distance=0.0, angle=0.0), "This puts tool0 at the same pose."),
-        (Gap(distance=1e-12, angle=1e-12), "This puts tool0 at the same pose."),
-        (Gap(distance=0.123456, angle=0.0), "This puts tool0 0.123 m away."),
-        (Gap(distance=0.0, angle=math.pi), "This puts tool0 turned by 180°."),
-        (Gap(distance=1234.5, angle=0.5), "This puts tool0 1230 m away and turned by 28.6°."),
-        (Gap(distance=1.5e-5, angle=1e-6), "This puts tool0 0.000015 m away and turned by 0.0000573°."),
+        (ToolOffset(distance=0.0, angle=0.0), "at the same pose"),
+        (ToolOffset(distance=1e-12, angle=1e-12), "at the same pose"),
+        (ToolOffset(distance=0.123456, angle=0.0), "0.123 m away"),
+        (ToolOffset(distance=0.0, angle=math.pi), "turned by 180°"),
+        (ToolOffset(distance=1234.5, angle=0.5), "1230 m away and turned by 28.6°"),
+        (ToolOffset(distance=1.5e-5, angle=1e-6), "0.000015 m away and turned by 0.0000573°"),
     ],
 )
-def test_a_gap_is_told_in_three_digits(gap: Gap, sentence: str) -> None:
-    assert gap.told("This") == sentence
+def test_an_offset_is_written_with_three_digits(offset: ToolOffset, text: str) -> None:
+    assert offset.text == text
 
 
-def test_a_table_of_parallel_axes_is_told_to_be_the_same_where_it_is() -> None:
+def test_misreading_a_table_of_parallel_axes_makes_no_difference() -> None:
     spec = RobotSpec(name="turner", rows=(row("a", d=0.2), row("b", d=0.3)))
-    assert told_reading(spec, [0.3, 0.4]) == "Read as modified, this table puts tool0 at the same pose."
+    assert misread_text(spec, [0.3, 0.4]) == "Read as modified, this table has tool0 at the same pose."

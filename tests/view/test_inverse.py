@@ -129,7 +129,7 @@ def test_any_robot_stays_within_its_limits_and_gets_no_farther_from_the_goal(
         return math.hypot(distance / size, lever * angle)
 
     first = cost(math.dist(before[:3, 3], T[:3, 3]), angle_between(before[:3, :3], T[:3, :3]))
-    # at the end a robot with few joints gives up orientation for position; the pull of the start counts 0.001 a joint
+    # at the end a robot with few joints gives up orientation for position; the drag of the start counts 0.001 a joint
     left = cost(found.position_error, found.rotation_error if model.chain.n >= 6 else 0.0)
     assert left <= first + 1e-2
 
@@ -277,15 +277,15 @@ def pose(row: int, column: int, value: float) -> Array:
         ([["x"]], "the goal must be an array of real numbers"),
         (
             pose(2, 2, -1.0),
-            "the goal is no pose: its upper left 3x3 part must be a rotation, its last row 0 0 0 1",
+            "the goal must be a pose: its upper left 3x3 part must be a rotation, its last row 0 0 0 1",
         ),
         (
             pose(2, 2, 1e300),
-            "the goal is no pose: its upper left 3x3 part must be a rotation, its last row 0 0 0 1",
+            "the goal must be a pose: its upper left 3x3 part must be a rotation, its last row 0 0 0 1",
         ),
         (
             pose(3, 3, 2.0),
-            "the goal is no pose: its upper left 3x3 part must be a rotation, its last row 0 0 0 1",
+            "the goal must be a pose: its upper left 3x3 part must be a rotation, its last row 0 0 0 1",
         ),
     ],
     ids=["nan", "inf", "shape", "text", "mirror", "huge", "scale"],

@@ -47,10 +47,10 @@ def test_pages_have_states_of_their_own_and_a_reload_begins_anew(open_page: Open
 def test_the_pose_is_shown_in_every_form_beside_that_of_mujoco(open_page: OpenPage, tmp_path: Path) -> None:
     page, spec = open_page(), load_robot("stanford")
     open_tab(page, "Pose")
-    wait_until(lambda: "MuJoCo has it" in shown(page, "mujoco"), "MuJoCo's pose")
+    wait_until(lambda: "Difference to MuJoCo" in shown(page, "mujoco"), "MuJoCo's pose")
     matrix = np.array(shown(page, "matrix").split(), dtype=np.float64).reshape(4, 4)
     assert np.allclose(matrix, table_tool_pose(spec, HOME), rtol=0, atol=1e-6)
-    found = re.search(r"MuJoCo has it (\S+) m and (\S+) rad", shown(page, "mujoco"))
+    found = re.search(r"Difference to MuJoCo: (\S+) m, (\S+) rad", shown(page, "mujoco"))
     assert found is not None
     assert all(float(number) < 1e-12 for number in found.groups())
     page.screenshot(path=tmp_path / "pose.png")
@@ -75,7 +75,7 @@ def test_files_are_handed_out_as_edited_and_the_model_matches_the_table(open_pag
     engine = MujocoEngine(tmp_path / "stanford.xml", [row.name for row in robot.moving_rows], len(robot.rows))
     tool = engine.frame_poses(np.array([HOME]))[0, engine.frames.index("tool0")]
     assert np.allclose(tool, table_tool_pose(robot, HOME), rtol=0, atol=1e-12)
-    wait_until(lambda: "stanford.xml: off the table by at most" in shown(page, "notice"), "the comparison")
+    wait_until(lambda: "stanford.xml: largest difference to the table" in shown(page, "notice"), "the comparison")
 
 
 def test_a_page_of_somebody_else_is_turned_away(viewer: Viewer) -> None:

@@ -13,7 +13,7 @@ import pytest
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import Convention
-from dh2sim.view.scene.ghost import told_reading
+from dh2sim.view.scene.ghost import misread_text
 from dh2sim.view.server import Viewer
 from tests.view.on_page import OpenPage, choose, field, open_tab, pixel, shown, wait_for_position, wait_until, xyz
 
@@ -57,8 +57,8 @@ def test_the_table_is_edited_marked_read_another_way_and_taken_back(open_page: O
     wait_for_position(page, edited, HOME)
     open_tab(page, "Table")
     field(page, "α₂").fill("90 +")
-    wait_until(lambda: "it ends too early" in shown(page, "complaint"), "the complaint")
-    assert shown(page, "notice") == "The robot is the one of before: joints[1].alpha: in '90 +': it ends too early"
+    wait_until(lambda: "it ends too early" in shown(page, "error"), "the error")
+    assert shown(page, "notice") == "Robot unchanged: joints[1].alpha: in '90 +': it ends too early"
     page.screenshot(path=tmp_path / "table.png")
     open_tab(page, "Joints")
     wait_for_position(page, edited, HOME)
@@ -87,7 +87,7 @@ def test_physics_moves_the_robot_until_it_is_given_back(open_page: OpenPage, tmp
     page, spec = open_page(), load_robot("stanford")
     open_tab(page, "Motion")
     choose(page, "Actuators", "free")
-    choose(page, "Moved by", "physics")
+    choose(page, "Mode", "physics")
     wait_until(lambda: simulated(page) >= 1.0, "a second is simulated")
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("button", name="Play").wait_for()
@@ -99,7 +99,7 @@ def test_physics_moves_the_robot_until_it_is_given_back(open_page: OpenPage, tmp
     home = table_tool_pose(spec, HOME)[:3, 3]
     wait_until(lambda: math.dist(xyz(page), home) > 0.1, "the arm falls")
     open_tab(page, "Motion")
-    choose(page, "Moved by", "me")
+    choose(page, "Mode", "manual")
     open_tab(page, "Joints")
     page.get_by_role("button", name="home").click()
     wait_for_position(page, spec, HOME)
@@ -114,7 +114,7 @@ def simulated(page: Page) -> float:
 def test_a_link_is_pulled_at_with_the_mouse(open_page: OpenPage, viewer: Viewer, tmp_path: Path) -> None:
     page, spec = open_page(), load_robot("stanford")
     open_tab(page, "Motion")
-    choose(page, "Moved by", "physics")
+    choose(page, "Mode", "physics")
     wait_until(lambda: simulated(page) > 0.1, "the simulation runs")
     (served,) = viewer.pages
     shoulder, wrist = table_frame_poses(spec, HOME)[[2, 3], :3, 3]
@@ -123,33 +123,33 @@ def test_a_link_is_pulled_at_with_the_mouse(open_page: OpenPage, viewer: Viewer,
     page.mouse.down()
     page.mouse.move(x + 40, y, steps=4)
     page.mouse.move(x + 60, y - 10, steps=4)
-    wait_until(lambda: served.state.pull is not None, "the link is grabbed")
-    pull = served.state.pull
-    assert pull is not None
-    assert pull.link == "link_3"
-    wait_until(lambda: f"{pull.link} is pulled at with" in shown(page, "motion"), "it is told")
+    wait_until(lambda: served.state.drag is not None, "the link is grabbed")
+    drag = served.state.drag
+    assert drag is not None
+    assert drag.link == "link_3"
+    wait_until(lambda: f"Force on {drag.link}: " in shown(page, "motion"), "it is told")
     wait_until(lambda: math.dist(pixel(page, served, target(served)), (x + 60, y - 10)) < 3.0, "the mouse is there")
-    page.screenshot(path=tmp_path / "pull.png")
+    page.screenshot(path=tmp_path / "drag.png")
     page.mouse.up()
-    wait_until(lambda: served.state.pull is None, "the link is let go")
-    wait_until(lambda: "pulled" not in shown(page, "motion"), "no more is told")
+    wait_until(lambda: served.state.drag is None, "the link is let go")
+    wait_until(lambda: "Force on" not in shown(page, "motion"), "no more is told")
 
 
 def target(served: ServedPage) -> Sequence[float]:
     """Where the mouse pulls to, m."""
-    pull = served.state.pull
-    assert pull is not None
-    return pull.target
+    drag = served.state.drag
+    assert drag is not None
+    return drag.target
 
 
 def test_another_robot_or_the_table_misread_stands_beside_as_a_ghost(open_page: OpenPage, tmp_path: Path) -> None:
     page, spec = open_page(), load_robot("stanford")
     open_tab(page, "Show")
-    choose(page, "Ghost is", "the table misread")
-    wait_until(lambda: "Read as modified, this table puts tool0 " in shown(page, "ghost"), "the misread table")
-    assert shown(page, "ghost") == told_reading(spec, HOME)
-    choose(page, "Ghost is", "scara")
-    wait_until(lambda: shown(page, "ghost").startswith("scara puts tool0 "), "another robot")
+    choose(page, "Ghost", "this table, misread")
+    wait_until(lambda: "Read as modified, this table has tool0 " in shown(page, "ghost"), "the misread table")
+    assert shown(page, "ghost") == misread_text(spec, HOME)
+    choose(page, "Ghost", "scara")
+    wait_until(lambda: shown(page, "ghost").startswith("scara has tool0 "), "another robot")
     page.screenshot(path=tmp_path / "ghost.png")
-    choose(page, "Ghost is", "nobody")
+    choose(page, "Ghost", "none")
     wait_until(lambda: not shown(page, "ghost"), "no ghost")

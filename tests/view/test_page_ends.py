@@ -8,7 +8,7 @@ import pytest
 
 from dh2sim.robot.read import load_robot
 from dh2sim.view.initial_state import open_state
-from dh2sim.view.page import says_that_nobody_is_there
+from dh2sim.view.page import is_disconnect
 from dh2sim.view.server import Viewer
 from tests.view.on_page import wait_until
 from tests.view.without_browser import speaking
@@ -23,12 +23,12 @@ from tests.view.without_browser import speaking
     ids=["viser", "asyncio"],
 )
 def test_a_browser_that_was_closed_is_no_defect(error: Exception) -> None:
-    assert says_that_nobody_is_there(error)
+    assert is_disconnect(error)
 
 
 @pytest.mark.parametrize("error", [RuntimeError("dictionary changed size"), UserWarning("something else")])
 def test_everything_else_is(error: Exception) -> None:
-    assert not says_that_nobody_is_there(error)
+    assert not is_disconnect(error)
 
 
 def test_a_server_ends_after_all_that_its_pages_still_do_for_browsers_that_are_gone() -> None:
@@ -57,7 +57,7 @@ def test_a_page_that_is_closed_leaves_what_is_queued() -> None:
             page.close()
             busy.set()
             page.join(20.0)
-            assert not page.works
+            assert not page.is_alive
             assert not done.is_set()
     finally:
         viewer.stop()

@@ -18,14 +18,14 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.simulate.dataset_layout import POSE
 from dh2sim.typing import Array
 from dh2sim.view.page_export import (
-    MOST_PICTURES,
-    RATE,
-    Extent,
+    MAX_FRAME_RATE,
+    MAX_FRAMES,
+    BoundingSphere,
+    bounding_sphere,
     export_page,
-    extent_of,
     page_html,
     robot_page_scene,
-    rollout_moments,
+    rollout_keyframes,
     shown_records,
 )
 from dh2sim.view.scene.items import Arrow, Label, Placed, Scene, Solid, Triad
@@ -35,7 +35,7 @@ from tests.robots.samples import NAMES, robot
 from tests.view.test_solids import matrix
 
 RED = (1.0, 0.0, 0.0)
-UNIT = Extent(centre=(0.0, 0.0, 0.0), radius=1.0)
+UNIT = BoundingSphere(centre=(0.0, 0.0, 0.0), radius=1.0)
 
 
 def rollout(run: xr.Dataset, number: int = 0) -> RolloutData:
@@ -77,7 +77,7 @@ def test_every_frame_of_the_table_stands_below_its_link_and_has_its_name(name: s
 
 def test_a_rollout_is_shown_with_the_tool_where_it_was_recorded() -> None:
     run, model = swinging("stanford"), build_model(robot("stanford"))
-    moments = list(rollout_moments(model, rollout(run, 1)))
+    moments = list(rollout_keyframes(model, rollout(run, 1)))
     times = run["time"].values
     assert len(moments) > 3
     assert moments[0][0] == 0.0
@@ -94,7 +94,7 @@ def test_a_rollout_is_shown_with_the_tool_where_it_was_recorded() -> None:
 def test_a_rollout_that_stopped_is_shown_up_to_there() -> None:
     run, model = stopped(swinging("rpr"), 1, 4), build_model(robot("rpr"))
     times = run["time"].values
-    assert list(rollout_moments(model, rollout(run, 1)))[-1][0] == times[4] - times[0]
+    assert list(rollout_keyframes(model, rollout(run, 1)))[-1][0] == times[4] - times[0]
 
 
 def test_a_floating_base_takes_the_robot_along() -> None:
@@ -113,13 +113,13 @@ def test_a_floating_base_takes_the_robot_along() -> None:
     )
     run = run.assign(base_pose=(("rollout", "step", "pose"), np.stack([poses, poses])))
     assert list(run["pose"].values) == list(POSE)
-    base = list(rollout_moments(model, rollout(run)))[-1][1]["/robot"]
+    base = list(rollout_keyframes(model, rollout(run)))[-1][1]["/robot"]
     assert base == Placed(position=(2.0, 3.0, 4.0), orientation=(math.cos(0.5), 0.0, 0.0, math.sin(0.5)))
 
 
 def test_a_rollout_of_another_robot_is_refused() -> None:
     with pytest.raises(PictureError) as caught:
-        list(rollout_moments(build_model(robot("scara")), rollout(swinging("rpr"))))
+        list(rollout_keyframes(build_model(robot("scara")), rollout(swinging("rpr"))))
     here = ", ".join(row.name for row in robot("scara").moving_rows)
     there = ", ".join(row.name for row in robot("rpr").moving_rows)
     assert str(caught.value) == f"run.zarr, rollout 0 is of a robot with the joints {there}; scara has {here}"
@@ -127,12 +127,12 @@ def test_a_rollout_of_another_robot_is_refused() -> None:
 
 def test_a_rollout_without_positions_is_refused() -> None:
     with pytest.raises(PictureError, match="a page needs qpos, which the run does not hold"):
-        list(rollout_moments(build_model(robot("rpr")), rollout(swinging("rpr", without=("qpos",)))))
+        list(rollout_keyframes(build_model(robot("rpr")), rollout(swinging("rpr", without=("qpos",)))))
 
 
 @pytest.mark.parametrize(
     ("duration", "count", "expected"),
-    [(2.0, 2001, 61), (2.0, 21, 21), (1000.0, 100_001, MOST_PICTURES), (0.0, 1, 1), (0.01, 11, 2)],
+    [(2.0, 2001, 61), (2.0, 21, 21), (1000.0, 100_001, MAX_FRAMES), (0.0, 1, 1), (0.01, 11, 2)],
 )
 def test_as_many_records_are_shown_as_can_be_seen(duration: float, count: int, expected: int) -> None:
     times = np.linspace(5.0, 5.0 + duration, count)
@@ -142,20 +142,20 @@ def test_as_many_records_are_shown_as_can_be_seen(duration: float, count: int, e
     assert shown == sorted(set(shown))
     if expected > 2:
         steps = np.diff(times[shown])
-        assert steps.max() <= max(duration / (expected - 1), 1 / RATE) * 1.1
+        assert steps.max() <= max(duration / (expected - 1), 1 / MAX_FRAME_RATE) * 1.1
 
 
 def test_the_extent_holds_everything_at_every_moment() -> None:
     model = build_model(robot("puma560"))
     scenes = [robot_page_scene(model, model.home + step) for step in (0.0, 0.5, 1.0)]
-    extent = extent_of(scenes)
+    bounds = bounding_sphere(scenes)
     for scene in scenes:
         for name, item in scene.items():
             if isinstance(item, Solid):
                 T = world_pose(scene, name)
                 points = np.array(item.vertices) @ T[:3, :3].T + T[:3, 3]
-                assert np.linalg.norm(points - extent.centre, axis=1).max() <= extent.radius
-    assert extent.radius < 2.0 * model.reach
+                assert np.linalg.norm(points - bounds.centre, axis=1).max() <= bounds.radius
+    assert bounds.radius < 2.0 * model.reach
 
 
 def test_the_extent_counts_lines_and_arrows_and_is_never_nothing() -> None:
@@ -164,8 +164,8 @@ def test_the_extent_counts_lines_and_arrows_and_is_never_nothing() -> None:
         "/a/line": Line(points=((0.0, 0.0, 0.0), (0.0, 4.0, 0.0)), color=RED),
         "/arrow": Arrow(start=(1.0, 0.0, 0.0), end=(1.0, 0.0, 3.0), color=RED, thickness=0.1),
     }
-    assert extent_of([scene]) == Extent(centre=(1.0, 2.0, 1.5), radius=2.5)
-    assert extent_of([{"/a": Placed()}]) == Extent(centre=(0.0, 0.0, 0.0), radius=1.0)
+    assert bounding_sphere([scene]) == BoundingSphere(centre=(1.0, 2.0, 1.5), radius=2.5)
+    assert bounding_sphere([{"/a": Placed()}]) == BoundingSphere(centre=(0.0, 0.0, 0.0), radius=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -202,5 +202,5 @@ def test_a_folder_that_is_not_there_is_told(puma: RobotModel, tmp_path: Path) ->
 
 
 def test_the_title_cannot_break_the_page() -> None:
-    page = page_html([(0.0, {"/a": Placed()})], title="</title><script>alert(1)</script>", extent=UNIT)
+    page = page_html([(0.0, {"/a": Placed()})], title="</title><script>alert(1)</script>", bounds=UNIT)
     assert "<title>&lt;/title&gt;&lt;script&gt;alert(1)&lt;/script&gt;</title>" in page

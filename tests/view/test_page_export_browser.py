@@ -18,7 +18,7 @@ from PIL import Image
 from dh2sim.draw.rollout_data import select_rollout
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.view.page_export import Extent, export_page, page_html
+from dh2sim.view.page_export import BoundingSphere, export_page, page_html
 from dh2sim.view.scene.items import ORIGIN, Color, Placed, Scene, Solid, Vector
 from tests.draw.datasets import swinging
 from tests.robots.samples import robot
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Route
 
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-UNIT = Extent(centre=(0.0, 0.0, 0.0), radius=1.0)
+UNIT = BoundingSphere(centre=(0.0, 0.0, 0.0), radius=1.0)
 WIDTH, HEIGHT = 480, 360
 DEADLINE = 60.0
 """s: a browser without a graphics card is slow."""
@@ -176,7 +176,7 @@ def test_solids_are_seen_where_they_are_in_the_colour_that_they_have(tab: Tab, t
         "/up/blue": box(BLUE, half=0.15),
         "/green": box(GREEN, half=0.15, position=(0.8, 0.0, -0.3)),
     }
-    path.write_text(page_html([(0.0, scene)], title="boxes", extent=UNIT), encoding="utf-8")
+    path.write_text(page_html([(0.0, scene)], title="boxes", bounds=UNIT), encoding="utf-8")
     tab.open(path)
     picture = tab.picture_when(middle_is(0))
     assert middle_is(0)(picture)
@@ -192,7 +192,7 @@ def test_solids_are_seen_where_they_are_in_the_colour_that_they_have(tab: Tab, t
 def test_an_animation_plays_again_and_again_and_goes_to_any_time(tab: Tab, tmp_path: Path) -> None:
     path = tmp_path / "colours.html"
     moments = [(0.4 * k, {"/box": box(color)}) for k, color in enumerate((RED, GREEN, BLUE))]
-    path.write_text(page_html(moments, title="colours", extent=UNIT), encoding="utf-8")
+    path.write_text(page_html(moments, title="colours", bounds=UNIT), encoding="utf-8")
     tab.open(path)
     clock = tab.page.locator("input").first
     clock.wait_for()

@@ -29,7 +29,7 @@ def test_an_interruption_ends_a_program_that_simulates(window: BrowserContext) -
         page = window.new_page()
         page.goto(found.group())
         open_tab(page, "Motion")
-        choose(page, "Moved by", "physics")
+        choose(page, "Mode", "physics")
         wait_until(
             lambda: re.match(r"Simulated: (?!0\.0)", shown(page, "motion")) is not None, "the arm is simulated"
         )

@@ -11,7 +11,7 @@ import pytest
 from dh2sim.robot.read import load_robot
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import Page as ServedPage
-from dh2sim.view.scene.robot_size import eye_of
+from dh2sim.view.scene.camera import viewpoint_of
 from tests.view.on_page import Serve, choose, field, open_tab, shown, wait_for_position, wait_until
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def test_keys_typed_into_a_field_move_nothing(serve: Serve) -> None:
     page.keyboard.type("147rfvgGyhn")
     wait_until(lambda: "147rfvgGyhn" in shown(page, "table"), "the cell")
     assert served.state.q[1:] == pytest.approx(home[1:], abs=1e-12)
-    assert served.state.draft.complaints, "it is no number, and the robot is the one of before"
+    assert served.state.table.errors, "it is no number, and the robot is the one of before"
 
 
 @pytest.mark.slow
@@ -87,7 +87,7 @@ def test_an_arrow_held_at_a_slider_moves_the_joint_and_not_the_eye(serve: Serve)
     camera = served.client.camera
     wait_until(lambda: camera.aspect < 1.0, "the panel is beside the scene")
     wait_until(
-        lambda: np.allclose(camera.position, eye_of(served.state.model, camera.aspect).position, atol=1e-6),
+        lambda: np.allclose(camera.position, viewpoint_of(served.state.model, camera.aspect).position, atol=1e-6),
         "the eye is where it begins",
     )
     eye = camera.position.copy()

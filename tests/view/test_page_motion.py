@@ -13,9 +13,9 @@ import pytest
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.read import load_robot
 from dh2sim.view.initial_state import open_state
-from dh2sim.view.motion.motion import Recording, Simulation
+from dh2sim.view.motion.motion_source import Recording, Simulation
 from dh2sim.view.motion.replay import Replay, open_replay
-from dh2sim.view.state import Pull
+from dh2sim.view.state import LinkDrag
 from tests.program import dh2sim
 
 STANFORD = open_state(load_robot("stanford"))
@@ -36,8 +36,8 @@ def test_a_simulation_goes_with_the_clock_and_holds_the_robot_where_it_was() -> 
         q = simulation.tick(now, STANFORD)
     assert 0.0 < simulation.physics.time <= 0.15 + 1e-9
     assert np.allclose(q, STANFORD.q, rtol=0, atol=1e-3)
-    assert re.fullmatch(r"Simulated: 0\.\d{3} s, \d\.\d\d of real time\.", simulation.told)
-    assert simulation.share == 0.0
+    assert re.fullmatch(r"Simulated: 0\.\d{3} s, \d\.\d\d x real time\.", simulation.status)
+    assert simulation.progress == 0.0
 
 
 def test_a_simulated_robot_follows_the_targets() -> None:
@@ -68,7 +68,7 @@ def test_a_simulation_stands_while_it_is_paused_and_makes_the_steps_that_were_as
     for steps, now in ((1, 5.1), (1, 5.2), (4, 5.3)):
         simulation.tick(now, replace(PAUSED, steps=steps))
         assert simulation.physics.time == pytest.approx(steps * step)
-    assert simulation.told == f"Simulated: {4 * step:.3f} s."
+    assert simulation.status == f"Simulated: {4 * step:.3f} s."
     simulation.tick(9.0, replace(STANFORD, steps=4))
     assert simulation.physics.time == pytest.approx(4 * step), "the pause is not made up for"
     simulation.tick(9.05, replace(STANFORD, steps=4))
@@ -82,13 +82,13 @@ def test_gravity_and_actuators_are_switched_while_the_robot_moves() -> None:
         simulation.tick(0.02 * k, STANFORD)
     moving = simulation.physics.qvel
     assert np.abs(moving).max() > 0.1
-    simulation.act(gravity=False, drive="free")
+    simulation.set_physics(gravity=False, drive="free")
     assert simulation.physics.qvel.tolist() == moving.tolist(), "it goes on as fast as it is"
     before = sum(simulation.physics.energy)
     simulation.tick(0.25, STANFORD)
     assert simulation.physics.time == pytest.approx(0.25, abs=0.01)
     assert sum(simulation.physics.energy) == pytest.approx(before, rel=1e-2), "nothing drives it any more"
-    simulation.act(gravity=False, drive="position")
+    simulation.set_physics(gravity=False, drive="position")
     for k in range(1, 101):
         simulation.tick(0.25 + 0.03 * k, STANFORD)
     assert np.allclose(simulation.physics.q, STANFORD.q, rtol=0, atol=0.02), "it is brought back"
@@ -96,19 +96,19 @@ def test_gravity_and_actuators_are_switched_while_the_robot_moves() -> None:
 
 def test_a_link_that_is_pulled_at_comes_to_the_mouse_until_it_is_let_go() -> None:
     simulation = Simulation(STANFORD.model, STANFORD.q, gravity=False, drive="free")
-    pull = Pull(link="link_3", point_in_link=(0.0, 0.0, 0.1), target=(0.5, 0.5, 0.5))
-    pulled = replace(STANFORD, pull=pull)
+    drag = LinkDrag(link="link_3", point_in_link=(0.0, 0.0, 0.1), target=(0.5, 0.5, 0.5))
+    pulled = replace(STANFORD, drag=drag)
     simulation.tick(0.0, pulled)
-    assert simulation.physics.pushing is not None
-    point, force = simulation.physics.pushing
-    before = math.dist(point, pull.target)
-    assert simulation.told == f"Simulated: 0.000 s. link_3 is pulled at with {np.linalg.norm(force):.3g} N."
+    assert simulation.physics.applied_force is not None
+    point, force = simulation.physics.applied_force
+    before = math.dist(point, drag.target)
+    assert simulation.status == f"Simulated: 0.000 s. Force on link_3: {np.linalg.norm(force):.3g} N."
     for k in range(1, 41):
         simulation.tick(0.05 * k, pulled)
-    assert math.dist(simulation.physics.pushing[0], pull.target) < 0.5 * before
+    assert math.dist(simulation.physics.applied_force[0], drag.target) < 0.5 * before
     simulation.tick(2.05, STANFORD)
     assert np.allclose(simulation.physics._data.qfrc_applied, 0.0)
-    assert "pulled" not in simulation.told
+    assert "pulled" not in simulation.status
 
 
 def test_a_paused_recording_goes_from_one_recorded_instant_to_the_next(replay: Replay) -> None:
@@ -128,7 +128,7 @@ def test_a_recording_is_played_by_the_clock_again_and_again(replay: Replay) -> N
     for now, instant in ((100.0, 0.0), (100.25, 0.25), (101.125, 0.125)):
         assert recording.tick(now, STANFORD) == tuple(replay.q_at(1, instant).tolist())
         assert recording.time == pytest.approx(instant)
-    assert recording.told == "Rollout 1: 0.12 of 1.00 s."
+    assert recording.status == "Rollout 1: 0.12 of 1.00 s."
 
 
 def test_a_recording_can_be_stopped_slowed_down_and_wound(replay: Replay) -> None:
@@ -136,10 +136,10 @@ def test_a_recording_can_be_stopped_slowed_down_and_wound(replay: Replay) -> Non
     recording.tick(0.0, STANFORD)
     recording.seek(0.5)
     assert recording.tick(0.0, STANFORD) == tuple(replay.q_at(0, 0.5).tolist())
-    assert recording.share == pytest.approx(0.5)
+    assert recording.progress == pytest.approx(0.5)
     recording.tick(0.3, PAUSED)
     assert recording.time == 0.5
-    recording.pace(0.25)
+    recording.set_speed(0.25)
     recording.tick(0.7, STANFORD)
     assert recording.time == pytest.approx(0.6)
     recording.seek(7.0)

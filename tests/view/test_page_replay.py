@@ -57,7 +57,7 @@ def stand_at(page: Page, percent: int, rollout: int) -> float:
     open_tab(page, "Motion")
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("button", name="Play").wait_for()
-    field(page, "Instant [%]").fill(str(percent))
+    field(page, "Time [%]").fill(str(percent))
     time = 0.01 * percent * DURATION
     told = f"Rollout {rollout}: {time:.2f} of {DURATION:.2f} s."
     wait_until(lambda: shown(page, "motion") == told, f"{shown(page, 'motion')}, not {told}")
@@ -68,7 +68,7 @@ def stand_at(page: Page, percent: int, rollout: int) -> float:
 def test_a_recording_is_paused_wound_exchanged_and_given_back(serve: Serve, run: Path) -> None:
     page, served = serve(open_state(STANFORD), run)
     open_tab(page, "Motion")
-    choose(page, "Moved by", "the recording")
+    choose(page, "Mode", "recording")
     for rollout, percent in ((0, 40), (1, 70)):
         if rollout:
             choose(page, "Rollout", str(rollout))
@@ -78,8 +78,8 @@ def test_a_recording_is_paused_wound_exchanged_and_given_back(serve: Serve, run:
         wait_for_position(page, STANFORD, q)
         assert served.state.q == pytest.approx(q, abs=1e-12)
         open_tab(page, "Motion")
-    choose(page, "Moved by", "me")
-    wait_until(lambda: served.state.mode is Mode.STILL, "the joints are given back")
+    choose(page, "Mode", "manual")
+    wait_until(lambda: served.state.mode is Mode.MANUAL, "the joints are given back")
     wait_until(lambda: shown(page, "motion") == "", "nothing is told of the recording any more")
 
 
@@ -87,12 +87,12 @@ def test_a_recording_is_paused_wound_exchanged_and_given_back(serve: Serve, run:
 def test_the_way_of_the_tool_is_drawn_while_a_recording_plays(serve: Serve, run: Path) -> None:
     page, served = serve(open_state(STANFORD), run)
     open_tab(page, "Show")
-    page.get_by_text("Trace of tool0").click()
+    page.get_by_text("Path of tool0").click()
     wait_until(lambda: Part.TRACE in served.state.shown, "the trace")
     assert served.client.scene.get_handle_by_name("/trace") is None
     open_tab(page, "Motion")
     choose(page, "Speed", "0.25")
-    choose(page, "Moved by", "the recording")
+    choose(page, "Mode", "recording")
     wait_until(lambda: len(trace_sent(served)) > 10, "tool0 goes about")
     with xr.open_dataset(run, engine="zarr", consolidated=False) as data:
         way = np.array([table_tool_pose(STANFORD, q)[:3, 3] for q in data.qpos.values[0]])
@@ -111,7 +111,7 @@ def test_a_base_that_floats_goes_away_and_comes_back(serve: Serve, tmp_path: Pat
     run = recorded(tmp_path, "--floating-base")
     page, served = serve(open_state(STANFORD), run)
     open_tab(page, "Motion")
-    choose(page, "Moved by", "the recording")
+    choose(page, "Mode", "recording")
     time = stand_at(page, 80, 0)
     with xr.open_dataset(run, engine="zarr", consolidated=False) as data:
         base = data.base_pose.values[0, np.abs(data.time.values - time).argmin()]
@@ -122,7 +122,7 @@ def test_a_base_that_floats_goes_away_and_comes_back(serve: Serve, tmp_path: Pat
     wait_for_position(page, STANFORD, q)
     wait_until(lambda: page.get_by_text("in base_link (which floats in the scene)").first.is_visible(), "it is said")
     open_tab(page, "Motion")
-    choose(page, "Moved by", "me")
+    choose(page, "Mode", "manual")
     wait_until(lambda: drawn_at(served, "/robot") == pytest.approx([0, 0, 0, 1, 0, 0, 0], abs=0), "it is back")
     assert scene_of(served.state)["/frames/tool0"].position == pytest.approx(table_tool_pose(STANFORD, q)[:3, 3])
 

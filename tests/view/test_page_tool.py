@@ -13,7 +13,7 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
 from dh2sim.view.page import Page as ServedPage
-from dh2sim.view.scene.robot_size import triad_length
+from dh2sim.view.scene.link_poses import triad_length
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import Goal, Part
 from tests.view.on_page import OpenPage, open_tab, pixel, shown, wait_for_position, wait_until
@@ -33,7 +33,7 @@ def goal_of(served: ServedPage) -> Goal:
 
 
 def drag(page: Page, served: ServedPage, axis: int, metres: float) -> None:
-    """Pull the arrow of an axis of tool0 with the mouse, and let go; again where the handle was not there yet."""
+    """LinkDrag the arrow of an axis of tool0 with the mouse, and let go; again where the handle was not there yet."""
     before, T = served.state.goal, table_tool_pose(STANFORD, served.state.q)
 
     def pulled() -> bool:

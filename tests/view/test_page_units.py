@@ -35,9 +35,9 @@ def test_the_table_is_written_in_radians_and_millimetres_and_the_robot_stays(ser
     choose(page, "Lengths in", "mm")
     millimetres = f"{1000.0 * STANFORD.rows[1].d:g}"
     wait_until(lambda: field(page, "d₂").input_value() == millimetres, "millimetres")
-    assert shown(page, "complaint") == ""
+    assert shown(page, "error") == ""
     written = parse_robot(served.state.text)
-    assert (served.state.draft.units.angle, served.state.draft.units.length) == (AngleUnit.RAD, LengthUnit.MM)
+    assert (served.state.table.units.angle, served.state.table.units.length) == (AngleUnit.RAD, LengthUnit.MM)
     for q in (HOME, SOMEWHERE):
         assert np.allclose(table_tool_pose(written, q), table_tool_pose(STANFORD, q), rtol=0, atol=1e-12)
     open_tab(page, "Joints")

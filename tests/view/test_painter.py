@@ -20,11 +20,11 @@ CORNERS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[viser.ViserServer]:
-    from dh2sim.view.server import quiet_server, stop_quietly
+    from dh2sim.view.server import start_server, stop_server
 
-    made = quiet_server("127.0.0.1", 0)
+    made = start_server("127.0.0.1", 0)
     yield made
-    stop_quietly(made)
+    stop_server(made)
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from dh2sim.view.motion.real_time import MOST_WAIT, RealTime
+from dh2sim.view.motion.physics import MAX_BACKLOG, RealTime
 
 STEP = 0.002
 
@@ -50,13 +50,13 @@ def test_a_simulation_that_is_too_slow_shows_in_the_factor_and_is_not_chased() -
         total += 0.004
         clock += 0.02
     assert pace.factor == pytest.approx(0.2, abs=0.01)
-    assert pace.due(clock) == pytest.approx(MOST_WAIT)
+    assert pace.due(clock) == pytest.approx(MAX_BACKLOG)
 
 
 def test_a_pause_of_the_page_is_not_made_up_for() -> None:
     pace = RealTime()
     run(pace, frame=0.02, seconds=1.0)
-    assert pace.due(100.0 + 1.0 + 30.0) == pytest.approx(MOST_WAIT)
+    assert pace.due(100.0 + 1.0 + 30.0) == pytest.approx(MAX_BACKLOG)
 
 
 def test_the_factor_is_that_of_the_last_second() -> None:

@@ -86,7 +86,7 @@ def test_a_robot_with_other_joints_is_refused(path: Path) -> None:
 
 def test_a_robot_that_was_changed_since_is_shown_with_a_note(path: Path, model: RobotModel) -> None:
     changed = replace(model, spec=replace(model.spec, source_file=None))
-    note = "The run was made with another text of stanford's file: what is shown may differ from it."
+    note = "The run was made with another version of stanford's file: the motion shown may differ from it."
     assert open_replay(path, changed).note == note
 
 

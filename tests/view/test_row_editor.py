@@ -88,7 +88,7 @@ def test_fields_are_named_as_the_row_s_convention_has_it(speaker: Speaker) -> No
     set_value(speaker, "Edit row", "2: joint_2")
     wait_until(lambda: fields(served) == ["a₂", "α₂", "d₂", "θ₂", "β₂"], "a Hayati row")
     set_value(speaker, "convention₂", "standard")
-    wait_until(lambda: "β₂" in fields(served) and served.state.draft.complaints != (), "beta means nothing there")
+    wait_until(lambda: "β₂" in fields(served) and served.state.table.errors != (), "beta means nothing there")
 
 
 def test_a_row_that_there_is_not_is_never_chosen(speaker: Speaker) -> None:

@@ -11,7 +11,7 @@ from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
-from dh2sim.view.events import CompareReading, Event, MoveJoint, SelectRow, SetJoints, Show
+from dh2sim.view.events import CompareMisread, Event, MoveJoint, SelectRow, SetJoints, Show
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.reduce import reduce
 from dh2sim.view.scene.items import Label, Lines, Polyline, Scene, Solid, Triad
@@ -97,7 +97,7 @@ def test_the_row_that_is_chosen_is_explained_inside_a_robot_that_can_be_seen_thr
 
 
 def test_without_soft_shading_surfaces_are_plain_and_nothing_else_changes() -> None:
-    compared = after(STANFORD, CompareReading())
+    compared = after(STANFORD, CompareMisread())
     soft, plain = scene_of(compared), scene_of(after(compared, Show(part=Part.SHADING, on=False)))
     solids = {name for name, item in soft.items() if isinstance(item, Solid)}
     assert {name.split("/")[1] for name in solids} == {"robot", "ghost"}
@@ -107,7 +107,7 @@ def test_without_soft_shading_surfaces_are_plain_and_nothing_else_changes() -> N
 
 
 def test_the_ghost_stands_where_the_other_reading_puts_it() -> None:
-    state = after(STANFORD, CompareReading(), MoveJoint(joint=1, value=0.3))
+    state = after(STANFORD, CompareMisread(), MoveJoint(joint=1, value=0.3))
     assert state.ghost is not None
     scene, ghost = scene_of(state), state.ghost.model
     frames = table_frame_poses(ghost.spec, state.q)

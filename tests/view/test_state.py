@@ -17,7 +17,7 @@ from dh2sim.robot.write import robot_file_text
 from dh2sim.view import events
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.reduce import reduce
-from dh2sim.view.state import COLUMNS, Complaint, Mode, Part, Pull, ViewState
+from dh2sim.view.state import COLUMNS, CellError, LinkDrag, Mode, Part, ViewState
 from tests.strategies import robot_specs
 
 STANFORD = open_state(load_robot("stanford"))
@@ -58,15 +58,15 @@ anything: st.SearchStrategy[events.Event] = st.one_of(
     st.builds(events.Pause, on=st.booleans()),
     st.builds(events.Step),
     st.builds(
-        events.PullLink,
-        pull=st.builds(
-            Pull,
+        events.DragLink,
+        drag=st.builds(
+            LinkDrag,
             link=st.sampled_from(["base_link", "link_1", "link_6", ""]),
             point_in_link=st.tuples(numbers, numbers, numbers),
             target=st.tuples(numbers, numbers, numbers),
         ),
     ),
-    st.builds(events.LetGo),
+    st.builds(events.ReleaseLink),
     st.builds(events.EditCell, row=rows, column=st.sampled_from([*COLUMNS, "convention", "link"]), text=typed),
     st.builds(events.SetConvention, row=st.none() | rows, convention=st.sampled_from(Convention)),
     st.builds(events.ConvertTable, convention=st.sampled_from(Convention)),
@@ -80,8 +80,8 @@ anything: st.SearchStrategy[events.Event] = st.one_of(
     st.builds(events.MoveTool, T_base_link_tool0=matrices, q=st.none() | st.just((0.1,) * 6), reached=st.booleans()),
     st.builds(events.Undo),
     st.builds(events.Compare, ghost=st.none()),
-    st.builds(events.CompareReading),
-    st.builds(events.Tell, notice=st.text(max_size=5)),
+    st.builds(events.CompareMisread),
+    st.builds(events.Notify, notice=st.text(max_size=5)),
 )
 
 
@@ -95,16 +95,16 @@ def assert_sound(state: ViewState) -> None:
     """What must hold of a page's state at all times."""
     assert len(state.q) == state.model.chain.n
     assert all(math.isfinite(value) for value in state.q)
-    if state.mode is Mode.STILL:
+    if state.mode is Mode.MANUAL:
         for joint, value in zip(state.model.moving_joints, state.q, strict=True):
             lower, upper = joint.travel
             assert lower <= value <= upper
     described = parse_robot(state.text)
     assert np.array_equal(table_tool_pose(described, state.q), table_tool_pose(state.spec, state.q))
-    assert len(state.draft.rows) == len(state.spec.rows)
+    assert len(state.table.rows) == len(state.spec.rows)
     assert 0 <= state.selected_row < len(state.spec.rows)
-    wrong = {(found.row, found.column) for found in state.draft.complaints}
-    assert len(wrong) == len(state.draft.complaints)
+    wrong = {(found.row, found.column) for found in state.table.errors}
+    assert len(wrong) == len(state.table.errors)
 
 
 @settings(max_examples=60)
@@ -125,7 +125,7 @@ def test_a_page_begins_at_home() -> None:
 
 def test_the_robot_file_is_shown_as_it_was_written() -> None:
     assert STANFORD.text == load_robot("stanford").source_file.text  # type: ignore[union-attr]
-    assert STANFORD.draft.rows[0].cells == ("0", "-90", "d1", "0", "0")
+    assert STANFORD.table.rows[0].cells == ("0", "-90", "d1", "0", "0")
 
 
 def test_a_joint_stops_at_its_limit() -> None:
@@ -147,7 +147,7 @@ def test_the_same_seed_gives_the_same_random_configuration() -> None:
 def test_an_expression_in_a_cell_is_evaluated_with_the_parameters_of_the_file() -> None:
     edited = after(STANFORD, events.EditCell(row=1, column="d", text="d2 + d1/2"))
     assert edited.spec.rows[1].d == 0.15 + 0.4 / 2
-    assert edited.draft.rows[1].cells[2] == "d2 + d1/2"
+    assert edited.table.rows[1].cells[2] == "d2 + d1/2"
     assert edited.notice == ""
 
 
@@ -181,10 +181,10 @@ def test_a_wrong_cell_keeps_the_robot_and_says_why_in_the_words_of_the_reader() 
     wrong = after(STANFORD, events.EditCell(row=0, column="alpha", text="-90+"))
     assert wrong.model is STANFORD.model
     assert wrong.text == STANFORD.text
-    assert wrong.draft.rows[0].cells[1] == "-90+"
+    assert wrong.table.rows[0].cells[1] == "-90+"
     message = "in '-90+': it ends too early"
-    assert wrong.draft.complaints == (Complaint(row=0, column="alpha", text="-90+", message=message),)
-    assert wrong.notice == f"The robot is the one of before: joints[0].alpha: {message}"
+    assert wrong.table.errors == (CellError(row=0, column="alpha", text="-90+", message=message),)
+    assert wrong.notice == f"Robot unchanged: joints[0].alpha: {message}"
 
 
 def test_a_right_cell_is_taken_while_another_one_is_wrong() -> None:
@@ -194,10 +194,10 @@ def test_a_right_cell_is_taken_while_another_one_is_wrong() -> None:
         events.EditCell(row=1, column="d", text="0.2"),
     )
     assert state.spec.rows[1].d == 0.2
-    (found,) = state.draft.complaints
+    (found,) = state.table.errors
     assert found.message == "unknown name 'x'. Known names: pi, d1, d2, d6"
     mended = after(state, events.EditCell(row=0, column="alpha", text="-45"))
-    assert mended.draft.complaints == ()
+    assert mended.table.errors == ()
     assert mended.spec.rows[0].alpha == math.radians(-45)
 
 
@@ -205,24 +205,24 @@ def test_what_is_typed_cannot_become_anything_but_the_value_of_its_cell() -> Non
     for text in ("0, link: {mesh: {file: x.stl}}", "0}\n  - {type: fixed", "&a 0", "!!python/object:x", "# gone"):
         state = after(STANFORD, events.EditCell(row=0, column="a", text=text))
         assert state.model is STANFORD.model
-        assert state.draft.complaint(0, "a") is not None
+        assert state.table.error(0, "a") is not None
 
 
 def test_a_very_long_cell_is_refused_and_cut_short() -> None:
     state = after(STANFORD, events.EditCell(row=0, column="a", text="1" * 100_000))
-    assert state.draft.complaints[0].message == "100000 characters; at most 200 are allowed"
-    assert len(state.draft.rows[0].cells[0]) == 201
+    assert state.table.errors[0].message == "100000 characters; at most 200 are allowed"
+    assert len(state.table.rows[0].cells[0]) == 201
 
 
 def test_a_robot_too_large_to_be_drawn_is_refused() -> None:
     state = after(STANFORD, events.EditCell(row=0, column="a", text="2e6"))
-    assert state.draft.complaints[0].message == "the robot would reach 2e+06 m; at most 1e+06 m are shown"
+    assert state.table.errors[0].message == "the robot's reach is 2e+06 m; at most 1e+06 m can be shown"
 
 
 def test_reading_a_row_in_another_convention_makes_another_robot_of_the_same_numbers() -> None:
     read = after(STANFORD, events.SetConvention(row=0, convention=Convention.MODIFIED))
     assert read.spec.rows[0].convention is Convention.MODIFIED
-    assert [row.cells for row in read.draft.rows] == [row.cells for row in STANFORD.draft.rows]
+    assert [row.cells for row in read.table.rows] == [row.cells for row in STANFORD.table.rows]
     q = STANFORD.q
     assert not np.allclose(table_tool_pose(read.spec, q), table_tool_pose(STANFORD.spec, q))
 
@@ -249,7 +249,7 @@ def test_a_row_becomes_hayati_and_back_though_a_zero_stands_in_a_column_that_it_
         events.SetConvention(row=4, convention=Convention.STANDARD),
     )
     assert back.spec.rows[4].convention is Convention.STANDARD, back.notice
-    assert back.draft.rows[4].cells == state.draft.rows[4].cells
+    assert back.table.rows[4].cells == state.table.rows[4].cells
 
 
 def test_converting_the_table_keeps_the_robot() -> None:
@@ -262,10 +262,10 @@ def test_converting_the_table_keeps_the_robot() -> None:
 
 def test_other_units_write_other_numbers_for_the_same_robot() -> None:
     state = after(STANFORD, events.SetUnits(angle=AngleUnit.RAD, length=LengthUnit.MM))
-    assert state.draft.rows[1].cells == ("0", "1.5707963267948966", "150", "0", "0")
+    assert state.table.rows[1].cells == ("0", "1.5707963267948966", "150", "0", "0")
     q = STANFORD.q
     assert np.allclose(table_frame_poses(state.spec, q), table_frame_poses(STANFORD.spec, q), rtol=0, atol=1e-15)
-    assert state.notice == "Numbers stand where parameters stood."
+    assert state.notice == "Parameters were replaced by their values."
 
 
 def test_a_file_whose_values_are_shared_by_an_anchor_is_written_anew() -> None:
@@ -279,7 +279,7 @@ def test_the_table_stands_while_a_simulation_moves_the_joints() -> None:
     driven = after(STANFORD, events.SetMode(mode=Mode.PHYSICS))
     edited = after(driven, events.EditCell(row=0, column="a", text="1"))
     assert edited.model is STANFORD.model
-    assert edited.notice == "The table can be edited once physics and replay are off."
+    assert edited.notice == "The table can be edited in manual mode only."
 
 
 def test_only_a_simulation_may_pass_a_limit_and_only_until_it_ends() -> None:
@@ -287,7 +287,7 @@ def test_only_a_simulation_may_pass_a_limit_and_only_until_it_ends() -> None:
     driven = after(STANFORD, events.SetMode(mode=Mode.PHYSICS), events.Follow(q=beyond))
     assert driven.q == beyond
     assert after(driven, events.MoveJoint(joint=0, value=0.0)).q == beyond
-    assert after(driven, events.SetMode(mode=Mode.STILL)).q[2] == 0.0
+    assert after(driven, events.SetMode(mode=Mode.MANUAL)).q[2] == 0.0
 
 
 def test_while_physics_is_on_the_user_moves_what_the_actuators_hold() -> None:
@@ -295,9 +295,9 @@ def test_while_physics_is_on_the_user_moves_what_the_actuators_hold() -> None:
     assert driven.target == STANFORD.q
     moved = after(driven, events.MoveJoint(joint=0, value=9.0), events.Nudge(joint=2, direction=1))
     assert moved.q == STANFORD.q
-    assert moved.wanted == (math.radians(170), STANFORD.q[1], STANFORD.q[2] + 0.0127, *STANFORD.q[3:])
-    still = after(moved, events.SetMode(mode=Mode.STILL))
-    assert still.wanted == STANFORD.q
+    assert moved.commanded == (math.radians(170), STANFORD.q[1], STANFORD.q[2] + 0.0127, *STANFORD.q[3:])
+    still = after(moved, events.SetMode(mode=Mode.MANUAL))
+    assert still.commanded == STANFORD.q
 
 
 def test_what_moves_is_paused_and_stepped_and_begins_anew_running() -> None:
@@ -314,16 +314,16 @@ def test_what_moves_is_paused_and_stepped_and_begins_anew_running() -> None:
 
 
 def test_only_links_of_a_simulated_robot_are_pulled_at() -> None:
-    pull = Pull(link="link_3", point_in_link=(0.0, 0.1, 0.0), target=(1.0, 0.0, 0.0))
-    assert after(STANFORD, events.PullLink(pull=pull)).pull is None
-    driven = after(STANFORD, events.SetMode(mode=Mode.PHYSICS), events.PullLink(pull=pull))
-    assert driven.pull == pull
-    further = replace(pull, target=(1.0, 1.0, 0.0))
-    assert after(driven, events.PullLink(pull=further)).pull == further
-    for wrong in (replace(pull, link="base_link"), replace(pull, target=(math.nan, 0.0, 0.0))):
-        assert after(driven, events.PullLink(pull=wrong)).pull == pull
-    assert after(driven, events.LetGo()).pull is None
-    assert after(driven, events.SetMode(mode=Mode.STILL)).pull is None
+    drag = LinkDrag(link="link_3", point_in_link=(0.0, 0.1, 0.0), target=(1.0, 0.0, 0.0))
+    assert after(STANFORD, events.DragLink(drag=drag)).drag is None
+    driven = after(STANFORD, events.SetMode(mode=Mode.PHYSICS), events.DragLink(drag=drag))
+    assert driven.drag == drag
+    further = replace(drag, target=(1.0, 1.0, 0.0))
+    assert after(driven, events.DragLink(drag=further)).drag == further
+    for wrong in (replace(drag, link="base_link"), replace(drag, target=(math.nan, 0.0, 0.0))):
+        assert after(driven, events.DragLink(drag=wrong)).drag == drag
+    assert after(driven, events.ReleaseLink()).drag is None
+    assert after(driven, events.SetMode(mode=Mode.MANUAL)).drag is None
 
 
 def test_nobody_moves_the_joints_of_a_recording() -> None:
@@ -348,7 +348,7 @@ def test_the_trace_follows_the_tool() -> None:
 
 
 def test_the_ghost_of_the_other_reading_follows_the_table() -> None:
-    compared = after(STANFORD, events.CompareReading(), events.EditCell(row=1, column="a", text="0.4"))
+    compared = after(STANFORD, events.CompareMisread(), events.EditCell(row=1, column="a", text="0.4"))
     assert compared.ghost is not None
     ghost = compared.ghost.model.spec
     assert [row.convention for row in ghost.rows] == [Convention.MODIFIED] * 6

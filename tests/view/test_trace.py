@@ -12,7 +12,7 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.read import load_robot
 from dh2sim.view.events import Event, Follow, SetMode, Show
 from dh2sim.view.initial_state import open_state
-from dh2sim.view.motion.motion import Recording
+from dh2sim.view.motion.motion_source import Recording
 from dh2sim.view.motion.replay import open_replay
 from dh2sim.view.reduce import reduce
 from dh2sim.view.state import Mode, Part, ViewState
@@ -35,9 +35,9 @@ def tool(q: tuple[float, ...]) -> list[float]:
 
 def test_where_a_recording_leaps_another_trace_begins() -> None:
     played = after(STANFORD, Show(part=Part.TRACE, on=True), SetMode(mode=Mode.REPLAY))
-    begun = after(played, Follow(q=PLACES[0], leaps=True), Follow(q=PLACES[1]), Follow(q=PLACES[2]))
+    begun = after(played, Follow(q=PLACES[0], jumps=True), Follow(q=PLACES[1]), Follow(q=PLACES[2]))
     assert np.allclose(begun.trace, [tool(q) for q in PLACES[:3]], rtol=0, atol=1e-12)
-    wound = after(begun, Follow(q=PLACES[0], leaps=True), Follow(q=PLACES[3]))
+    wound = after(begun, Follow(q=PLACES[0], jumps=True), Follow(q=PLACES[3]))
     assert np.allclose(wound.trace, [tool(PLACES[0]), tool(PLACES[3])], rtol=0, atol=1e-12)
 
 
@@ -46,13 +46,13 @@ def test_a_recording_leaps_where_it_begins_ends_and_is_wound_and_nowhere_else(tm
     done = dh2sim("rollout", "stanford", "--out", out, "--rollouts", "1", "--duration", "1", "--quiet")
     assert done.status == 0, done.err
     recording = Recording(open_replay(out, STANFORD.model), 0)
-    leaps = []
+    jumps = []
     for now, share in ((0.0, None), (0.3, None), (0.6, 0.2), (0.7, None), (1.3, None), (1.6, None), (1.7, None)):
         if share is not None:
             recording.seek(share)
         recording.tick(now, STANFORD)
-        leaps.append((round(recording.time, 6), recording.leaps))
-    assert leaps == [(0.0, True), (0.3, False), (0.5, True), (0.6, False), (0.2, True), (0.5, False), (0.6, False)]
+        jumps.append((round(recording.time, 6), recording.jumps))
+    assert jumps == [(0.0, True), (0.3, False), (0.5, True), (0.6, False), (0.2, True), (0.5, False), (0.6, False)]
     recording.tick(1.8, replace(STANFORD, paused=True))
     assert recording.time == pytest.approx(0.6)
-    assert not recording.leaps
+    assert not recording.jumps

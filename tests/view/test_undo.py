@@ -10,7 +10,7 @@ from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
 from dh2sim.view.events import ConvertTable, EditCell, Event, OpenText, SelectRow, SetConvention, SetUnits, Undo
 from dh2sim.view.initial_state import open_state
-from dh2sim.view.reduce import MOST, MOST_LETTERS, reduce
+from dh2sim.view.reduce import MAX_UNDO, MAX_UNDO_LENGTH, reduce
 from dh2sim.view.state import Mode, ViewState
 
 STANFORD = open_state(load_robot("stanford"))
@@ -42,31 +42,31 @@ def test_edits_are_taken_back_in_turn_to_the_letter() -> None:
     for earlier in reversed(states[:-1]):
         state = after(state, Undo())
         assert state.text == earlier.text
-        assert state.draft == earlier.draft
-    assert state.earlier == ()
+        assert state.table == earlier.table
+    assert state.undo_texts == ()
 
 
 def test_what_is_typed_into_a_cell_letter_by_letter_is_one_edit() -> None:
     typed = after(STANFORD, *(cell(text) for text in ("0", "0.", "0.1", "0.12", "0.12 +", "0.12 + 1")))
     assert typed.spec.rows[0].a == 1.12
-    assert typed.earlier == (STANFORD.text,)
+    assert typed.undo_texts == (STANFORD.text,)
     assert after(typed, Undo()).text == STANFORD.text
     other = after(typed, cell("0.3", row=2), cell("0.5"))
-    assert len(other.earlier) == 3, "into another cell and back are further edits"
+    assert len(other.undo_texts) == 3, "into another cell and back are further edits"
 
 
 def test_what_is_wrong_is_no_edit_and_its_mark_goes_with_the_edit_before() -> None:
     wrong = after(STANFORD, cell("0.1"), cell("pi /", row=1, column="alpha"))
-    assert wrong.draft.complaints
-    assert wrong.earlier == (STANFORD.text,)
+    assert wrong.table.errors
+    assert wrong.undo_texts == (STANFORD.text,)
     back = after(wrong, Undo())
-    assert (back.text, back.draft.complaints) == (STANFORD.text, ())
+    assert (back.text, back.table.errors) == (STANFORD.text, ())
 
 
 def test_what_is_typed_into_a_cell_after_something_wrong_is_an_edit_of_its_own() -> None:
     first = after(STANFORD, cell("0.1"))
     second = after(first, cell("90 +", row=1, column="alpha"), cell("45", row=1, column="alpha"))
-    assert second.earlier == (STANFORD.text, first.text)
+    assert second.undo_texts == (STANFORD.text, first.text)
     assert after(second, Undo()).text == first.text
 
 
@@ -78,30 +78,30 @@ def test_joints_and_the_chosen_row_stay_where_they_are() -> None:
 
 
 def test_where_nothing_was_edited_nothing_is_taken_back_and_it_is_told() -> None:
-    assert after(STANFORD, Undo()) == replace(STANFORD, notice="There is no edit to take back.")
+    assert after(STANFORD, Undo()) == replace(STANFORD, notice="Nothing to undo.")
 
 
 @pytest.mark.parametrize("mode", [Mode.PHYSICS, Mode.REPLAY])
 def test_nothing_is_taken_back_while_something_moves_the_joints(mode: Mode) -> None:
     edited = after(STANFORD, cell("0.1"))
     state = after(replace(edited, mode=mode), Undo())
-    assert (state.text, state.earlier) == (edited.text, edited.earlier)
-    assert state.notice == "The table can be edited once physics and replay are off."
+    assert (state.text, state.undo_texts) == (edited.text, edited.undo_texts)
+    assert state.notice == "The table can be edited in manual mode only."
 
 
 def test_another_file_begins_anew() -> None:
     edited = after(STANFORD, cell("0.1"))
     opened = after(edited, OpenText(text=b"name: x\nconvention: standard\njoints:\n  - {type: revolute}\n", file="x"))
     assert opened.spec.name == "x", opened.notice
-    assert opened.earlier == ()
+    assert opened.undo_texts == ()
 
 
 @pytest.mark.slow
 def test_what_is_kept_is_bounded() -> None:
     state = STANFORD
-    for k in range(MOST + 5):
+    for k in range(MAX_UNDO + 5):
         state = after(state, cell(f"0.{k + 1}", row=k % 2))
-    assert len(state.earlier) == MOST
-    letters = "#" * (MOST_LETTERS // 2)
-    long = after(replace(STANFORD, earlier=(letters, letters)), cell("0.1"))
-    assert long.earlier == (letters, STANFORD.text)
+    assert len(state.undo_texts) == MAX_UNDO
+    letters = "#" * (MAX_UNDO_LENGTH // 2)
+    long = after(replace(STANFORD, undo_texts=(letters, letters)), cell("0.1"))
+    assert long.undo_texts == (letters, STANFORD.text)

@@ -18,11 +18,10 @@ from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.read import builtin_path, load_robot, parse_robot
 from dh2sim.view import events
-from dh2sim.view.initial_state import builtin_ghost, open_state
+from dh2sim.view.initial_state import MAX_PROBLEMS, builtin_ghost, file_name, open_state, uploaded_ghost
 from dh2sim.view.panel import markup
 from dh2sim.view.reduce import reduce
 from dh2sim.view.state import Mode, Part, ViewState
-from dh2sim.view.uploads import MOST_PROBLEMS, file_name, uploaded_ghost
 
 STANFORD = open_state(load_robot("stanford"))
 HEAD = "name: mine\nconvention: standard\njoints:\n"
@@ -44,8 +43,8 @@ def assert_refused(text: str | bytes, *lines: str) -> None:
     """Nothing but the notice changes."""
     before = after(STANFORD, events.Nudge(joint=0, direction=1))
     state = after(before, upload(text))
-    assert state.notice.split("\n") == ["The robot is the one of before.", *lines]
-    assert after(state, events.Tell(notice="")) == before
+    assert state.notice.split("\n") == ["Robot unchanged.", *lines]
+    assert after(state, events.Notify(notice="")) == before
 
 
 def test_a_robot_that_is_uploaded_stands_at_home_where_its_table_has_it() -> None:
@@ -56,7 +55,7 @@ def test_a_robot_that_is_uploaded_stands_at_home_where_its_table_has_it() -> Non
     assert (state.file, state.folder) == ("my puma.yaml", None)
     assert state.text == text.decode()
     assert state.notice == "Opened my puma.yaml: puma560, 6 joints."
-    assert [row.name for row in state.draft.rows] == [row.name for row in spec.rows]
+    assert [row.name for row in state.table.rows] == [row.name for row in spec.rows]
     assert state.q == tuple(state.model.home.tolist())
     assert np.array_equal(table_tool_pose(state.spec, state.q), table_tool_pose(spec, state.q))
 
@@ -77,8 +76,8 @@ def test_nothing_points_at_places_of_the_robot_that_was_shown_before() -> None:
     )
     state = after(before, upload(MINE))
     assert (state.selected_row, state.frame, state.goal, state.trace) == (0, "tool0", None, ())
-    assert (state.mode, state.paused, state.steps, state.target, state.pull) == (Mode.STILL, False, 0, None, None)
-    assert state.draft.complaints == ()
+    assert (state.mode, state.paused, state.steps, state.target, state.drag) == (Mode.MANUAL, False, 0, None, None)
+    assert state.table.errors == ()
     assert state.shown == before.shown
     assert state.notice == "Opened mine.yaml: mine, 2 joints."
 
@@ -87,17 +86,17 @@ def test_an_uploaded_robot_is_edited_as_any_other() -> None:
     state = after(STANFORD, upload(MINE), events.EditCell(row=0, column="a", text="0.7"))
     assert state.text == MINE.replace("a: 0.5", "a: 0.7")
     assert state.spec.rows[0].a == 0.7
-    converted = after(state, events.SetUnits(angle=state.draft.units.angle, length=state.draft.units.length))
+    converted = after(state, events.SetUnits(angle=state.table.units.angle, length=state.table.units.length))
     assert np.array_equal(table_tool_pose(converted.spec, (0.1, 0.2)), table_tool_pose(state.spec, (0.1, 0.2)))
 
 
 def test_the_ghost_stays_unless_it_is_a_reading_of_the_robot_that_was_shown() -> None:
     scara = builtin_ghost("scara")
     assert after(STANFORD, events.Compare(ghost=scara), upload(MINE)).ghost == scara
-    reading = after(STANFORD, events.CompareReading(), upload(MINE)).ghost
-    assert reading is not None
-    assert reading.reading
-    assert reading.model.spec.name == "mine_misread"
+    ghost = after(STANFORD, events.CompareMisread(), upload(MINE)).ghost
+    assert ghost is not None
+    assert ghost.misread
+    assert ghost.model.spec.name == "mine_misread"
 
 
 @pytest.fixture
@@ -169,9 +168,9 @@ def test_all_that_is_wrong_is_told_as_of_any_robot_file() -> None:
 def test_of_many_problems_the_first_are_told_and_how_many_more_there_are() -> None:
     state = after(STANFORD, upload(HEAD + "  - {type: revolute, a: x}\n" * 40))
     lines = state.notice.split("\n")
-    assert len(lines) == 1 + MOST_PROBLEMS + 1
+    assert len(lines) == 1 + MAX_PROBLEMS + 1
     assert lines[1].startswith("mine.yaml:4:25: joints[0].a: ")
-    assert lines[-1] == f"… and {40 - MOST_PROBLEMS} more."
+    assert lines[-1] == f"… and {40 - MAX_PROBLEMS} more."
 
 
 @pytest.mark.parametrize(
@@ -218,19 +217,19 @@ def test_a_robot_that_would_keep_this_machine_busy_for_long_is_not_built() -> No
     started = time.monotonic()
     assert_refused(
         HEAD + "  - {type: revolute}\n" * 3000,
-        "mine.yaml: the robot has 3000 joints; at most 200 are shown of one that was uploaded",
+        "mine.yaml: the robot has 3000 joints; at most 200 are allowed in an uploaded file",
     )
     assert time.monotonic() - started < 30.0
     many = "".join(f"  c{i}: [0]\n" for i in range(201))
     assert_refused(
         f"{HEAD}{ROW}configurations:\n{many}",
-        "mine.yaml: the robot has 201 configurations; at most 200 are shown of one that was uploaded",
+        "mine.yaml: the robot has 201 configurations; at most 200 are allowed in an uploaded file",
     )
 
 
 def test_a_robot_too_large_to_be_drawn_is_refused() -> None:
     assert_refused(
-        f"{HEAD}  - {{type: revolute, a: 1e8}}\n", "the robot would reach 1e+08 m; at most 1e+06 m are shown"
+        f"{HEAD}  - {{type: revolute, a: 1e8}}\n", "the robot's reach is 1e+08 m; at most 1e+06 m can be shown"
     )
 
 
@@ -244,11 +243,11 @@ def test_no_bytes_bring_a_page_down(data: bytes) -> None:
 
 def test_a_robot_to_compare_with_is_called_by_its_name() -> None:
     ghost = uploaded_ghost(MINE.encode(), "some file.yaml")
-    assert (ghost.model.name, ghost.label, ghost.reading) == ("mine", "mine (uploaded)", False)
+    assert (ghost.model.name, ghost.label, ghost.misread) == ("mine", "mine (uploaded)", False)
     with pytest.raises(Dh2simError) as caught:
         uploaded_ghost(b"name: x\n", "x.yaml")
     assert str(caught.value).split("\n") == [
-        "There is nothing new to compare with.",
+        "Ghost unchanged.",
         "x.yaml:1:1: missing key 'convention'",
         "x.yaml:1:1: missing key 'joints'",
     ]
@@ -256,7 +255,7 @@ def test_a_robot_to_compare_with_is_called_by_its_name() -> None:
 
 def test_a_page_that_asks_for_a_ghost_of_any_other_name_gets_no_file(robot_with_mesh: Path) -> None:
     for name in (str(robot_with_mesh), "../robots/scara", "/etc/passwd", ""):
-        with pytest.raises(Dh2simError, match=r"^there is no robot named '"):
+        with pytest.raises(Dh2simError, match=r"^unknown robot '"):
             builtin_ghost(name)
 
 

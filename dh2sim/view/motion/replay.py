@@ -1,4 +1,4 @@
-"""Recorded motion, to be looked at again: the rollouts of a run, by time."""
+"""The rollouts of a run, played back by time."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from dh2sim.draw.motion import Motion
     from dh2sim.draw.rollout_data import RolloutData
 
-KEPT = 8
-"""Rollouts that stay in memory once they were looked at."""
+CACHED = 8
+"""Rollouts that stay in memory once they were read."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,23 +30,23 @@ class _Recorded:
 
     motion: Motion
     q: Array
-    """In the order of the table, shape (N, n)."""
+    """Joint vectors in the order of the table, shape (N, n)."""
     base: Array | None
-    """Poses of base_link in the world, shape (N, 4, 4); None where it stands still."""
+    """Poses of base_link in the world, shape (N, 4, 4); None if it does not move."""
     stopped: str
 
 
 class Replay:
-    """A run; made by ``open_replay``. A rollout is read when it is first asked for."""
+    """A run, opened by ``open_replay``. Rollouts are read when they are first used."""
 
     def __init__(self, path: Path, *, joints: tuple[str, ...], rollouts: tuple[int, ...], note: str) -> None:
-        """Keep what all rollouts share.
+        """Read nothing yet.
 
         Args:
-            path: of the run.
-            joints: names of the joints in the order that joint vectors are wanted in.
-            rollouts: numbers of those that can be shown.
-            note: what a user should know of the run, a sentence, or empty.
+            path: Of the run.
+            joints: Names of the joints in the order of joint vectors.
+            rollouts: Numbers of the rollouts that can be shown.
+            note: A sentence if the run may be of another robot; else empty.
         """
         self.path = path
         self.joints = joints
@@ -54,29 +54,29 @@ class Replay:
         self.rollouts = rollouts
         """Numbers of the rollouts that have been run."""
         self.note = note
-        """A sentence where the robot of the run may not be the one that is shown; else empty."""
-        self._recorded = functools.lru_cache(maxsize=KEPT)(self._read)
+        """A sentence if the robot of the run may differ from the one that is shown; else empty."""
+        self._recorded = functools.lru_cache(maxsize=CACHED)(self._read)
 
     def times(self, rollout: int) -> Array:
-        """Return the instants that were recorded until the rollout ended, s, ascending, shape (N,).
+        """Return the recorded times, s, ascending, shape (N,).
 
         Raises:
-            PictureError: there is no such rollout, it has not been run, or positions were not recorded.
-            RunError: the run cannot be read. All methods raise these errors.
+            PictureError: The rollout does not exist or has not been run, or positions were not recorded.
+            RunError: The run cannot be read. All methods raise these errors.
         """
         return self._recorded(rollout).motion.time
 
     def duration(self, rollout: int) -> float:
-        """Return the last of them, s."""
+        """Return the last recorded time, s."""
         return float(self.times(rollout)[-1])
 
     def q_at(self, rollout: int, t: float) -> Array:
-        """Return the joint positions that were recorded nearest to ``t``, s; rad or m, shape (n,)."""
+        """Return the joint positions recorded nearest to time ``t``, s; rad or m, shape (n,)."""
         recorded = self._recorded(rollout)
         return np.asarray(recorded.q[recorded.motion.nearest(t)])
 
     def base_at(self, rollout: int, t: float) -> Array | None:
-        """Return base_link's pose in the world nearest to ``t``, s, shape (4, 4); None where it does not float."""
+        """Return base_link's pose in the world nearest to time ``t``, s, shape (4, 4); None if it does not float."""
         recorded = self._recorded(rollout)
         return None if recorded.base is None else np.asarray(recorded.base[recorded.motion.nearest(t)])
 
@@ -94,18 +94,19 @@ class Replay:
         names = data.names("joint")
         q = data.values("qpos")[:, [names.index(name) for name in self.joints]]
         base = _base_poses(motion) if motion.floats else None
-        return _Recorded(motion=motion, q=read_only(q), base=base, stopped=_why(data))
+        return _Recorded(motion=motion, q=read_only(q), base=base, stopped=_stop_reason(data))
 
 
 def open_replay(path: Path, model: RobotModel | None) -> Replay:
     """Open a run, finished or not.
 
     Args:
-        path: of the run.
-        model: the robot that is to be shown in the run's positions; None: whichever it was made with.
+        path: Of the run.
+        model: The robot to show; None for the one that the run was made with.
 
     Raises:
-        RunError: there is no run, it is damaged, none of its rollouts has been run, or it is one of another robot.
+        RunError: There is no run, it is damaged, none of its rollouts has been run, or it is of a robot with other
+            joints.
     """
     from dh2sim.simulate.store.reader import open_dataset, reading
 
@@ -126,12 +127,16 @@ def open_replay(path: Path, model: RobotModel | None) -> Replay:
         )
     source = model.spec.source_file
     same = source is not None and source.sha256 == digest
-    note = "" if same else f"The run was made with another text of {robot}'s file: what is shown may differ from it."
+    note = (
+        ""
+        if same
+        else f"The run was made with another version of {robot}'s file: the motion shown may differ from it."
+    )
     return Replay(path, joints=joints, rollouts=rollouts, note=note)
 
 
 def _base_poses(motion: Motion) -> Array:
-    """Return base_link's poses in the world by the run's own model, shape (N, 4, 4)."""
+    """Return base_link's poses in the world, computed with the run's own model, shape (N, 4, 4)."""
     import mujoco
 
     data = mujoco.MjData(motion.model)
@@ -144,7 +149,7 @@ def _base_poses(motion: Motion) -> Array:
     return read_only(poses)
 
 
-def _why(rollout: RolloutData) -> str:
+def _stop_reason(rollout: RolloutData) -> str:
     """Return why a rollout stopped early, a sentence; empty if it did not."""
     if not rollout.reason:
         return ""

@@ -1,8 +1,8 @@
-"""Widgets bound to the state: what a user does becomes an event, and the state is shown without talking back.
+"""Widgets bound to the state: a user's change becomes an event, and the state is shown without echoes.
 
-A widget that is told what its user has just typed would undo what was typed since. So each knows the value that the
-widget has as far as events were worked through, and is told only what differs from that. Where it was told something
-after the user's event had come, and before that was worked through, it shows what it was told.
+A widget that is set to what its user has just typed would lose what was typed since. So each remembers the value that
+the browser has, as far as events were worked through, and is written only if the state differs from that. If it was
+written after the user's event came and before its turn, it keeps what was written.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ Value = TypeVar("Value")
 
 
 class Send(Protocol):
-    """How widgets tell the page what was done."""
+    """Queues what a widget stands for."""
 
-    def __call__(self, task: Event | Callable[[], None], *, seen: Callable[[], None] | None = None) -> None:
-        """Queue an event, or something to do in its turn; ``seen`` is called when it is worked through."""
+    def __call__(self, task: Event | Callable[[], None], *, on_start: Callable[[], None] | None = None) -> None:
+        """Queue an event or a function; ``on_start`` is called when its turn comes."""
 
 
 @dataclass(slots=True)
@@ -30,45 +30,45 @@ class Bound(Generic[Value]):
 
     handle: Any
     known: Value
-    """What the widget shows, as far as events were worked through."""
-    told: int = 0
-    """How often the widget was told a value."""
+    """What the browser shows, as far as events were worked through."""
+    writes: int = 0
+    """How often the widget was written."""
 
     def show(self, value: Value) -> None:
         """Make the widget show a value."""
         if value != self.known:
             self.known = value
             self.handle.value = value
-            self.told += 1
+            self.writes += 1
 
-    def see(self, value: Value, told: int) -> None:
-        """Note what the user had set when the widget had been told a value so often."""
-        if told == self.told:
+    def acknowledge(self, value: Value, writes: int) -> None:
+        """Record a user's value, set when the widget had been written ``writes`` times."""
+        if writes == self.writes:
             self.known = value
 
 
 def bind(handle: Any, send: Send, event: Callable[[Any], Event | Callable[[], None]]) -> Bound[Any]:
-    """Send the event that a widget's new value stands for, whenever a user changes it.
+    """Send the event of a widget's new value whenever a user changes it.
 
     Args:
         handle: A viser widget with a value.
-        send: Where events go.
-        event: From a value; or something to do.
+        send: Queues events.
+        event: Returns the event, or a function, for a value.
     """
     bound = Bound(handle, handle.value)
 
-    async def changed(change: Any) -> None:  # async: runs on viser's own loop, so that order is kept
-        if change.client is None:  # set from here, not by a user
+    async def changed(change: Any) -> None:  # async: runs on viser's own loop, which keeps the order
+        if change.client is None:  # not by a user
             return
-        value, told = handle.value, bound.told
-        send(event(value), seen=lambda: bound.see(value, told))
+        value, writes = handle.value, bound.writes
+        send(event(value), on_start=lambda: bound.acknowledge(value, writes))
 
     handle.on_update(changed)
     return bound
 
 
 def on_click(handle: Any, send: Send, action: Callable[[], Event | Callable[[], None]]) -> None:
-    """Send what a button stands for, whenever it is pressed."""
+    """Send the event, or function, that ``action`` returns whenever a button is pressed."""
 
     async def clicked(_press: Any) -> None:
         send(action())

@@ -1,7 +1,4 @@
-"""The joints: a slider with a number for each, and configurations that have names.
-
-Keys that move joints: each joint has one for less and one for more.
-"""
+"""The Joints tab: a slider for each joint, named configurations, and keys that move joints."""
 
 from __future__ import annotations
 
@@ -12,22 +9,21 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from dh2sim.robot.spec import AngleUnit
 from dh2sim.view.events import Event, MoveJoint, Nudge, RandomConfiguration, SetConfiguration, ShowAngles
+from dh2sim.view.frame_readout import readout_of
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
-from dh2sim.view.panel.pose import pose_lines, whose_pose
-from dh2sim.view.panel.readings import readings_of
+from dh2sim.view.panel.pose import frame_title, pose_lines
 from dh2sim.view.state import ViewState, configurations
 
 if TYPE_CHECKING:
     import viser
 
     from dh2sim.model.robot_model import JointModel
-    from dh2sim.view.panel.bound import Send
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeyPair:
-    """The keys of a joint, as a user names them."""
+    """The keys of a joint as a user names them."""
 
     down: str
     up: str
@@ -37,22 +33,22 @@ KEYS: Final = tuple(
     KeyPair(down=down, up=up)
     for down, up in (("1", "3"), ("4", "6"), ("7", "9"), ("R", "Y"), ("F", "H"), ("V", "N"), ("G", "Shift+G"))
 )
-"""Of joints 1 to 7: the rows of a keyboard's number block, then of its letters."""
+"""Of joints 1 to 7: rows of the numeric keypad, then of letters."""
 
 
-ARROWS_ARE_THE_SLIDERS: Final = """<img hidden src="data:," onerror="
+ARROW_KEYS_FOR_SLIDERS: Final = """<img hidden src="data:," onerror="
 if (!document.body.dataset.dh2sim) {
     document.body.dataset.dh2sim = 'arrows';
     document.body.addEventListener('keydown', (event) => {
         if (event.key.startsWith('Arrow') && event.target.closest('[role=slider]')) event.stopPropagation();
     });
 }">"""
-"""viser turns the eye at arrow keys, also at those that move a slider; by here the slider has seen them."""
+"""Keeps arrow keys that move a slider from also turning viser's camera."""
 
 
 def add_keys(client: viser.ClientHandle, send: Send) -> None:
-    """Make a page listen to the keys; they do nothing while the user types into a field."""
-    client.gui.add_html(ARROWS_ARE_THE_SLIDERS)
+    """Make a page listen to the keys; viser ignores them while the user types into a field."""
+    client.gui.add_html(ARROW_KEYS_FOR_SLIDERS)
     for joint, pair in enumerate(KEYS):
         _add(client, send, pair.down, joint, -1)
         _add(client, send, pair.up, joint, 1)
@@ -62,7 +58,7 @@ def _add(client: viser.ClientHandle, send: Send, key: str, joint: int, direction
     *modifier, letter = key.split("+")
     command = client.gui.add_command(
         f"Joint {joint + 1}: {'more' if direction > 0 else 'less'}",
-        description="3 degrees, or 1 % of a sliding joint's travel",
+        description="3 degrees, or 1 % of a prismatic joint's travel",
         hotkey=letter,  # type: ignore[arg-type]
         modifier="shift" if modifier else None,
     )
@@ -74,13 +70,13 @@ def _add(client: viser.ClientHandle, send: Send, key: str, joint: int, direction
 
 
 _LAST: Final = 1e9
-"""Place of what stands below the sliders, which are made anew now and then."""
+"""Order of the widgets below the sliders, which are replaced now and then."""
 _DIGITS: Final = {"deg": 2, "rad": 4, "m": 4}
-"""Decimals that are shown of a coordinate."""
+"""Decimals of a coordinate."""
 
 
 class JointsTab:
-    """Sliders are made anew when limits, units or joints change."""
+    """Sliders, which are replaced when limits, units or joints change."""
 
     def __init__(self, client: viser.ClientHandle, tab: viser.GuiTabHandle, send: Send, state: ViewState) -> None:
         """Add the widgets to a tab, viser's current container."""
@@ -100,21 +96,21 @@ class JointsTab:
     def show(self, state: ViewState) -> None:
         """Show a state."""
         self._units.show(state.angle.value)
-        described = _description(state)
-        if described != self._built:
-            self._built = described
+        layout = _layout(state)
+        if layout != self._built:
+            self._built = layout
             self._build(state)
-        for slider, joint, value in zip(self._sliders, state.model.moving_joints, state.wanted, strict=True):
-            slider.show(_shown(joint, value, state.angle))
-        caption = markup.note(whose_pose(state))
-        self._readout.content = caption + markup.lines(pose_lines(readings_of(state), state.angle), name="readout")
+        for slider, joint, value in zip(self._sliders, state.model.moving_joints, state.commanded, strict=True):
+            slider.show(_displayed(joint, value, state.angle))
+        caption = markup.note(frame_title(state))
+        self._readout.content = caption + markup.lines(pose_lines(readout_of(state), state.angle), name="readout")
 
     def _build(self, state: ViewState) -> None:
         for widget in [*(slider.handle for slider in self._sliders), *([self._choice] if self._choice else [])]:
             widget.remove()
         with self._tab:
             self._sliders = [
-                self._slider(i, joint, state.wanted[i], state.angle)
+                self._slider(i, joint, state.commanded[i], state.angle)
                 for i, joint in enumerate(state.model.moving_joints)
             ]
             self._choice = self._gui.add_button_group("Go to", (*configurations(state.model), "random"))
@@ -125,10 +121,10 @@ class JointsTab:
         unit = _unit(joint, angle)
         slider = self._gui.add_slider(
             f"{joint.name} [{_symbol(unit)}]",
-            min=_shown(joint, lower, angle),
-            max=_shown(joint, upper, angle),
+            min=_displayed(joint, lower, angle),
+            max=_displayed(joint, upper, angle),
             step=10.0 ** -_DIGITS[unit],
-            initial_value=_shown(joint, value, angle),
+            initial_value=_displayed(joint, value, angle),
             hint=_hint(index, joint),
         )
 
@@ -142,8 +138,8 @@ def _configuration(name: str) -> Event:
     return RandomConfiguration(seed=secrets.randbits(32)) if name == "random" else SetConfiguration(name=name)
 
 
-def _description(state: ViewState) -> object:
-    """Return all that the sliders depend on besides where the joints are."""
+def _layout(state: ViewState) -> object:
+    """Return everything that the sliders depend on besides joint coordinates."""
     joints = [(joint.name, joint.joint.type, joint.travel) for joint in state.model.moving_joints]
     return joints, state.angle, tuple(configurations(state.model))
 
@@ -156,7 +152,7 @@ def _symbol(unit: str) -> str:
     return "°" if unit == "deg" else unit
 
 
-def _shown(joint: JointModel, value: float, angle: AngleUnit) -> float:
+def _displayed(joint: JointModel, value: float, angle: AngleUnit) -> float:
     unit = _unit(joint, angle)
     number = round(math.degrees(value) if unit == "deg" else value, _DIGITS[unit])
     return number + 0.0
@@ -164,7 +160,7 @@ def _shown(joint: JointModel, value: float, angle: AngleUnit) -> float:
 
 def _hint(index: int, joint: JointModel) -> str:
     keys = f"; keys {KEYS[index].down} and {KEYS[index].up}" if index < len(KEYS) else ""
-    limits = "turns without end" if joint.position_range is None else "limits of the robot file"
+    limits = "no limits" if joint.position_range is None else "limits from the robot file"
     if "position" in joint.assumed:
-        limits = "limits assumed: the robot file gives none"
+        limits = "assumed limits: the robot file has none"
     return f"{joint.joint.type.value}, {limits}{keys}"

@@ -1,4 +1,4 @@
-"""HTML of the panel; every text that is not ours is escaped."""
+"""HTML of the panel, in which foreign text is escaped."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ _MONO = "font-family:ui-monospace,Menlo,Consolas,monospace;font-size:0.78em"
 
 
 def text(content: object) -> str:
-    """Return any text as HTML."""
+    """Return text as HTML."""
     return escape(str(content))
 
 
 def lines_of_text(content: str) -> str:
-    """Return any text as HTML, its lines below each other."""
+    """Return text as HTML, one line below the other."""
     return "<br>".join(text(line) for line in content.split("\n"))
 
 
@@ -39,7 +39,7 @@ def table(rows: Iterable[Sequence[str]], *, head: Sequence[str] = (), name: str 
 
 
 def lines(pairs: Iterable[tuple[str, str]], *, name: str = "") -> str:
-    """Return names and values below each other; both are HTML."""
+    """Return lines of names and values, both HTML."""
     body = "".join(
         f'<tr><td style="{_CELL};opacity:0.65">{key}</td><td style="{_CELL}">{value}</td></tr>'
         for key, value in pairs
@@ -50,10 +50,10 @@ def lines(pairs: Iterable[tuple[str, str]], *, name: str = "") -> str:
     )
 
 
-def note(content: str, *, wrong: bool = False, name: str = "") -> str:
-    """Return a line of text, HTML; empty where there is nothing to say."""
+def note(content: str, *, error: bool = False, name: str = "") -> str:
+    """Return a line of text, given as HTML; an empty element without text."""
     if not content:
         return f'<div data-dh2sim="{escape(name)}"></div>'
-    color = "#b42318" if wrong else "inherit"
+    color = "#b42318" if error else "inherit"
     style = f"padding:0.3em 0.8em;font-size:0.82em;line-height:1.35;color:{color};overflow-wrap:anywhere"
     return f'<div data-dh2sim="{escape(name)}" style="{style}">{content}</div>'

@@ -1,9 +1,4 @@
-"""The table: all of it to be read, one row at a time to be edited, and files to take home.
-
-The table as it is printed: indices as in the textbooks, the joint's own variable in its column.
-
-The cells of one row of the table, to be typed into.
-"""
+"""The Table tab: an overview of the table as printed in textbooks, and an editor of one row."""
 
 from __future__ import annotations
 
@@ -15,46 +10,46 @@ from dh2sim.view.events import ConvertTable, EditCell, SelectRow, SetConvention,
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
 from dh2sim.view.scene.annotations import Quantity, subscript, symbol
-from dh2sim.view.state import CONVENTION, Complaint, Draft, Part, ViewState
+from dh2sim.view.state import CONVENTION, CellError, Part, TableState, ViewState
 
 if TYPE_CHECKING:
     import viser
 
-_WRONG = "background:#fde2df;color:#b42318;border-radius:3px;padding:0 0.2em"
-_CHOSEN = "font-weight:700"
+_ERROR = "background:#fde2df;color:#b42318;border-radius:3px;padding:0 0.2em"
+_SELECTED = "font-weight:700"
 
 
 def overview(state: ViewState) -> str:
-    """Return the table as HTML; cells that are wrong are marked, and say why when pointed at."""
-    draft = state.draft
-    hayati = any(row.convention is Convention.HAYATI for row in draft.rows)
-    angle = "°" if draft.units.angle is AngleUnit.DEG else "rad"
-    length = draft.units.length.value
+    """Return the table as HTML; cells with errors are marked, with the message as tooltip."""
+    table = state.table
+    hayati = any(row.convention is Convention.HAYATI for row in table.rows)
+    angle = "°" if table.units.angle is AngleUnit.DEG else "rad"
+    length = table.units.length.value
     head = ["i", "joint", f"a<br>{length}", f"α<br>{angle}", f"d<br>{length}", f"θ<br>{angle}"]
     head += [f"β<br>{angle}"] if hayati else []
-    rows = [_row(state, i, hayati=hayati) for i in range(len(draft.rows))]
-    return markup.table(rows, head=[*head, "convention"], name="table") + markup.note(_legend(draft))
+    rows = [_row(state, i, hayati=hayati) for i in range(len(table.rows))]
+    return markup.table(rows, head=[*head, "convention"], name="table") + markup.note(_legend(table))
 
 
 def _row(state: ViewState, i: int, *, hayati: bool) -> list[str]:
-    row = state.draft.rows[i]
-    number = f"<span style='{_CHOSEN}'>{i + 1}</span>" if i == state.selected_row else str(i + 1)
+    row = state.table.rows[i]
+    number = f"<span style='{_SELECTED}'>{i + 1}</span>" if i == state.selected_row else str(i + 1)
     columns = ("a", "alpha", "d", "theta", *(("beta",) if hayati else ()))
     cells = [_cell(state, i, column, text) for column, text in zip(columns, row.cells, strict=False)]
     flips = [spec.flip for spec in state.spec.rows]
     variable = _variable(i, flip=flips[i])
     if row.type.moves:
         moved = 3 if row.type.turns else 2
-        marked = state.draft.complaint(i, columns[moved]) is not None
+        marked = state.table.error(i, columns[moved]) is not None
         cells[moved] = f"{variable} + {cells[moved]}" if marked else variable + _offset(row.cells[moved])
     return [number, markup.text(row.name), *cells, row.convention.value]
 
 
 def _cell(state: ViewState, row: int, column: str, text: str) -> str:
-    found: Complaint | None = state.draft.complaint(row, column)
+    found: CellError | None = state.table.error(row, column)
     if found is None:
         return markup.text(text)
-    return f'<span title="{markup.text(found.message)}" style="{_WRONG}">{markup.text(text) or "?"}</span>'
+    return f'<span title="{markup.text(found.message)}" style="{_ERROR}">{markup.text(text) or "?"}</span>'
 
 
 def _variable(i: int, *, flip: bool) -> str:
@@ -62,7 +57,7 @@ def _variable(i: int, *, flip: bool) -> str:
 
 
 def _offset(text: str) -> str:
-    """Return what follows a joint's variable: nothing where the offset is zero."""
+    """Return the offset after a joint's variable; empty if it is zero."""
     number = text.strip().removeprefix("+").strip()
     if not number or _is_zero(number):
         return ""
@@ -77,25 +72,24 @@ def _is_zero(text: str) -> bool:
         return False
 
 
-def _legend(draft: Draft) -> str:
-    kinds = {row.convention for row in draft.rows}
-    said = {
+def _legend(table: TableState) -> str:
+    used = {row.convention for row in table.rows}
+    products = {
         Convention.STANDARD: "standard: Rz(θ) Tz(d) Tx(a) Rx(α)",
         Convention.MODIFIED: "modified: Tx(a) Rx(α) Rz(θ) Tz(d), a and α of index i − 1",
         Convention.HAYATI: "hayati: Rz(θ) Tx(a) Rx(α) Ry(β)",
     }
-    return "<br>".join(words for kind, words in said.items() if kind in kinds)
+    return "<br>".join(text for convention, text in products.items() if convention in used)
 
 
 _STEP: Final = 0.01
-"""Between the places of widgets: they stand between two that were placed by viser, whose places are whole numbers."""
+"""Between the orders of widgets, which are placed between two of viser's, whose orders are whole numbers."""
 
 
 class RowEditor:
-    """Fields of one row, named as it is; another row is given fields of its own.
+    """Fields of one row, labelled with its indices; another row gets fields of its own.
 
-    What is typed goes to the row whose name stands beside the field, also where another row was chosen a moment ago
-    and the page has not followed yet.
+    So typing always goes to the row that the label names, even if another row was selected a moment before.
     """
 
     def __init__(self, gui: viser.GuiApi, send: Send, state: ViewState, row: int, place: float) -> None:
@@ -103,13 +97,13 @@ class RowEditor:
 
         Args:
             gui: The page's widgets.
-            send: Where events go.
-            state: That has the row.
+            send: Queues events.
+            state: A state that has the row.
             row: From 0.
-            place: Of the widget that they stand below.
+            place: Order of the widget that they are placed below.
         """
         self._row = row
-        shown = state.draft.rows[row]
+        shown = state.table.rows[row]
         self._convention_shown = shown.convention
         self._cells: dict[Quantity, Bound[str]] = {}
         for k, quantity in enumerate(Quantity, start=1):
@@ -126,46 +120,46 @@ class RowEditor:
                 f"convention{subscript(row + 1)}",
                 [convention.value for convention in Convention],
                 initial_value=shown.convention.value,
-                hint="Reads the same numbers another way: the robot becomes another one",
+                hint="Reads the same numbers in another way, which makes another robot",
                 order=end + _STEP,
             ),
             send,
             lambda name: SetConvention(row=row, convention=Convention(name)),
         )
-        self._complaint = gui.add_html("", order=end + 2 * _STEP)
+        self._errors = gui.add_html("", order=end + 2 * _STEP)
 
     def show(self, state: ViewState) -> None:
-        """Show a state, which has the row."""
-        row = state.draft.rows[self._row]
+        """Show a state that has the row."""
+        row = state.table.rows[self._row]
         for (quantity, cell), text in zip(self._cells.items(), row.cells, strict=True):
             cell.show(text)
-            marked = state.draft.complaint(self._row, quantity.value) is not None
+            marked = state.table.error(self._row, quantity.value) is not None
             cell.handle.visible = marked or quantity is not Quantity.BETA or row.convention is Convention.HAYATI
             if row.convention is not self._convention_shown:
                 cell.handle.label = symbol(quantity, row.convention, self._row)
         self._convention_shown = row.convention
         self._convention.show(row.convention.value)
-        ours = [found for found in state.draft.complaints if found.row == self._row]
-        told = "<br>".join(_told(found, row.convention) for found in ours)
-        self._complaint.content = markup.note(told, wrong=True, name="complaint")
+        errors = [error for error in state.table.errors if error.row == self._row]
+        text = "<br>".join(_error_text(error, row.convention) for error in errors)
+        self._errors.content = markup.note(text, error=True, name="cell-errors")
 
     def remove(self) -> None:
-        """Take the widgets off the page."""
-        for widget in (*(cell.handle for cell in self._cells.values()), self._convention.handle, self._complaint):
+        """Remove the widgets from the page."""
+        for widget in (*(cell.handle for cell in self._cells.values()), self._convention.handle, self._errors):
             widget.remove()
 
     def _edit(self, column: str, text: str) -> EditCell:
         return EditCell(row=self._row, column=column, text=text)
 
 
-def _told(found: Complaint, convention: Convention) -> str:
-    if found.column == CONVENTION:
-        return f"<b>convention</b>: {markup.text(found.message)}"
-    return f"<b>{symbol(Quantity(found.column), convention, found.row)}</b>: {markup.text(found.message)}"
+def _error_text(error: CellError, convention: Convention) -> str:
+    if error.column == CONVENTION:
+        return f"<b>convention</b>: {markup.text(error.message)}"
+    return f"<b>{symbol(Quantity(error.column), convention, error.row)}</b>: {markup.text(error.message)}"
 
 
 class TableTab:
-    """An overview, and an editor of the row that is chosen."""
+    """An overview, and an editor of the selected row."""
 
     def __init__(self, client: viser.ClientHandle, tab: viser.GuiTabHandle, send: Send, state: ViewState) -> None:
         """Add the widgets to a tab, viser's current container."""
@@ -179,7 +173,7 @@ class TableTab:
         self._chooser = bind(chooser, send, self._selected)
         self._edited = _identity(state)
         self._editor = self._editor_of_row(state)
-        self._undo = self._gui.add_button("Undo", disabled=True, hint="Takes the last edit of the table back")
+        self._undo = self._gui.add_button("Undo", disabled=True, hint="Undoes the last edit of the table")
         on_click(self._undo, send, Undo)
         self._explain = bind(
             self._gui.add_checkbox("Explain in scene", Part.ANNOTATIONS in state.shown),
@@ -190,11 +184,11 @@ class TableTab:
             self._add_whole(state)
 
     def show(self, state: ViewState) -> None:
-        """Show a state; that is nothing new where only the joints have moved."""
-        seen = (state.draft, state.model, state.selected_row, state.shown, bool(state.earlier))
-        if seen == self._shown:
+        """Show a state, unless only the joints have moved."""
+        shown = (state.table, state.model, state.selected_row, state.shown, bool(state.undo_texts))
+        if shown == self._shown:
             return
-        self._shown = seen
+        self._shown = shown
         self._overview.content = overview(state)
         if _names(state) != self._rows:
             self._rows = self._chooser.handle.options = _names(state)
@@ -205,26 +199,26 @@ class TableTab:
             with self._tab:
                 self._editor = self._editor_of_row(state)
         self._editor.show(state)
-        if self._undo.disabled == bool(state.earlier):
-            self._undo.disabled = not state.earlier
+        if self._undo.disabled == bool(state.undo_texts):
+            self._undo.disabled = not state.undo_texts
         self._explain.show(Part.ANNOTATIONS in state.shown)
-        self._angle.show(state.draft.units.angle.value)
-        self._length.show(state.draft.units.length.value)
+        self._angle.show(state.table.units.angle.value)
+        self._length.show(state.table.units.length.value)
 
     def _editor_of_row(self, state: ViewState) -> RowEditor:
         return RowEditor(self._gui, self._send, state, state.selected_row, self._chooser.handle.order)
 
     def _selected(self, label: str) -> SelectRow:
-        """Return what a choice stands for; one of a robot that is gone meanwhile, for a row that there is not."""
+        """Return the event of a choice; one of a robot no longer shown selects no row."""
         return SelectRow(row=self._rows.index(label) if label in self._rows else -1)
 
     def _add_whole(self, state: ViewState) -> None:
-        """Add what concerns all rows."""
-        units = state.draft.units
+        """Add the widgets for all rows."""
+        units = state.table.units
         self._angle = self._unit("Angles in", list(AngleUnit), units.angle)
         self._length = self._unit("Lengths in", list(LengthUnit), units.length)
         hints = {
-            "Read as": "All rows, the same numbers: another robot",
+            "Read as": "The same numbers in all rows, another robot",
             "Convert to": "The same robot, other numbers",
         }
         whole = [Convention.STANDARD, Convention.MODIFIED]
@@ -248,9 +242,9 @@ def _whole(label: str, group: Any) -> SetConvention | ConvertTable:
 
 
 def _names(state: ViewState) -> tuple[str, ...]:
-    return tuple(f"{i}: {row.name}" for i, row in enumerate(state.draft.rows, start=1))
+    return tuple(f"{i}: {row.name}" for i, row in enumerate(state.table.rows, start=1))
 
 
 def _identity(state: ViewState) -> object:
-    """Return what makes fields those of a row: the robot, its rows, and which is chosen."""
+    """Return what the fields belong to: the robot, its rows, and the selected one."""
     return state.spec.name, _names(state), state.selected_row

@@ -1,1 +1,1 @@
-"""What a state looks like: items derived from it, and the painter that sends them to a page."""
+"""What a state looks like: the items of its scene, and the painter that sends them to a page."""

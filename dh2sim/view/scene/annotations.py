@@ -1,10 +1,7 @@
-"""A row of the table explained in the scene: its axes, its common normal, and every number as what it measures.
+"""A row of the table explained in the scene: its axes, its common normal, and what each number measures.
 
-How the quantities of a row are written: letters and indices as in the textbooks.
-
-A row of the table as elementary steps: what is turned or slid, by how much, from which frame.
-
-What a step of a row is drawn with: an arrow for a length, an arc for an angle.
+A row is a product of elementary steps, each a rotation or a translation by one number of the table. A length is drawn
+as an arrow, an angle as an arc, both labelled with letter and index as in the textbooks.
 """
 
 from __future__ import annotations
@@ -24,7 +21,7 @@ from dh2sim.kinematics.forward import frame_poses
 from dh2sim.kinematics.transforms import compose, joint_part, link_part, second_twist
 from dh2sim.robot.spec import AngleUnit, Convention, RobotSpec
 from dh2sim.typing import Array, read_only
-from dh2sim.view.scene.items import Arrow, Color, Item, Label, Polyline, Scene, Vector
+from dh2sim.view.scene.items import Arrow, Color, Item, Label, Polyline, Scene, Vector, vector
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
@@ -45,7 +42,7 @@ class Quantity(StrEnum):
 
     @property
     def axis(self) -> int:
-        """Of the frame at hand, about or along which it goes: 0 for x, 1 for y, 2 for z."""
+        """Axis of the rotation or translation: 0 for x, 1 for y, 2 for z."""
         return {Quantity.A: 0, Quantity.ALPHA: 0, Quantity.BETA: 1}.get(self, 2)
 
 
@@ -55,8 +52,8 @@ _LETTERS = {Quantity.ALPHA: "α", Quantity.THETA: "θ", Quantity.BETA: "β"}
 def symbol(quantity: Quantity, convention: Convention, row: int) -> str:
     """Return letter and index of a quantity, such as ``a₂``.
 
-    The index is that of the row; a and alpha of a modified row carry one less, as in J. J. Craig, Introduction to
-    Robotics.
+    The index is the row's number; for a and alpha of a modified row it is one less, as in J. J. Craig, Introduction
+    to Robotics.
 
     Args:
         quantity: A column of the table.
@@ -68,48 +65,46 @@ def symbol(quantity: Quantity, convention: Convention, row: int) -> str:
 
 
 def subscript(number: int) -> str:
-    """Return a number in small figures below the line."""
+    """Return a number in subscript digits."""
     return str(number).translate(_SUBSCRIPTS)
 
 
-NOTHING = 1e-9
-"""m or rad: what is smaller is rounding, as 0.3 * cos(pi / 2) is; it is told as 0 and not drawn."""
-
-
+ZERO = 1e-9
+"""m or rad: smaller values are rounding errors, as of 0.3 * cos(pi / 2), and count as 0."""
 ORDER = {
     Convention.STANDARD: (Quantity.THETA, Quantity.D, Quantity.A, Quantity.ALPHA),
     Convention.MODIFIED: (Quantity.A, Quantity.ALPHA, Quantity.THETA, Quantity.D),
     Convention.HAYATI: (Quantity.THETA, Quantity.D, Quantity.A, Quantity.ALPHA, Quantity.BETA),
 }
-"""In which order a row of each convention goes from frame i - 1 to frame i."""
+"""Order of the steps from frame i - 1 to frame i in each convention."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Step:
-    """A step of a row; it leads from one frame to the next."""
+    """An elementary step of a row, from one frame to the next."""
 
     quantity: Quantity
     symbol: str
     """Letter and index, such as ``a₂``."""
     value: float
-    """m or rad, with the joint coordinate."""
+    """m or rad, including the joint coordinate."""
     moves: bool
-    """Whether the joint coordinate is in it."""
+    """Whether it includes the joint coordinate."""
     T_before: Array = field(repr=False)
-    """Pose of the frame that it starts from, in base_link, shape (4, 4)."""
+    """Pose of the frame before the step in base_link, shape (4, 4)."""
     T_after: Array = field(repr=False)
-    """Pose of the frame that it leads to."""
+    """Pose of the frame after it."""
 
     @property
     def is_drawn(self) -> bool:
-        """Whether there is something to see."""
-        return abs(self.value) > NOTHING
+        """Whether it is more than zero."""
+        return abs(self.value) > ZERO
 
     def text(self, unit: AngleUnit) -> str:
-        """Return name, index and value, such as ``a₂ = 0.4318 m``; a star marks what moves."""
-        return f"{self.symbol}{'*' if self.moves else ''} = {self._told(unit)}"
+        """Return symbol and value, such as ``a₂ = 0.4318 m``; a star marks the joint variable."""
+        return f"{self.symbol}{'*' if self.moves else ''} = {self._value_text(unit)}"
 
-    def _told(self, unit: AngleUnit) -> str:
+    def _value_text(self, unit: AngleUnit) -> str:
         if not self.moves and not self.is_drawn:
             return "0"
         if not self.quantity.turns:
@@ -130,7 +125,7 @@ def row_steps(spec: RobotSpec, chain: KinematicChain, row: int, q: ArrayLike) ->
 
     Raises:
         IndexError: There is no such row.
-        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
+        ConfigurationError: ``q`` has the wrong shape or is not finite.
     """
     if not 0 <= row < len(spec.rows):
         raise IndexError(f"{spec.name} has rows 0 to {len(spec.rows) - 1}, not {row}")
@@ -151,8 +146,8 @@ def row_steps(spec: RobotSpec, chain: KinematicChain, row: int, q: ArrayLike) ->
 def _coordinate(spec: RobotSpec, row: int, q: ArrayLike) -> float:
     if not spec.rows[row].type.moves:
         return 0.0
-    place = sum(before.type.moves for before in spec.rows[:row])
-    value = float(read_only(q)[place])
+    index = sum(before.type.moves for before in spec.rows[:row])
+    value = float(read_only(q)[index])
     return -value if spec.rows[row].flip else value
 
 
@@ -171,37 +166,36 @@ def _transform(quantity: Quantity, value: float) -> Array:
 
 
 def _number(value: float, decimals: int | None) -> str:
-    """Write a number; one that changes all the time keeps its decimals, so that it does not jump about."""
+    """Return a number as text; one that changes all the time has fixed decimals, so that the text does not jump."""
     return f"{value:.6g}" if decimals is None else f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
 ARC_RADIUS = 0.8
-"""Of an angle's arc; like all that follows a share of the size that is asked for."""
+"""Of an angle's arc; like all that follows a share of the ``size`` argument."""
 _LEG = 1.0
-"""Of the lines from an arc's centre through its ends."""
+"""Length of the lines from an arc's centre through its ends."""
 _TIP = 0.16
 _THICKNESS = 0.05
 _BESIDE = 0.3
-"""Between a mark and its label."""
+"""Distance between a mark and its label."""
 _ARC_STEP = math.radians(3.0)
 _TIP_ANGLE = math.radians(25.0)
 
 
 def step_marks(step: Step, color: Color, size: float) -> dict[str, Item]:
-    """Draw a step that is not zero.
+    """Return the drawing of a step that is not zero.
 
-    An arrow runs from the origin of the frame before to that of the frame behind. An arc runs, in the plane across
-    the axis of the turn, from an axis of the frame before to where the turn takes it: x for theta, z for alpha and
-    beta.
-    It goes once around, and then on, for angles beyond a full turn.
+    An arrow goes from the origin of the frame before to that of the frame after. An arc goes, in the plane normal to
+    the axis of rotation, from an axis of the frame before to its image: x for theta, z for alpha and beta. For angles
+    beyond a full turn it goes once around, and then on.
 
     Args:
         step: The step.
-        color: Of all of it.
+        color: Of the whole drawing.
         size: m.
 
     Returns:
-        An arrow named as the quantity, or an arc named so, with its ``…_tip``, ``…_from`` and ``…_to``; in base_link.
+        An arrow or arc named after the quantity, an arc with its ``…_tip``, ``…_from`` and ``…_to``; in base_link.
     """
     name = step.quantity.value
     if not step.quantity.turns:
@@ -223,7 +217,7 @@ def step_marks(step: Step, color: Color, size: float) -> dict[str, Item]:
 
 
 def label_place(step: Step, size: float) -> Array:
-    """Return where the label of a step would best stand, m in base_link, shape (3,)."""
+    """Return the best place for the label of a step, m in base_link, shape (3,)."""
     if step.quantity.turns:
         angle = _drawn_angle(step.value) if step.is_drawn else 0.0
         return _on_arc(step, 0.5 * angle, (ARC_RADIUS + _BESIDE) * size)
@@ -232,19 +226,13 @@ def label_place(step: Step, size: float) -> Array:
     return np.asarray(middle + _BESIDE * size * beside)
 
 
-def vector(point: Array) -> Vector:
-    """Return a point of shape (3,) as a tuple."""
-    x, y, z = (float(component) for component in point)
-    return x, y, z
-
-
 def _drawn_angle(angle: float) -> float:
     turn = 2.0 * math.pi
     return angle if abs(angle) <= turn else math.copysign(turn + math.fmod(abs(angle), turn), angle)
 
 
 def _on_arc(step: Step, angle: float, radius: float) -> Array:
-    """Return a point on a step's circle, shape (3,), ``angle`` behind the axis that it starts from."""
+    """Return a point on a step's circle, shape (3,), at ``angle`` from the axis where the arc starts."""
     axes = step.T_before[:3, :3]
     match step.quantity.axis:
         case 0:
@@ -260,9 +248,9 @@ def _tip(step: Step, angle: float, radius: float, size: float) -> tuple[Vector, 
     """Return the two strokes of an arrowhead at the end of an arc."""
     end = _on_arc(step, angle, radius)
     length = min(_TIP * size, 0.5 * abs(angle) * radius)
-    outwards = (end - step.T_before[:3, 3]) / radius
-    onwards = math.copysign(1.0, angle) * (_on_arc(step, angle + 0.5 * math.pi, 1.0) - step.T_before[:3, 3])
-    back, aside = -length * math.cos(_TIP_ANGLE) * onwards, length * math.sin(_TIP_ANGLE) * outwards
+    outward = (end - step.T_before[:3, 3]) / radius
+    along = math.copysign(1.0, angle) * (_on_arc(step, angle + 0.5 * math.pi, 1.0) - step.T_before[:3, 3])
+    back, aside = -length * math.cos(_TIP_ANGLE) * along, length * math.sin(_TIP_ANGLE) * outward
     return vector(end + back + aside), vector(end), vector(end + back - aside)
 
 
@@ -275,13 +263,13 @@ COLORS: Final[Mapping[Quantity, Color]] = MappingProxyType(
         Quantity.BETA: (0.05, 0.52, 0.60),
     }
 )
-"""Of the table's columns, in the scene and wherever else they are shown."""
+"""Of the table's columns."""
 AXIS_COLOR: Final[Color] = (0.35, 0.40, 0.50)
 """Of joint axes and of the common normal."""
 _AXIS = 3.0
-"""How far axes go on beyond frames and offsets; like all that follows a share of the size that is asked for."""
+"""Length of axes beyond frames and offsets; like the next a share of the ``size`` argument."""
 _NORMAL = 0.6
-"""How far the common normal goes on beyond the axes."""
+"""Length of the common normal beyond the axes."""
 
 
 def row_annotations(
@@ -292,28 +280,28 @@ def row_annotations(
     size: float,
     angle: AngleUnit = AngleUnit.DEG,
 ) -> Scene:
-    """Explain a row of the table at a configuration.
+    """Return a drawing that explains a row of the table at a configuration.
 
-    The arrows and arcs, put together in the order of the row's product, lead from DH frame i - 1 to DH frame i:
-    theta, d, a, alpha (standard), a, alpha, theta, d (modified), theta, d, a, alpha, beta (Hayati). What is zero has
-    a label, but nothing is drawn for it.
+    In the order of the row's product, the arrows and arcs lead from DH frame i - 1 to DH frame i: theta, d, a, alpha
+    (standard), a, alpha, theta, d (modified), theta, d, a, alpha, beta (Hayati). A quantity that is zero has a label
+    but no drawing.
 
     Args:
         spec: The robot.
         chain: Of the same robot.
         row: Of the table, from 0.
         q: Joint vector, rad and m, shape (n,).
-        size: Length of the axes that frames are drawn with, m; everything is drawn in proportion.
+        size: Length of the axes of frames, m; everything is drawn in proportion.
         angle: Unit of the angles in labels.
 
     Returns:
-        Items below ``/row/``, placed in base_link: ``axis_before`` and ``axis_behind``, the z axes of frames i - 1
-        and i; ``normal``, the line of a, which is the common normal of those axes unless a Hayati row has a beta; of
-        each quantity its arrow, or its arc with ``_tip``, ``_from`` and ``_to``; and labels, ``…_label``.
+        Items below ``/row/``, in base_link: ``axis_before`` and ``axis_after``, the z axes of frames i - 1 and i;
+        ``normal``, the line of a, which is the common normal of those axes unless a Hayati row has a beta; for each
+        quantity its arrow, or its arc with ``_tip``, ``_from`` and ``_to``; and labels, ``…_label``.
 
     Raises:
         IndexError: There is no such row.
-        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
+        ConfigurationError: ``q`` has the wrong shape or is not finite.
     """
     steps = row_steps(spec, chain, row, q)
     axes, ends = _axes(steps, spec.rows[row].convention, size)
@@ -322,20 +310,20 @@ def row_annotations(
         color = COLORS[step.quantity]
         if step.is_drawn:
             items.update(step_marks(step, color, size))
-        place = vector(label_place(step, size))
-        items[f"{step.quantity.value}_label"] = Label(position=place, text=step.text(angle), color=color)
-    for name, number in (("axis_before", row), ("axis_behind", row + 1)):
+        position = vector(label_place(step, size))
+        items[f"{step.quantity.value}_label"] = Label(position=position, text=step.text(angle), color=color)
+    for name, number in (("axis_before", row), ("axis_after", row + 1)):
         items[f"{name}_label"] = Label(position=vector(ends[name]), text=f"z{subscript(number)}", color=AXIS_COLOR)
     return {f"/row/{name}": item for name, item in items.items()}
 
 
 def _axes(steps: tuple[Step, ...], convention: Convention, size: float) -> tuple[dict[str, Item], dict[str, Array]]:
-    """Return the z axes of the frames before and behind, and their upper ends; each goes on along its offset d."""
+    """Return the z axes of the frames before and after, and their upper ends; each covers its offset d."""
     d = next(step.value for step in steps if step.quantity is Quantity.D)
-    of_behind = convention is Convention.MODIFIED
+    modified = convention is Convention.MODIFIED
     spans = {
-        "axis_before": (steps[0].T_before, 0.0 if of_behind else d),
-        "axis_behind": (steps[-1].T_after, -d if of_behind else 0.0),
+        "axis_before": (steps[0].T_before, 0.0 if modified else d),
+        "axis_after": (steps[-1].T_after, -d if modified else 0.0),
     }
     lines: dict[str, Item] = {}
     ends = {}
@@ -356,5 +344,7 @@ def _extended(length: float, margin: float) -> tuple[float, float]:
 
 
 def _line(T: Array, axis: int, low: float, high: float) -> Polyline:
-    origin, way = T[:3, 3], T[:3, axis]
-    return Polyline(points=(vector(origin + low * way), vector(origin + high * way)), color=AXIS_COLOR, width=1.0)
+    origin, direction = T[:3, 3], T[:3, axis]
+    return Polyline(
+        points=(vector(origin + low * direction), vector(origin + high * direction)), color=AXIS_COLOR, width=1.0
+    )

@@ -1,92 +1,156 @@
-"""Where the eye stands: so that the whole robot is seen, until the user moves it."""
+"""The camera of a page: placed so that the whole robot is seen, until the user moves it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from dh2sim.kinematics.transforms import compose
+from dh2sim.model.meshes import MeshAsset
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.view.events import Look
-from dh2sim.view.scene.pinhole import Sight, sight_of
-from dh2sim.view.scene.robot_size import FIELD, eye_of, size_of
+from dh2sim.typing import Array
+from dh2sim.view.events import SetCamera
+from dh2sim.view.scene.items import Vector, vector
+from dh2sim.view.scene.link_poses import frame_origins, poses_at, robot_size
+from dh2sim.view.scene.pinhole import Pinhole, pinhole_of
+from dh2sim.view.scene.solids import mesh_triangles
 
 if TYPE_CHECKING:
     import viser
 
+FIELD_OF_VIEW: Final = math.radians(45.0)
+"""From top to bottom, rad."""
+_NARROWEST: Final = 0.2
+"""Aspect ratio of the narrowest picture that the robot is fitted into."""
+_DIRECTION: Final = (0.62, -0.68, 0.42)
+"""From the robot to the camera."""
 _SAME_ASPECT: Final = 0.01
-_SAME_SIGHT: Final = 0.02
-"""Turns, rad, and shares of the distance or of the scale, that labels need not be placed anew for."""
+_SAME_PINHOLE: Final = 0.02
+"""Rotation, rad, and relative change of distance or scale below which labels stay where they are."""
 _SAME_PLACE: Final = 1e-3
-"""As a share of the robot's size: an eye that is no farther from where it was put was not moved by the user."""
+"""Distance, as a share of the robot's size, up to which the camera counts as not moved by the user."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Viewpoint:
+    """Where a camera is, and what it looks at; m, in base_link."""
+
+    position: Vector
+    look_at: Vector
+
+
+def viewpoint_of(model: RobotModel, aspect: float = 1.0) -> Viewpoint:
+    """Return a viewpoint that shows the whole robot at home, with a margin.
+
+    Args:
+        model: The robot.
+        aspect: Width of the picture over its height; for a narrow one the camera is farther away.
+    """
+    corners = np.vstack([frame_origins(model), _shape_corners(model)])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    centre = 0.5 * (low + high)
+    radius = max(0.55 * float(np.linalg.norm(high - low)), 0.5 * robot_size(model))
+    direction = np.array(_DIRECTION) / np.linalg.norm(_DIRECTION)
+    half = math.atan(math.tan(0.5 * FIELD_OF_VIEW) * min(max(aspect, _NARROWEST), 1.0))
+    position = centre + radius / math.sin(half) * direction
+    return Viewpoint(position=vector(position), look_at=vector(centre))
 
 
 def aim(camera: viser.CameraHandle | viser.InitialCameraConfig, model: RobotModel, aspect: float = 1.0) -> None:
-    """Make a camera see the whole of a robot, however small or large that is.
+    """Make a camera show the whole of a robot, however small or large.
 
     Args:
-        camera: A page's own, or that which pages begin with.
+        camera: That of a page, or the initial one of all pages.
         model: The robot.
         aspect: Width of the camera's picture over its height.
     """
-    eye, size = eye_of(model, aspect), size_of(model)
+    viewpoint, size = viewpoint_of(model, aspect), robot_size(model)
     camera.near, camera.far = 1e-3 * size, 1e3 * size
-    camera.fov = FIELD
-    camera.position = eye.position
-    camera.look_at = eye.look_at
+    camera.fov = FIELD_OF_VIEW
+    camera.position = viewpoint.position
+    camera.look_at = viewpoint.look_at
 
 
-class Watch:
-    """Tells how a page's camera sees, and aims it again when its picture becomes narrower or wider.
+class CameraWatch:
+    """Reports how a page's camera sees, and aims it again when the window changes its shape.
 
-    The latter only where the user has not moved it.
+    A camera that the user has moved is not aimed.
     """
 
     def __init__(
         self,
         camera: viser.CameraHandle,
         model: Callable[[], RobotModel],
-        send: Callable[[Look | Callable[[], None]], None],
+        send: Callable[[SetCamera | Callable[[], None]], None],
     ) -> None:
-        """Begin to watch.
+        """Watch a camera.
 
         Args:
-            camera: Of the page; aimed at the robot already, for a picture that is no higher than wide.
+            camera: The page's, already aimed at the robot for a picture at least as wide as high.
             model: Returns the robot that is shown.
-            send: Queues an event, or what is to be done.
+            send: Queues an event or a task.
         """
         self._camera = camera
         self._model = model
         self._send = send
-        self._seen = (model(), 1.0)
-        self._told: Sight | None = None
-        self._tell()
+        self._aimed = (model(), 1.0)
+        self._reported: Pinhole | None = None
+        self._report()
         camera.on_update(self._changed)
 
-    def look(self) -> None:
+    def aim(self) -> None:
         """Aim at the robot that is shown."""
-        self._seen = (self._model(), self._aspect)
-        aim(self._camera, *self._seen)
+        self._aimed = (self._model(), self._aspect)
+        aim(self._camera, *self._aimed)
 
     @property
     def _aspect(self) -> float:
-        """Of the picture; all that are wider than high are alike."""
+        """Aspect ratio of the picture; 1 for all that are wider than high."""
         return min(self._camera.aspect, 1.0)
 
     async def _changed(self, _camera: viser.CameraHandle) -> None:
-        self._tell()
-        model, aspect = self._seen
-        away = float(np.linalg.norm(self._camera.position - np.array(eye_of(model, aspect).position)))
-        if abs(self._aspect - aspect) > _SAME_ASPECT and away <= _SAME_PLACE * size_of(model):
-            self._send(self.look)
+        self._report()
+        model, aspect = self._aimed
+        moved = float(np.linalg.norm(self._camera.position - np.array(viewpoint_of(model, aspect).position)))
+        if abs(self._aspect - aspect) > _SAME_ASPECT and moved <= _SAME_PLACE * robot_size(model):
+            self._send(self.aim)
 
-    def _tell(self) -> None:
-        """Tell how the camera sees, if that makes a difference."""
-        sight = sight_of(self._camera)
-        if sight is None:
+    def _report(self) -> None:
+        """Report how the camera sees, if that makes a difference to labels."""
+        pinhole = pinhole_of(self._camera)
+        if pinhole is None:
             return
         distance = float(np.linalg.norm(self._camera.position - self._camera.look_at))
-        if self._told is None or not sight.resembles(self._told, _SAME_SIGHT, distance):
-            self._told = sight
-            self._send(Look(sight=sight))
+        if self._reported is None or not pinhole.resembles(self._reported, _SAME_PINHOLE, distance):
+            self._reported = pinhole
+            self._send(SetCamera(pinhole=pinhole))
+
+
+def _shape_corners(model: RobotModel) -> Array:
+    """Return points around the shapes and meshes of the links at home, m, shape (count, 3)."""
+    poses = poses_at(model, model.home)
+    points = [np.empty((0, 3))]
+    for link, T_base_link, T_base_dh in zip(model.all_links, poses.links, poses.frames, strict=True):
+        if link.mesh is None:
+            points += [_transformed(T_base_link, shape.ends) for shape in link.shapes]
+        else:
+            points.append(_transformed(compose(T_base_dh, link.mesh.T_dh_mesh), _box(link.mesh)))
+    return np.vstack(points)
+
+
+@lru_cache(maxsize=64)
+def _box(mesh: MeshAsset) -> Array:
+    """Return the corners of the box around a mesh in its own frame, m, shape (8, 3)."""
+    vertices = np.array(mesh_triangles(mesh)[0])
+    return np.array(list(product(*np.stack([vertices.min(axis=0), vertices.max(axis=0)], axis=1))))
+
+
+def _transformed(T: Array, points: ArrayLike) -> Array:
+    return np.asarray(points) @ T[:3, :3].T + T[:3, 3]

@@ -1,15 +1,13 @@
-"""Frames that stand side by side as one item: sent in one message, and drawn in one go.
+"""The contents of a scene as plain values, which can be compared, and tested without a browser.
 
-What a scene is made of: plain values, so that scenes can be compared, and tested without a browser.
-
-An item's name is its place in the scene's tree: ``/robot/link_2/shape_0`` moves with ``/robot/link_2``. Poses
-are in the parent's frame. Numbers are tuples, so that items compare by value.
+An item's name is its path in the scene's tree: ``/robot/link_2/shape_0`` moves with ``/robot/link_2``. Poses are in
+the parent's frame. Numbers are tuples, so that items compare by value.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -19,22 +17,28 @@ Quaternion: TypeAlias = tuple[float, float, float, float]
 Color: TypeAlias = tuple[float, float, float]
 """Red, green, blue, each from 0 to 1."""
 
-STILL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ORIGIN: Vector = (0.0, 0.0, 0.0)
+NO_ROTATION: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+
+def vector(values: Iterable[float]) -> Vector:
+    """Return three numbers, such as an array of shape (3,), as a tuple."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placed:
-    """Anything that stands somewhere; by itself an invisible frame that carries others."""
+    """An item with a pose; by itself an invisible frame that carries others."""
 
     position: Vector = ORIGIN
     """m."""
-    orientation: Quaternion = STILL
+    orientation: Quaternion = NO_ROTATION
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solid(Placed):
-    """A surface: a capsule, cylinder, sphere, box, or one made of triangles."""
+    """A surface made of triangles."""
 
     vertices: tuple[Vector, ...] = field(repr=False)
     """m."""
@@ -42,7 +46,7 @@ class Solid(Placed):
     color: Color
     opacity: float = 1.0
     plain: bool = False
-    """Whether it is shaded in a few steps, which is faster where there is no graphics card."""
+    """Whether it is shaded in a few steps, which is faster without a graphics card."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +59,7 @@ class Triad(Placed):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Triads(Placed):
-    """The axes of many frames, as one item: a browser draws them much faster so."""
+    """The axes of many frames as one item, which a browser draws much faster."""
 
     positions: tuple[Vector, ...]
     """m."""
@@ -66,7 +70,7 @@ class Triads(Placed):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Polyline(Placed):
-    """A line through points; an arc, a trace, a dashed axis."""
+    """A line through points."""
 
     points: tuple[Vector, ...] = field(repr=False)
     """m."""
@@ -77,7 +81,7 @@ class Polyline(Placed):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lines(Placed):
-    """Lines of their own, each from one point to another."""
+    """Separate lines, each from one point to another."""
 
     segments: tuple[tuple[Vector, Vector], ...] = field(repr=False)
     """m."""
@@ -91,6 +95,7 @@ class Arrow(Placed):
     """An arrow from one point to another."""
 
     start: Vector
+    """m."""
     end: Vector
     color: Color
     thickness: float
@@ -99,7 +104,7 @@ class Arrow(Placed):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Label(Placed):
-    """A text that always faces the eye."""
+    """A text that always faces the camera."""
 
     text: str
     color: Color = (0.1, 0.1, 0.1)
@@ -111,15 +116,10 @@ Scene: TypeAlias = Mapping[str, Item]
 
 
 def batched(scene: Scene) -> Scene:
-    """Return a scene that looks the same, with all triads of a parent and a length as one item.
+    """Return a scene that looks the same, in which all triads of one parent and length are one item.
 
-    Triads that carry something stay as they are.
-
-    Args:
-        scene: Items by name.
-
-    Returns:
-        Items by name; triads that were below ``/frames`` are ``/frames/axes_0``, with other lengths ``axes_1`` ...
+    Triads that carry other items are left alone. Triads below ``/frames`` become ``/frames/axes_0``, those of another
+    length ``/frames/axes_1``, and so on.
     """
     carriers = {_parent(name) for name in scene}
     rest: dict[str, Item] = {}

@@ -1,9 +1,10 @@
-"""Where a robot's links and frames are at a configuration: worked out once for all that is drawn of it."""
+"""Poses of a robot's links and frames, computed once for everything that is drawn; and how large the robot is."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,12 +14,14 @@ from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array, read_only
 
-_KEPT = 8
-"""The robot and its ghost, at this configuration and the last, for a few pages."""
+_CACHED: Final = 8
+"""Enough for the robot and its ghost, now and one configuration ago, on a few pages."""
+_TRIAD: Final = 0.13
+"""Length of a frame's axes, as a share of the robot's size."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stance:
+class LinkPoses:
     """Poses in base_link."""
 
     links: Array
@@ -29,24 +32,42 @@ class Stance:
     """Shape (4, 4)."""
 
 
-def stance_of(model: RobotModel, q: ArrayLike) -> Stance:
-    """Return where everything is.
+def poses_at(model: RobotModel, q: ArrayLike) -> LinkPoses:
+    """Return the poses of all links and frames.
 
     Args:
         model: The robot.
         q: Joint vector, rad and m, shape (n,).
 
     Raises:
-        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
+        ConfigurationError: ``q`` has the wrong shape or is not finite.
     """
-    return _stance(model, tuple(np.asarray(q, dtype=np.float64).ravel().tolist()))
+    return _poses_at(model, tuple(np.asarray(q, dtype=np.float64).ravel().tolist()))
 
 
-@lru_cache(maxsize=_KEPT)
-def _stance(model: RobotModel, q: tuple[float, ...]) -> Stance:
+@lru_cache(maxsize=_CACHED)
+def _poses_at(model: RobotModel, q: tuple[float, ...]) -> LinkPoses:
     chain = model.chain
     links = np.concatenate([identity()[None], joint_poses(chain, q)])
     T_link_dh = np.stack([chain.T_base_link_dh0, *(joint.T_joint_dh for joint in chain.joints)])
     frames = links @ T_link_dh
     tool0 = compose(frames[-1], chain.T_dhn_tool0)
-    return Stance(links=read_only(links), frames=read_only(frames), tool0=read_only(tool0))
+    return LinkPoses(links=read_only(links), frames=read_only(frames), tool0=read_only(tool0))
+
+
+@lru_cache(maxsize=_CACHED)
+def robot_size(model: RobotModel) -> float:
+    """Return the diagonal of the box around base_link and all frames at home, m; positive."""
+    size = float(np.linalg.norm(np.ptp(frame_origins(model), axis=0)))
+    return size if size > 1e-9 else model.reach or 1.0
+
+
+def frame_origins(model: RobotModel) -> Array:
+    """Return the origins of base_link and of all frames at home, m, shape (count, 3)."""
+    poses = poses_at(model, model.home)
+    return np.vstack([np.zeros(3), poses.frames[:, :3, 3], poses.tool0[:3, 3]])
+
+
+def triad_length(model: RobotModel) -> float:
+    """Return the length of the axes that frames are drawn with, m."""
+    return _TRIAD * robot_size(model)

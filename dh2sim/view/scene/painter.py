@@ -1,4 +1,4 @@
-"""Scenes into viser: only what differs from what is drawn already is sent."""
+"""Draws scenes with viser; only what differs from what is drawn already is sent."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ _SHAFT: Final = 0.018
 
 
 class Painter:
-    """Draws on one viser scene; must not be used by two threads at a time."""
+    """Draws on one viser scene; not thread-safe."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        """``scene`` is a client's own, or a server's for all clients."""
+        """Draw on ``scene``, a client's own or a server's for all clients."""
         self._scene = scene
         self._drawn: dict[str, Item] = {}
         self._handles: dict[str, Any] = {}
 
     def draw(self, scene: Scene) -> int:
-        """Make viser's scene this one.
+        """Make viser show a scene.
 
         Args:
             scene: Items by name.
@@ -52,7 +52,7 @@ class Painter:
         """
         scene = batched(scene)
         gone = [name for name in self._drawn if name not in scene]
-        for name in sorted(gone, reverse=True):  # what is below a name comes before it
+        for name in sorted(gone, reverse=True):  # children before their parents
             self._handles.pop(name).remove()
             del self._drawn[name]
         changed = [name for name, item in scene.items() if self._drawn.get(name) != item]
@@ -62,14 +62,14 @@ class Painter:
         return len(gone) + len(changed)
 
     def solids(self) -> dict[str, Any]:
-        """Return viser's handles of the surfaces that are drawn, by name."""
+        """Return viser's handles of the surfaces, by name."""
         return {name: self._handles[name] for name, item in self._drawn.items() if isinstance(item, Solid)}
 
     def _paint(self, name: str, item: Item) -> None:
         old = self._drawn.get(name)
-        if old is not None and _look(old) == _look(item):
+        if old is not None and _appearance(old) == _appearance(item):
             handle = self._handles[name]
-            # what stays is not even mentioned: viser takes a while to find out that nothing is to be sent
+            # assigning an unchanged value costs time: viser compares before it sends nothing
             if item.position != old.position:
                 handle.position = item.position
             if item.orientation != old.orientation:
@@ -80,7 +80,7 @@ class Painter:
             self._handles[name] = self._added(name, item)
 
     def _added(self, name: str, item: Item) -> Any:
-        """Add an item; one that has the name already is exchanged for it."""
+        """Add an item, in place of one with the same name."""
         pose: dict[str, Any] = {"position": item.position, "wxyz": item.orientation}
         match item:
             case Solid():
@@ -128,7 +128,7 @@ class Painter:
                     colors=_bytes(item.color),
                     shaft_radius=0.5 * item.thickness,
                     head_radius=1.25 * item.thickness,
-                    head_length=min(3.0 * item.thickness, 0.6 * _distance(item)),
+                    head_length=min(3.0 * item.thickness, 0.6 * _length(item)),
                     **pose,
                 )
             case Label():
@@ -137,8 +137,8 @@ class Painter:
                 return self._scene.add_frame(name, show_axes=False, **pose)
 
 
-def _look(item: Item) -> tuple[object, ...]:
-    """Return all of an item but where it stands."""
+def _appearance(item: Item) -> tuple[object, ...]:
+    """Return everything of an item but its pose."""
     if isinstance(item, Triads):
         return Triads, item.length, len(item.positions)
     names = [name for name in type(item).__dataclass_fields__ if name not in ("position", "orientation")]
@@ -146,7 +146,7 @@ def _look(item: Item) -> tuple[object, ...]:
 
 
 def _arrays(triads: Triads) -> tuple[Array, Array]:
-    """Return positions and orientations as viser takes them."""
+    """Return positions and orientations as viser expects them."""
     return np.array(triads.positions, dtype=np.float32), np.array(triads.orientations, dtype=np.float32)
 
 
@@ -154,7 +154,7 @@ def _segments(item: Polyline | Lines) -> Sequence[tuple[Vector, Vector]]:
     return item.segments if isinstance(item, Lines) else tuple(pairwise(item.points))
 
 
-def _distance(arrow: Arrow) -> float:
+def _length(arrow: Arrow) -> float:
     return float(np.linalg.norm(np.subtract(arrow.end, arrow.start)))
 
 

@@ -1,4 +1,4 @@
-"""The scene that a state stands for: a pure function."""
+"""The scene of a state: a pure function."""
 
 from __future__ import annotations
 
@@ -9,45 +9,64 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from dh2sim.kinematics.forward import forward_kinematics
+from dh2sim.kinematics.transforms import pose_errors
+from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.view.scene.annotations import row_annotations
-from dh2sim.view.scene.ghost import ghost_configuration, ghost_scene
-from dh2sim.view.scene.items import Color, Item, Label, Lines, Placed, Polyline, Scene, Solid, Triad, Vector
-from dh2sim.view.scene.labels import spread
-from dh2sim.view.scene.link_poses import stance_of
-from dh2sim.view.scene.markers import line_to_unreached, pull_arrow
-from dh2sim.view.scene.robot_size import size_of, triad_length
+from dh2sim.view.scene.ghost import ToolOffset, ghost_configuration, ghost_scene
+from dh2sim.view.scene.items import (
+    Arrow,
+    Color,
+    Item,
+    Label,
+    Lines,
+    Placed,
+    Polyline,
+    Scene,
+    Solid,
+    Triad,
+    Vector,
+    vector,
+)
+from dh2sim.view.scene.labels import spread_labels
+from dh2sim.view.scene.link_poses import poses_at, robot_size, triad_length
 from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids
-from dh2sim.view.state import Part, ViewState
+from dh2sim.view.state import Goal, LinkDrag, Part, ViewState
 
 ROBOT: Final = "/robot"
 FRAMES: Final = "/frames"
 NAMES: Final = "/names"
 ROW: Final = "/row"
 GHOST: Final = "/ghost"
-PULL: Final = "/pull"
-UNREACHED: Final = "/unreached"
+DRAG: Final = "/drag"
+GOAL: Final = "/goal"
 IN_BASE_LINK: Final = (ROBOT, FRAMES, NAMES, ROW, GHOST)
-"""All that stands in base_link is below these; the rest, such as the trace and the grid, stands in the world."""
+"""Items below these are given in base_link, all others, such as the trace and the grid, in the world."""
 _TRACE_COLOR: Final[Color] = (0.10, 0.45, 0.85)
 _GRID_COLOR: Final[Color] = (0.82, 0.84, 0.87)
 _AXIS_COLOR: Final[Color] = (0.62, 0.65, 0.70)
+_GOAL_COLOR: Final[Color] = (0.85, 0.20, 0.10)
+_DRAG_COLOR: Final[Color] = (0.75, 0.10, 0.70)
 _CELLS: Final = 20
 """Cells of the grid along each side."""
-_SEEN_THROUGH: Final = 0.35
-"""Opacity of a robot inside which something is explained."""
+_SEE_THROUGH: Final = 0.35
+"""Opacity of a robot in which a row is explained."""
 _TOGETHER: Final = 0.25
-"""Frames nearer to each other than this share of their axes' length have one label."""
+"""Frames nearer to each other than this share of their axes' length share a label."""
 _ABOVE: Final = 0.45
-"""How far above its frame a label stands, as a share of the axes' length."""
+"""Height of a label above its frame, as a share of the axes' length."""
+_THICKNESS: Final = 0.12
+"""Of the arrow of a drag, as a share of the axes' length."""
 
 
 def scene_of(state: ViewState) -> Scene:
     """Return everything that is drawn, by name.
 
-    The pose of ``/robot/link_i`` is that of link i in base_link, of ``/frames/dh_i`` that of DH frame i. What stands
-    in base_link is below ``IN_BASE_LINK``, which have the pose of base_link in the world.
+    The pose of ``/robot/link_i`` is that of link i in base_link, that of ``/frames/dh_i`` is that of DH frame i. The
+    roots in ``IN_BASE_LINK`` have the pose of base_link in the world.
     """
     items = dict(_items(state))
     items.update(_spread_labels(state, items))
@@ -59,7 +78,7 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
     explained = Part.ANNOTATIONS in state.shown
     base = _base_link(state)
     yield from ((root, base) for root in IN_BASE_LINK)
-    solids = robot_solids(state.model, state.q, ROBOT, opacity=_SEEN_THROUGH if explained else None)
+    solids = robot_solids(state.model, state.q, ROBOT, opacity=_SEE_THROUGH if explained else None)
     yield from _without(ROBOT, {name: item for name, item in solids.items() if shapes or not isinstance(item, Solid)})
     if Part.FRAMES in state.shown:
         yield from _frames(state)
@@ -68,25 +87,25 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
         row = row_annotations(state.spec, state.model.chain, state.selected_row, state.q, size, state.angle)
         yield from row.items()
     if Part.GHOST in state.shown and state.ghost is not None:
-        stands = ghost_configuration(state.ghost.model, state.model, state.q)
-        yield from _without(GHOST, ghost_scene(state.ghost.model, stands.q))
-    if state.pull is not None:
-        yield PULL, pull_arrow(state.model, state.q, state.pull)
-    if (line := line_to_unreached(state)) is not None:
-        yield UNREACHED, line
+        configuration = ghost_configuration(state.ghost.model, state.model, state.q)
+        yield from _without(GHOST, ghost_scene(state.ghost.model, configuration.q))
+    if state.drag is not None:
+        yield DRAG, _drag_arrow(state, state.drag)
+    if (marker := _goal_marker(state)) is not None:
+        yield GOAL, marker
     if Part.TRACE in state.shown and len(state.trace) > 1:
         yield "/trace", Polyline(points=state.trace, color=_TRACE_COLOR, width=3.0)
     if Part.GRID in state.shown:
-        yield from _grid(size_of(state.model)).items()
+        yield from _grid(robot_size(state.model)).items()
 
 
 def _spread_labels(state: ViewState, items: Scene) -> Scene:
-    """Return the labels where the eye sees all of them; those of the explained row choose their places first."""
-    if state.sight is None:
+    """Return the labels where all can be read; those of the explained row are placed first."""
+    if state.pinhole is None:
         return {}
-    sight = state.sight.seen_from(state.T_world_base_link) if state.floats else state.sight
+    pinhole = state.pinhole.in_frame(state.T_world_base_link) if state.floats else state.pinhole
     labels = {name: item for name, item in items.items() if isinstance(item, Label)}
-    return spread(labels, sight, first=[name for name in labels if name.startswith(f"{ROW}/")])
+    return spread_labels(labels, pinhole, first=[name for name in labels if name.startswith(f"{ROW}/")])
 
 
 def _plain(item: Item) -> Item:
@@ -94,7 +113,6 @@ def _plain(item: Item) -> Item:
 
 
 def _base_link(state: ViewState) -> Placed:
-    """Return where base_link is in the world."""
     if not state.floats:
         return Placed()
     T = np.array(state.T_world_base_link)
@@ -116,7 +134,7 @@ def _frames(state: ViewState) -> Iterator[tuple[str, Item]]:
 
 
 def _names(places: Mapping[str, Vector], length: float) -> Iterator[tuple[str, Item]]:
-    """Yield the frames' names, those of frames with one origin on one label."""
+    """Yield labels with the frames' names; frames at one place share a label."""
     groups: list[tuple[Vector, list[str]]] = []
     for name, place in places.items():
         group = next((names for other, names in groups if math.dist(other, place) <= _TOGETHER * length), None)
@@ -131,15 +149,69 @@ def _names(places: Mapping[str, Vector], length: float) -> Iterator[tuple[str, I
 
 def frames_of(state: ViewState) -> dict[str, Array]:
     """Return the poses of DH frames dh_0 … dh_n and of tool0 in base_link, shape (4, 4) each."""
-    stance = stance_of(state.model, state.q)
-    return {**{f"dh_{i}": T for i, T in enumerate(stance.frames)}, "tool0": stance.tool0}
+    poses = poses_at(state.model, state.q)
+    return {**{f"dh_{i}": T for i, T in enumerate(poses.frames)}, "tool0": poses.tool0}
 
 
 def _braced(name: str) -> str:
     return f"{{{name.removeprefix('dh_')}}}" if name.startswith("dh_") else name
 
 
-@lru_cache(maxsize=8)  # the same lines for every picture
+def goal_text(state: ViewState) -> str:
+    """Return how far tool0 is from where the user has dragged its handle, a sentence; empty if it is there."""
+    goal = _missed_goal(state)
+    if goal is None:
+        return ""
+    tool = forward_kinematics(state.model.chain, state.q)
+    distance, angle = pose_errors(tool, np.array(goal.T_base_link_tool0))
+    offset = ToolOffset(distance=float(distance), angle=float(angle))
+    return f"The handle is out of reach, or too far for one step: tool0 is {offset.text}."
+
+
+def _goal_marker(state: ViewState) -> Polyline | None:
+    """Return a line in base_link from tool0 to where its handle is; None if it is there."""
+    goal = _missed_goal(state)
+    if goal is None:
+        return None
+    tool = position_of(forward_kinematics(state.model.chain, state.q))
+    return Polyline(points=(tool, position_of(np.array(goal.T_base_link_tool0))), color=_GOAL_COLOR, width=3.0)
+
+
+def _missed_goal(state: ViewState) -> Goal | None:
+    missed = Part.HANDLE in state.shown and state.goal is not None and not state.goal.reached
+    return state.goal if missed else None
+
+
+def point_in_link(model: RobotModel, q: ArrayLike, link: str, point: ArrayLike) -> Vector:
+    """Return a point of base_link in a link's frame.
+
+    Args:
+        model: The robot.
+        q: Joint vector, rad and m, shape (n,).
+        link: Name of one of the links.
+        point: In base_link, m, shape (3,).
+
+    Returns:
+        The point in the link's frame, m.
+    """
+    T = _link_pose(model, q, link)
+    return vector(T[:3, :3].T @ (np.asarray(point, dtype=np.float64) - T[:3, 3]))
+
+
+def _drag_arrow(state: ViewState, drag: LinkDrag) -> Arrow:
+    """Return the arrow from the grabbed point of a link to the mouse, in base_link."""
+    T = _link_pose(state.model, state.q, drag.link)
+    start = T[:3, :3] @ np.array(drag.point_in_link) + T[:3, 3]
+    thickness = _THICKNESS * triad_length(state.model)
+    return Arrow(start=vector(start), end=drag.target, color=_DRAG_COLOR, thickness=thickness)
+
+
+def _link_pose(model: RobotModel, q: ArrayLike, link: str) -> Array:
+    index = [known.name for known in model.all_links].index(link)
+    return np.asarray(poses_at(model, q).links[index])
+
+
+@lru_cache(maxsize=8)  # the lines are the same in every picture
 def _grid(size: float) -> Mapping[str, Item]:
     """Return lines on the ground, a round number of metres apart."""
     cell = _round_length(2.6 * size / _CELLS)

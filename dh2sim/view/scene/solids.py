@@ -1,8 +1,7 @@
-"""Links as solids made of triangles: one way for the robot, the ghost and the page.
+"""Links as solids made of triangles, for the robot, its ghost and exported pages.
 
-``robot_solids`` gives all of a robot at a configuration, ``link_solids`` what hangs below a link's frame. Triangles
-are made once for every size of a shape and every mesh file and then shared, so that scenes compare quickly, those of
-an edited robot too.
+Triangles are made once for every size of a shape and every mesh, and shared from then on, so that scenes compare
+quickly, even those of an edited robot.
 """
 
 from __future__ import annotations
@@ -21,18 +20,18 @@ from dh2sim.model.meshes import STL_FACE, STL_HEADER, MeshAsset
 from dh2sim.model.robot_model import LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.typing import Array
-from dh2sim.view.scene.items import Color, Item, Placed, Quaternion, Solid, Vector
-from dh2sim.view.scene.link_poses import stance_of
+from dh2sim.view.scene.items import Color, Item, Placed, Quaternion, Solid, Vector, vector
+from dh2sim.view.scene.link_poses import poses_at
 
 SIDES = 32
-"""Of a round shape's cross-section; its corners lie on the true surface, and so it is up to 1.5 % too small."""
+"""Of a round shape's cross-section; its corners lie on the true surface, which makes it up to 1.5 % too small."""
 RINGS = 8
 """Between the equator and the pole of a capsule's end."""
-_SHAPES_KEPT = 128
-"""Of up to a seventh of a megabyte each; every edit of a table makes a few new ones."""
-_MESHES_KEPT = 32
-_ROBOTS_KEPT = 6
-"""The robot, seen through or not, and its ghost; of a few pages."""
+_SHAPES_CACHED = 128
+"""Up to 140 kB each; every edit of a table makes a few new ones."""
+_MESHES_CACHED = 32
+_ROBOTS_CACHED = 6
+"""The robot, opaque or not, and its ghost, on a few pages."""
 
 Triangles: TypeAlias = tuple[tuple[Vector, ...], tuple[tuple[int, int, int], ...]]
 """Vertices, m, and the three corners of every face, anticlockwise from outside."""
@@ -43,12 +42,12 @@ _Profile: TypeAlias = list[tuple[float, float]]
 def link_solids(
     link: LinkModel, T_link_dh: Array, *, color: Color | None = None, opacity: float | None = None
 ) -> dict[str, Solid]:
-    """Return what shows a link.
+    """Return the solids of a link.
 
     Args:
         link: The link.
-        T_link_dh: Pose of the link's DH frame in the link's frame, which carries its mesh: a joint's ``T_joint_dh``,
-            and ``T_base_link_dh0`` for the base link; shape (4, 4).
+        T_link_dh: Pose of the link's DH frame, which carries its mesh, in the link's frame: a joint's ``T_joint_dh``,
+            or ``T_base_link_dh0`` for the base link; shape (4, 4).
         color: Instead of the link's own colours.
         opacity: Instead of the link's own.
 
@@ -80,21 +79,21 @@ def robot_solids(
         opacity: Likewise.
 
     Returns:
-        ``root`` in base_link, a frame ``root/link_2`` at every link, and below it what ``link_solids`` gives. Only
-        the frames' poses change with ``q``.
+        ``root`` in base_link, a frame ``root/link_2`` at every link, and below it the solids of the link. Only the
+        frames' poses change with ``q``.
 
     Raises:
-        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
+        ConfigurationError: ``q`` has the wrong shape or is not finite.
     """
     items: dict[str, Item] = {root: Placed()}
-    for link, T in zip(model.all_links, stance_of(model, q).links, strict=True):
+    for link, T in zip(model.all_links, poses_at(model, q).links, strict=True):
         items[f"{root}/{link.name}"] = Placed(position=position_of(T), orientation=orientation_of(T))
     return {**items, **_fixed_solids(model, root, color, opacity)}
 
 
-@lru_cache(maxsize=_ROBOTS_KEPT)
+@lru_cache(maxsize=_ROBOTS_CACHED)
 def _fixed_solids(model: RobotModel, root: str, color: Color | None, opacity: float | None) -> Mapping[str, Solid]:
-    """Return what hangs below the links' frames, which is the same at every configuration."""
+    """Return what is below the links' frames, the same at every configuration."""
     dh_frames = [model.chain.T_base_link_dh0, *(joint.T_joint_dh for joint in model.chain.joints)]
     return {
         f"{root}/{link.name}/{name}": solid
@@ -104,32 +103,32 @@ def _fixed_solids(model: RobotModel, root: str, color: Color | None, opacity: fl
 
 
 def shape_triangles(shape: Shape) -> Triangles:
-    """Return a shape as a closed surface, in the shape's own frame; the rim of a cylinder has its points twice."""
+    """Return the closed surface of a shape in its own frame."""
     return _shape_triangles(shape.kind, shape.radius, shape.length)
 
 
-@lru_cache(maxsize=_SHAPES_KEPT)
+@lru_cache(maxsize=_SHAPES_CACHED)
 def _shape_triangles(kind: ShapeKind, radius: float, length: float) -> Triangles:
     half = 0.5 * length
     match kind:
         case ShapeKind.CYLINDER:
-            # the ends have points of their own: so their rims are drawn sharp
+            # the ends have vertices of their own, which makes their rims look sharp
             below, side, above = (
                 [(0.0, -half), (radius, -half)],
                 [(radius, -half), (radius, half)],
                 [(radius, half), (0.0, half)],
             )
-            return _joined([_turned(profile) for profile in (below, side, above)])
+            return _merged([_revolved(profile) for profile in (below, side, above)])
         case ShapeKind.CAPSULE:
-            return _turned(_capsule_profile(radius, half))
+            return _revolved(_capsule_profile(radius, half))
 
 
 def mesh_triangles(mesh: MeshAsset) -> Triangles:
-    """Return a mesh in its own frame, m; corners that coincide become one."""
+    """Return the surface of a mesh in its own frame, m; coincident corners are merged."""
     return _mesh_triangles(mesh.data, mesh.scale)
 
 
-@lru_cache(maxsize=_MESHES_KEPT)
+@lru_cache(maxsize=_MESHES_CACHED)
 def _mesh_triangles(data: bytes, scale: float) -> Triangles:
     record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     count = (len(data) - STL_HEADER) // STL_FACE
@@ -143,15 +142,26 @@ def _mesh_triangles(data: bytes, scale: float) -> Triangles:
 
 
 def position_of(T: Array) -> Vector:
-    """Return where a pose, shape (4, 4), is, m."""
-    x, y, z = (float(component) for component in T[:3, 3])
-    return x, y, z
+    """Return the position of a pose of shape (4, 4), m."""
+    return vector(T[:3, 3])
 
 
 def orientation_of(T: Array) -> Quaternion:
-    """Return how a pose, shape (4, 4), is turned, (w, x, y, z)."""
+    """Return the orientation of a pose of shape (4, 4), (w, x, y, z)."""
     w, x, y, z = (float(component) for component in quaternion_from_rotation(T))
     return w, x, y, z
+
+
+def rotation_matrix(quaternion: ArrayLike) -> Array:
+    """Return the rotation of a unit quaternion (w, x, y, z), shape (3, 3)."""
+    w, x, y, z = np.asarray(quaternion, dtype=np.float64).tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _solid(
@@ -181,8 +191,8 @@ def _capsule_profile(radius: float, half: float) -> _Profile:
     return [(0.0, -half - radius), *below, *above, (0.0, half + radius)]
 
 
-def _turned(profile: _Profile) -> Triangles:
-    """Turn a profile about z; a ring of no radius is a single point."""
+def _revolved(profile: _Profile) -> Triangles:
+    """Revolve a profile about z; a ring of radius 0 is a single point."""
     vertices: list[Vector] = []
     rings = []
     for radius, z in profile:
@@ -202,7 +212,7 @@ def _turned(profile: _Profile) -> Triangles:
     return tuple(vertices), tuple(faces)
 
 
-def _joined(parts: list[Triangles]) -> Triangles:
+def _merged(parts: list[Triangles]) -> Triangles:
     vertices: list[Vector] = []
     faces: list[tuple[int, int, int]] = []
     for points, triangles in parts:

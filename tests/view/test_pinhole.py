@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.typing import Array
-from dh2sim.view.scene.pinhole import Sight, sight_of
+from dh2sim.view.scene.pinhole import Pinhole, pinhole_of
 
 
 @dataclass
@@ -40,8 +40,8 @@ def looking(rng: np.random.Generator) -> tuple[Camera, Array, Array]:
     return Camera(position=position, wxyz=quaternion), R, position
 
 
-def sight(camera: Camera) -> Sight:
-    found = sight_of(camera)  # type: ignore[arg-type]
+def pinhole(camera: Camera) -> Pinhole:
+    found = pinhole_of(camera)  # type: ignore[arg-type]
     assert found is not None
     return found
 
@@ -52,7 +52,7 @@ def test_points_are_seen_where_a_pinhole_camera_has_them(seed: int) -> None:
     camera, R, position = looking(rng)
     points = rng.normal(size=(20, 3)) * 3.0
     in_camera = (points - position) @ R  # x right, y down, z ahead
-    seen = sight(camera).in_picture(points)
+    seen = pinhole(camera).project(points)
     focal = 300.0 / math.tan(0.4)
     np.testing.assert_allclose(seen[:, 2], in_camera[:, 2], rtol=0, atol=1e-12)
     ahead = in_camera[:, 2] > 0.0
@@ -65,9 +65,9 @@ def test_points_are_seen_where_a_pinhole_camera_has_them(seed: int) -> None:
 def test_a_raised_point_is_seen_so_many_pixels_higher_and_as_deep(seed: int, pixels: float) -> None:
     camera, R, position = looking(np.random.default_rng(seed))
     point = position + R @ (0.3, -0.2, 2.5)
-    seen = sight(camera)
+    seen = pinhole(camera)
     raised = seen.raised((point[0], point[1], point[2]), pixels, 2.5)
-    before, after = seen.in_picture(np.array([point, raised]))
+    before, after = seen.project(np.array([point, raised]))
     np.testing.assert_allclose(after - before, [0.0, pixels, 0.0], rtol=0, atol=1e-9)
 
 
@@ -79,8 +79,8 @@ def test_in_a_frame_that_moves_along_nothing_is_seen_elsewhere() -> None:
     T_world_frame[:3, :3], T_world_frame[:3, 3] = R, t
     points = rng.normal(size=(10, 3))
     in_world = points @ R.T + t
-    moved = sight(camera).seen_from(T_world_frame)
-    np.testing.assert_allclose(moved.in_picture(points), sight(camera).in_picture(in_world), rtol=1e-9, atol=1e-9)
+    moved = pinhole(camera).in_frame(T_world_frame)
+    np.testing.assert_allclose(moved.project(points), pinhole(camera).project(in_world), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -96,17 +96,17 @@ def test_in_a_frame_that_moves_along_nothing_is_seen_elsewhere() -> None:
 )
 def test_a_camera_of_nonsense_sees_nothing(change: dict[str, object]) -> None:
     camera, _, _ = looking(np.random.default_rng(0))
-    assert sight_of(replace(camera, **change)) is None  # type: ignore[arg-type]
+    assert pinhole_of(replace(camera, **change)) is None  # type: ignore[arg-type]
 
 
 def test_small_moves_make_no_difference_and_large_ones_do() -> None:
     camera, _, position = looking(np.random.default_rng(1))
-    here = sight(camera)
+    here = pinhole(camera)
     assert here.resembles(here, 0.02, 2.0)
     for step, same in ((0.03, True), (0.05, False)):
-        there = sight(replace(camera, position=position + np.array([step, 0.0, 0.0])))
+        there = pinhole(replace(camera, position=position + np.array([step, 0.0, 0.0])))
         assert there.resembles(here, 0.02, 2.0) is same
     for height, same in ((610, True), (620, False)):
-        assert sight(replace(camera, image_height=height)).resembles(here, 0.02, 2.0) is same
+        assert pinhole(replace(camera, image_height=height)).resembles(here, 0.02, 2.0) is same
     turned = replace(here, right=here.up, up=tuple(-value for value in here.right))  # type: ignore[arg-type]
     assert not turned.resembles(here, 0.02, 2.0)

@@ -12,8 +12,8 @@ from dh2sim.robot.read import builtin_robots, load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from dh2sim.view.events import ChooseFrame, RandomConfiguration, SetJoints
+from dh2sim.view.frame_readout import readout_of
 from dh2sim.view.initial_state import open_state
-from dh2sim.view.panel.readings import readings_of
 from dh2sim.view.reduce import reduce
 
 
@@ -35,7 +35,7 @@ def jacobian_by_differences(spec: RobotSpec, q: tuple[float, ...], step: float =
 def test_manipulability_and_distance_to_singularity_are_those_of_the_table(robot: str) -> None:
     spec = load_robot(robot)
     state = reduce(open_state(spec), RandomConfiguration(seed=3))
-    told, J = readings_of(state), jacobian_by_differences(spec, state.q)
+    told, J = readout_of(state), jacobian_by_differences(spec, state.q)
     gram = J @ J.T if J.shape[1] >= 6 else J.T @ J
     size = max(1.0, state.model.reach) ** 3
     assert told.manipulability == pytest.approx(math.sqrt(max(np.linalg.det(gram), 0.0)), abs=1e-6 * size)
@@ -45,8 +45,8 @@ def test_manipulability_and_distance_to_singularity_are_those_of_the_table(robot
 
 def test_where_the_wrist_is_stretched_there_is_no_distance_to_singularity() -> None:
     spec = load_robot("stanford")
-    bent = readings_of(reduce(open_state(spec), SetJoints(q=(0.3, 0.5, 0.4, 0.2, 0.9, 0.1))))
-    stretched = readings_of(reduce(open_state(spec), SetJoints(q=(0.3, 0.5, 0.4, 0.2, 0.0, 0.1))))
+    bent = readout_of(reduce(open_state(spec), SetJoints(q=(0.3, 0.5, 0.4, 0.2, 0.9, 0.1))))
+    stretched = readout_of(reduce(open_state(spec), SetJoints(q=(0.3, 0.5, 0.4, 0.2, 0.0, 0.1))))
     assert bent.smallest_singular_value > 0.01
     assert bent.manipulability > 0.01
     assert stretched.smallest_singular_value < 1e-12
@@ -59,7 +59,7 @@ def test_a_pose_is_told_in_three_ways_that_agree_with_the_table(frame: str) -> N
     state = reduce(reduce(open_state(spec), RandomConfiguration(seed=5)), ChooseFrame(name=frame))
     frames = table_frame_poses(spec, state.q)
     expected = table_tool_pose(spec, state.q) if frame == "tool0" else frames[int(frame.removeprefix("dh_"))]
-    told = readings_of(state)
+    told = readout_of(state)
     assert np.allclose(told.T_base_frame, expected, rtol=0, atol=1e-12)
     assert np.allclose(told.xyz, expected[:3, 3], rtol=0, atol=1e-12)
     # rpy: about the fixed axes x, y and z in turn, as URDF has it; quaternion: the scalar first

@@ -11,8 +11,7 @@ from dh2sim.view.events import Event, MoveJoint, MoveTool, SetMode, Show
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.reduce import reduce
 from dh2sim.view.scene.items import Polyline
-from dh2sim.view.scene.markers import told_unreached
-from dh2sim.view.scene.scene import scene_of
+from dh2sim.view.scene.scene import goal_text, scene_of
 from dh2sim.view.state import Matrix, Mode, Part, ViewState
 
 STANFORD = open_state(load_robot("stanford"))
@@ -40,8 +39,8 @@ def wanted(*, reached: bool, turned: bool = False) -> MoveTool:
 @pytest.mark.parametrize(("turned", "how_far"), [(False, "0.5 m away"), (True, "0.5 m away and turned by 90°")])
 def test_it_is_told_how_far_the_tool_is_from_its_handle_and_a_line_leads_there(turned: bool, how_far: str) -> None:
     state = after(HANDLE, wanted(reached=False, turned=turned))
-    assert told_unreached(state) == f"The handle is out of reach, or too far for one step: tool0 is {how_far}."
-    line = scene_of(state)["/unreached"]
+    assert goal_text(state) == f"The handle is out of reach, or too far for one step: tool0 is {how_far}."
+    line = scene_of(state)["/goal"]
     assert isinstance(line, Polyline)
     x, y, z = TOOL[:3, 3]
     assert np.allclose(line.points, [(x, y, z), (x, y, z + 0.5)], rtol=0, atol=1e-12)
@@ -59,8 +58,8 @@ def test_it_is_told_how_far_the_tool_is_from_its_handle_and_a_line_leads_there(t
 )
 def test_nothing_is_told_where_the_tool_is_not_wanted_elsewhere(happened: tuple[Event, ...]) -> None:
     state = after(*happened)
-    assert told_unreached(state) == ""
-    assert "/unreached" not in scene_of(state)
+    assert goal_text(state) == ""
+    assert "/goal" not in scene_of(state)
 
 
 def test_a_handle_that_was_put_away_comes_back_at_the_tool() -> None:

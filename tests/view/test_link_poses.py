@@ -12,7 +12,7 @@ from dh2sim.model.build import build_model
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
-from dh2sim.view.scene.link_poses import stance_of
+from dh2sim.view.scene.link_poses import poses_at
 from tests.strategies import robots_with_joint_vectors
 
 
@@ -23,19 +23,19 @@ def test_frames_and_tool_are_where_the_table_has_them(robot: tuple[RobotSpec, Ar
     model = build_model(spec)
     scale = max(1.0, model.reach)
     for q in vectors:
-        stance = stance_of(model, q)
-        assert np.allclose(stance.frames, table_frame_poses(spec, q), rtol=0, atol=1e-12 * scale)
-        assert np.allclose(stance.tool0, table_tool_pose(spec, q), rtol=0, atol=1e-12 * scale)
-        assert stance.links[0].tolist() == np.eye(4).tolist()
-        for link, joint, frame in zip(stance.links[1:], model.chain.joints, stance.frames[1:], strict=True):
+        poses = poses_at(model, q)
+        assert np.allclose(poses.frames, table_frame_poses(spec, q), rtol=0, atol=1e-12 * scale)
+        assert np.allclose(poses.tool0, table_tool_pose(spec, q), rtol=0, atol=1e-12 * scale)
+        assert poses.links[0].tolist() == np.eye(4).tolist()
+        for link, joint, frame in zip(poses.links[1:], model.chain.joints, poses.frames[1:], strict=True):
             assert np.allclose(link @ joint.T_joint_dh, frame, rtol=0, atol=1e-12 * scale)
 
 
 def test_a_configuration_is_worked_out_once_and_cannot_be_spoilt() -> None:
     model = build_model(load_robot("stanford"))
-    first = stance_of(model, [0.1] * 6)
-    assert stance_of(model, np.full(6, 0.1)) is first
-    assert stance_of(model, [0.1] * 5 + [0.2]) is not first
+    first = poses_at(model, [0.1] * 6)
+    assert poses_at(model, np.full(6, 0.1)) is first
+    assert poses_at(model, [0.1] * 5 + [0.2]) is not first
     for poses in (first.links, first.frames, first.tool0):
         with pytest.raises(ValueError, match="read-only"):
             poses[..., 0, 3] = 1.0
@@ -44,4 +44,4 @@ def test_a_configuration_is_worked_out_once_and_cannot_be_spoilt() -> None:
 def test_a_configuration_of_the_wrong_length_is_refused() -> None:
     model = build_model(load_robot("stanford"))
     with pytest.raises(ConfigurationError):
-        stance_of(model, [0.0] * 5)
+        poses_at(model, [0.0] * 5)
