@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from html.parser import HTMLParser
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -238,3 +239,78 @@ def test_what_is_no_robot_is_refused_in_words(
 def test_an_import_takes_the_path_as_text() -> None:
     imported = dh2sim.import_robot(str(GENERATED / "scara" / "scara.urdf"))
     assert imported.spec.name == "scara"
+
+
+MIXED = Robot(
+    [
+        Revolute(a=0.1, alpha=0.651, theta=pi / 2, flip=True, name="shoulder"),
+        Prismatic(theta=-pi / 2, d=-0.25, flip=True, limits=(-0.1, 0.1)),
+        Fixed(d=0.2),
+        Continuous(convention="hayati", beta=0.5, theta=-0.3),
+        Revolute(convention="modified", alpha=-pi / 2),
+    ],
+    name="mixed",
+)
+
+
+class Cells(HTMLParser):
+    """The texts of a table's cells, by row; fails where an element is not closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.rows: list[list[str]] = []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:  # noqa: ARG002
+        if tag != "br":
+            self.open.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if {"td", "th"} & set(self.open):
+            self.rows[-1][-1] += data
+
+
+def test_a_notebook_shows_the_table_with_the_variables_starred() -> None:
+    rows = Cells(Robot.load("stanford")._repr_html_()).rows
+    assert rows[0] == ["i", "joint", "type", "aim", "αideg", "dim", "θideg", "limits"]
+    assert rows[1] == ["1", "joint_1", "revolute", "0", "−90", "0.4", "θ1*", "−170 … 170°"]
+    assert rows[3] == ["3", "joint_3", "prismatic", "0", "0", "d3*", "0", "0 … 1.27 m"]
+    rows = Cells(MIXED._repr_html_()).rows
+    assert {len(row) for row in rows} == {10}
+    assert rows[1][3:] == ["standard", "0.1", "37.2996", "", "0", "90 − θ1*", ""]
+    assert rows[2][3:] == ["standard", "0", "0", "", "−0.25 − d2*", "−90", "−0.1 … 0.1 m"]
+    assert rows[4][3:] == ["hayati", "0", "0", "28.6479", "", "θ4* − 17.1887", ""]
+
+
+def test_a_notebook_is_offered_the_table_as_latex() -> None:
+    assert Robot.load("rpr")._repr_latex_() == "\n".join(
+        [
+            r"$\displaystyle \begin{array}{c|cccc}",
+            r"i & a_{i-1} & \alpha_{i-1} & d_{i} & \theta_{i} \\",
+            r" & [\mathrm{m}] & [^\circ] & [\mathrm{m}] & [^\circ] \\ \hline",
+            r"1 & 0 & 0 & 0 & \theta_{1}^{*} \\",
+            r"2 & 0 & 90 & d_{2}^{*} & 0 \\",
+            r"3 & 0 & 0 & 0.2 & \theta_{3}^{*} \\",
+            r"\end{array}$",
+        ]
+    )
+    lines = MIXED._repr_latex_().splitlines()[1:-1]
+    assert {line.count("&") for line in lines} == {6}
+    assert lines[2] == r"1 & \text{standard} & 0.1 & 37.2996 &  & 0 & 90 - \theta_{1}^{*} \\"
+
+
+def test_a_viewer_is_started_and_returned(arm: Robot) -> None:
+    viewer = arm.view(browser=False, port=18090)
+    try:
+        assert viewer.url.startswith("http://127.0.0.1:180")
+    finally:
+        viewer.stop()
