@@ -117,4 +117,12 @@ class ControllerError(Dh2simError):
 
 
 class SettingsError(Dh2simError, ValueError):
-    """A run's settings are wrong; its text has a line for each thing that is."""
+    """Options of a run are wrong; ``problems`` has the name of each argument with what is wrong with it.
+
+    The name is empty where a problem is about no single argument.
+    """
+
+    def __init__(self, problems: Iterable[tuple[str, str]]) -> None:
+        """Keep the problems; the text has a line for each."""
+        self.problems = tuple(problems)
+        super().__init__("\n".join(f"{name} {message}" if name else message for name, message in self.problems))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scripts.bench_timing import Ratios, Row, Usage, measure, run_python
 
 if TYPE_CHECKING:
-    from dh2sim.simulate.prepare import Job
+    from dh2sim.simulate.block import Job
 
 ROLLOUTS, STEPS = 1024, 2000
 RECORD = ("qpos", "qvel", "ctrl")
@@ -80,16 +80,16 @@ def steady() -> Iterator[Row]:
     """60 s of simulation of 1000 arms: time per step in the last tenth, against the first."""
     from dh2sim import build_model, load_robot
     from dh2sim.simulate.block import simulate_block
-    from dh2sim.simulate.options import Wish
+    from dh2sim.simulate.options import RolloutOptions
     from dh2sim.simulate.prepare import prepare
 
     model = build_model(load_robot("stanford"))
     for controller in ("sine", "computed-torque"):
-        wish = Wish(rollouts=1000, duration=60.0, controller=controller, every=100, record=("qpos",))
-        job = prepare(model, wish)
-        paces = _Paces(job.settings.steps)
-        choice = replace(job.settings.controller, make=paces.watched(job.settings.controller.make))
-        simulate_block(job.mjcf, replace(job.settings, controller=choice), range(1000))
+        options = RolloutOptions(rollouts=1000, duration=60.0, controller=controller, every=100, record=("qpos",))
+        job = prepare(model, options)
+        paces = _Paces(job.options.steps)
+        choice = replace(job.controller, make=paces.watched(job.controller.make))
+        simulate_block(replace(job, controller=choice), range(1000))
         ratio = paces.late / paces.early
         what = f"60 s of 1000 arms, {controller}: step at the end / start"
         yield what, f"{ratio:.2f} ({paces.early * 1e3:.2f} ms for 256 arms)", "<= 1.15", ratio <= 1.15
@@ -141,11 +141,11 @@ class _Paces:
 
 def _job(controller: str, count: int) -> Job:
     from dh2sim import build_model, load_robot
-    from dh2sim.simulate.options import Wish
+    from dh2sim.simulate.options import RolloutOptions
     from dh2sim.simulate.prepare import prepare
 
-    wish = Wish(rollouts=count, steps=STEPS, controller=controller, start="random", record=RECORD)
-    return prepare(build_model(load_robot("stanford")), wish)
+    options = RolloutOptions(rollouts=count, steps=STEPS, controller=controller, start="random", record=RECORD)
+    return prepare(build_model(load_robot("stanford")), options)
 
 
 def _held_arms() -> tuple[str, NDArray[np.float64], NDArray[np.float64]]:
@@ -154,7 +154,7 @@ def _held_arms() -> tuple[str, NDArray[np.float64], NDArray[np.float64]]:
     from dh2sim.simulate.block import simulate_block
 
     job = _job("hold", ROLLOUTS)
-    block = simulate_block(job.mjcf, replace(job.settings, steps=1), range(ROLLOUTS))
+    block = simulate_block(replace(job, options=job.options.replace(steps=1)), range(ROLLOUTS))
     return to_mjcf(build_model(load_robot("stanford"))), block["qpos"][:, 0], block["ctrl"][:, 0]
 
 

@@ -17,9 +17,8 @@ import xarray as xr
 
 from dh2sim import build_model, load_robot
 from dh2sim.simulate.dataset_layout import STATUS, Layout
-from dh2sim.simulate.options import Wish
+from dh2sim.simulate.options import DEFAULT_RECORD, RECORDABLE, RolloutOptions
 from dh2sim.simulate.prepare import prepare
-from dh2sim.simulate.settings import DEFAULT_RECORD, RECORDABLE
 from dh2sim.simulate.store.skeleton import make_skeleton
 from tests.program import contents, dh2sim
 
@@ -56,11 +55,11 @@ def layouts(tmp_path_factory: pytest.TempPathFactory) -> list[Layout]:
     robot.write_text(JOINTED)
     model = build_model(load_robot(robot))
     change = dict.fromkeys(("mass", "friction", "damping", "armature", "gain"), 0.1)
-    wishes = (
-        Wish(rollouts=4, steps=6, record=RECORDABLE, controller="computed-torque", floating_base=True),
-        Wish(rollouts=4, steps=6, record=RECORDABLE, controller="hold", randomize=change),
+    runs = (
+        RolloutOptions(rollouts=4, steps=6, record=RECORDABLE, controller="computed-torque", floating_base=True),
+        RolloutOptions(rollouts=4, steps=6, record=RECORDABLE, controller="hold", randomize=change),
     )
-    return [prepare(model, wish).layout for wish in wishes]
+    return [prepare(model, options).layout for options in runs]
 
 
 def test_every_dimension_is_described_and_no_other(layouts: list[Layout]) -> None:

@@ -222,7 +222,8 @@ def complain(error: object) -> int:
         case RobotFileError():
             text = str(error)
         case SettingsError():
-            text = "\n".join(f"dh2sim: {line}" for line in str(error).splitlines())
+            options = ((name and f"--{name.replace('_', '-')} ", message) for name, message in error.problems)
+            text = "\n".join(f"dh2sim: {option}{message}" for option, message in options)
         case _:
             text = f"dh2sim: {error}"
     print(text, file=sys.stderr)

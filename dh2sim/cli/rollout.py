@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import FrameType
 
+    from dh2sim.simulate.block import Job
     from dh2sim.simulate.description import RunSummary
-    from dh2sim.simulate.prepare import Job
     from dh2sim.simulate.run import Progress
 
 
@@ -93,12 +93,12 @@ def rollout(
     """
     model = build_all([robot])[0]
     from dh2sim.simulate.description import summarize
-    from dh2sim.simulate.options import Wish, names_of
+    from dh2sim.simulate.options import RolloutOptions
     from dh2sim.simulate.prepare import prepare
     from dh2sim.simulate.run import fill, open_run
 
     gc.enable()
-    wish = Wish(
+    options = RolloutOptions(
         rollouts=rollouts,
         steps=steps,
         duration=duration,
@@ -107,12 +107,12 @@ def rollout(
         controller=controller,
         start=start,
         seed=seed,
-        record=names_of(record),
+        record=record,
         every=every,
         randomize=_shares(randomize),
         floating_base=floating_base,
     )
-    job = prepare(model, wish, command=shlex.join(["dh2sim", *sys.argv[1:]]))
+    job = prepare(model, options, command=shlex.join(["dh2sim", *sys.argv[1:]]))
     with (
         open_run(job, out, resume=resume, overwrite=overwrite) as writer,
         _patient(quiet) as patience,
@@ -182,13 +182,13 @@ def _patient(quiet: bool) -> Iterator[_Patience]:
 
 
 def _tell(job: Job, summary: RunSummary, progress: Progress, out: Path) -> None:
-    settings = job.settings
+    options = job.options
     print(
         f"{summary.robot}: {summary.rollouts:,} rollouts of {summary.steps:,} steps ({summary.duration:g} s), "
-        f"{settings.controller.text}, in {out}"
+        f"{options.controller}, in {out}"
     )
     if progress.rollouts:
-        rate = progress.rollouts * settings.steps / progress.seconds
+        rate = progress.rollouts * options.steps / progress.seconds
         took = f"{progress.seconds:.1f}" if progress.seconds >= 1.0 else f"{progress.seconds:.2g}"
         print(f"  simulated {progress.rollouts:,} in {took} s: {rate:,.0f} steps/s")
     else:

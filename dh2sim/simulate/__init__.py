@@ -13,6 +13,7 @@ _HOMES = {
     "Observation": "controllers.protocol",
     "OpenLoop": "controllers.protocol",
     "RolloutBatch": "controllers.protocol",
+    "RolloutOptions": "options",
     "open_dataset": "store.reader",
     "rollout": "run",
 }
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from dh2sim.simulate.controllers.protocol import Observation as Observation
     from dh2sim.simulate.controllers.protocol import OpenLoop as OpenLoop
     from dh2sim.simulate.controllers.protocol import RolloutBatch as RolloutBatch
+    from dh2sim.simulate.options import RolloutOptions as RolloutOptions
     from dh2sim.simulate.run import rollout as rollout
     from dh2sim.simulate.store.reader import open_dataset as open_dataset
 else:

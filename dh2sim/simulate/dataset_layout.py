@@ -1,20 +1,18 @@
-"""The dataset of a run: its dimensions, coordinates and variables, from the robot and the settings.
-
-What a run's dataset holds: dimensions, coordinates, variables; the same on disk and in memory.
-"""
+"""Layout of a run's dataset: its dimensions, coordinates and variables, the same on disk and in memory."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.plant import Plant
 from dh2sim.simulate.randomization import links
-from dh2sim.simulate.settings import Settings
 
 FORMAT = 1
 """Version of the layout, in the attribute ``dh2sim_run``."""
@@ -93,23 +91,42 @@ FORCES = "N*m or N"
 DOUBLE, LONG, INT, BYTE = np.dtype(np.float64), np.dtype(np.int64), np.dtype(np.int32), np.dtype(np.int8)
 
 
-def run_layout(plant: Plant, settings: Settings, attributes: Mapping[str, Any], block: int) -> Layout:
-    """Return the layout of a run's dataset, in blocks of ``block`` rollouts."""
+def run_layout(
+    plant: Plant, options: RolloutOptions, attributes: Mapping[str, Any], *, follows: bool, block: int
+) -> Layout:
+    """Return the layout of a run's dataset.
+
+    Args:
+        plant: The robot as it is simulated.
+        options: What is simulated and recorded.
+        attributes: Those of the dataset, JSON values.
+        follows: Whether the controller has a reference to record.
+        block: Rollouts in a block.
+    """
+    variables = tuple(_variables(plant, options, follows=follows))
+    sizes = _sizes(plant, options, variables)
     return Layout(
-        sizes=run_sizes(plant, settings),
-        coordinates=tuple(_coordinates(plant, settings)),
-        variables=tuple(run_variables(plant, settings)),
+        sizes=sizes,
+        coordinates=tuple(_coordinates(plant, options, sizes)),
+        variables=variables,
         attributes=attributes,
         block=block,
     )
 
 
-def run_sizes(plant: Plant, settings: Settings) -> dict[str, int]:
-    """Return the size of every dimension that the run's variables have."""
-    every = {
-        "rollout": settings.rollouts,
-        "step": settings.records + 1,
-        "interval": settings.records,
+def rollout_bytes(plant: Plant, options: RolloutOptions, *, follows: bool) -> int:
+    """Return how many bytes a rollout records."""
+    variables = tuple(_variables(plant, options, follows=follows))
+    sizes = _sizes(plant, options, variables)
+    return sum(math.prod(sizes[name] for name in each.dimensions[1:]) * each.dtype.itemsize for each in variables)
+
+
+def _sizes(plant: Plant, options: RolloutOptions, variables: Iterable[Variable]) -> dict[str, int]:
+    """Return the size of every dimension that the variables have."""
+    sizes = {
+        "rollout": options.rollouts,
+        "step": options.records + 1,
+        "interval": options.records,
         "joint": plant.n,
         "actuator": len(plant.actuators),
         "pose": len(POSE),
@@ -117,13 +134,14 @@ def run_sizes(plant: Plant, settings: Settings) -> dict[str, int]:
         "twist": len(TWIST),
         "link": len(links(plant)),
     }
-    used = {dimension for variable in run_variables(plant, settings) for dimension in variable.dimensions}
-    return {name: size for name, size in every.items() if name in used | {"step", "interval", "joint"}}
+    used = {"step", "interval", "joint", *(name for variable in variables for name in variable.dimensions)}
+    return {name: size for name, size in sizes.items() if name in used}
 
 
-def run_variables(plant: Plant, settings: Settings) -> Iterator[Variable]:
-    """Yield the variables of a run."""
-    yield from (variable for name in settings.record for variable in _recorded(name, plant, settings))
+def _variables(plant: Plant, options: RolloutOptions, *, follows: bool) -> Iterator[Variable]:
+    for name in options.record:
+        if name != "reference" or follows:
+            yield from _recorded(name, plant)
     flags = {"flag_values": list(STATUS.values()), "flag_meanings": " ".join(STATUS)}
     yield _per_rollout("status", (), BYTE, NOT_RUN, "1", "how the rollout ended", **flags)
     yield _per_rollout("stop_step", (), LONG, -1, "1", "time step in which the rollout stopped early, or -1")
@@ -131,7 +149,7 @@ def run_variables(plant: Plant, settings: Settings) -> Iterator[Variable]:
         "saturation", ("actuator",), LONG, 0, "1", "time steps in which the wanted control was out of range"
     )
     dimensions = {"mass": ("link",), "gain": ("actuator",)}
-    for name in settings.randomize:
+    for name in options.randomize:
         yield _per_rollout(
             f"{name}_scale", dimensions.get(name, ("joint",)), DOUBLE, np.nan, "1", f"factor of the {name}"
         )
@@ -149,7 +167,7 @@ def _per_rollout(
     )
 
 
-def _recorded(name: str, plant: Plant, settings: Settings) -> Iterator[Variable]:
+def _recorded(name: str, plant: Plant) -> Iterator[Variable]:
     match name:
         case "qpos":
             yield _per_rollout("qpos", ("step", "joint"), DOUBLE, np.nan, JOINT_UNITS, "joint position")
@@ -170,10 +188,9 @@ def _recorded(name: str, plant: Plant, settings: Settings) -> Iterator[Variable]
             words = "pose of tool0 in the world"
             yield _per_rollout("tool_pose", ("step", "pose"), DOUBLE, np.nan, "m; unit quaternion", words)
         case "reference":
-            if settings.controller.follows:
-                dimensions = ("step", "joint")
-                yield _per_rollout("qpos_ref", dimensions, DOUBLE, np.nan, JOINT_UNITS, "reference position")
-                yield _per_rollout("qvel_ref", dimensions, DOUBLE, np.nan, JOINT_RATES, "reference velocity")
+            dimensions = ("step", "joint")
+            yield _per_rollout("qpos_ref", dimensions, DOUBLE, np.nan, JOINT_UNITS, "reference position")
+            yield _per_rollout("qvel_ref", dimensions, DOUBLE, np.nan, JOINT_RATES, "reference velocity")
         case "qacc":
             words = "joint acceleration at the beginning of the interval"
             yield _per_rollout("qacc", ("interval", "joint"), DOUBLE, np.nan, "rad/s2 or m/s2", words)
@@ -187,11 +204,10 @@ def _recorded(name: str, plant: Plant, settings: Settings) -> Iterator[Variable]
             yield _per_rollout("contacts", ("interval",), INT, -1, "1", words)
 
 
-def _coordinates(plant: Plant, settings: Settings) -> Iterator[Coordinate]:
-    sizes = run_sizes(plant, settings)
-    time = plant.timestep * settings.every * np.arange(settings.records + 1)
+def _coordinates(plant: Plant, options: RolloutOptions, sizes: Mapping[str, int]) -> Iterator[Coordinate]:
+    time = plant.timestep * options.every * np.arange(options.records + 1)
     units = ["rad" if turns else "m" for turns in plant.turns]
-    yield Coordinate(name="rollout", dimension="rollout", values=np.arange(settings.rollouts, dtype=np.int64))
+    yield Coordinate(name="rollout", dimension="rollout", values=np.arange(options.rollouts, dtype=np.int64))
     yield Coordinate(
         name="time", dimension="step", values=time, attributes={"units": "s", "long_name": "time since the start"}
     )

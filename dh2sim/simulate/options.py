@@ -1,127 +1,246 @@
-"""What is wanted of a run, and whether it can be had of any robot."""
+"""Description of a run: what is simulated and recorded, and how often."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import partial
 from types import MappingProxyType
+from typing import Any, Final, SupportsIndex, TypedDict, Unpack
 
+from dh2sim.errors import SettingsError
 from dh2sim.messages import did_you_mean, listed
-from dh2sim.simulate.settings import DEFAULT_RECORD, RANDOMIZABLE, RECORDABLE
 
-DURATION = 2.0
-"""s, where neither steps nor duration are given."""
-MOST_STEPS = 10**12
-"""Time steps of a rollout: years of computing."""
-MOST_ROLLOUTS = 10**7
-"""Of one run; with other seeds there can be more runs."""
-INTEGRATORS = {name.lower(): name for name in ("Euler", "RK4", "implicit", "implicitfast")}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Wish:
-    """What is wanted of a run; see ``dh2sim.simulate.rollout``."""
-
-    rollouts: int = 256
-    steps: int | None = None
-    duration: float | None = None
-    timestep: float = 0.002
-    integrator: str = "implicitfast"
-    controller: str = "sine"
-    start: str = "home"
-    seed: int = 0
-    record: Sequence[str] = DEFAULT_RECORD
-    every: int = 1
-    randomize: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    floating_base: bool = False
-
-    @property
-    def integrator_name(self) -> str:
-        """The integrator as MuJoCo spells it; empty if there is no such one."""
-        return INTEGRATORS.get(self.integrator.lower(), "")
-
-    @property
-    def recorded(self) -> tuple[str, ...]:
-        """What is recorded, in the order of ``RECORDABLE``."""
-        return tuple(name for name in RECORDABLE if name in self.record)
+RECORDABLE: Final = ("qpos", "qvel", "ctrl", "tool_pose", "reference", "qacc", "torque", "energy", "contacts")
+"""What ``record`` may contain."""
+DEFAULT_RECORD: Final = ("qpos", "qvel", "ctrl", "tool_pose", "reference")
+"""'reference' is recorded for controllers that follow one."""
+RANDOMIZABLE: Final = ("mass", "friction", "damping", "armature", "gain")
+"""What ``randomize`` may contain: mass and inertia of links together; dry friction, viscous damping and rotor inertia
+of joints; gains of position and velocity actuators."""
+STARTS: Final = ("home", "zero", "random")
+INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
+DEFAULT_DURATION: Final = 2.0
+"""s."""
+MOST_STEPS: Final = 10**12
+"""Years of computing."""
+MOST_ROLLOUTS: Final = 10**7
 
 
-def names_of(record: Sequence[str]) -> tuple[str, ...]:
-    """Return names that may also be given as one text with commas between them."""
-    names = record.split(",") if isinstance(record, str) else record
-    return tuple(name.strip() for name in names if name.strip())
+class RolloutKeywords(TypedDict, total=False):
+    """What a ``RolloutOptions`` is made from; each keyword may be left out."""
+
+    rollouts: SupportsIndex
+    steps: SupportsIndex | None
+    duration: float | None
+    timestep: float
+    integrator: str
+    controller: str
+    start: str
+    seed: SupportsIndex
+    record: str | Sequence[str]
+    every: SupportsIndex
+    randomize: Mapping[str, float]
+    floating_base: bool
 
 
-def check_wish(wish: Wish) -> tuple[int, list[str]]:
-    """Return the time steps of a rollout, 0 if that is unclear, and everything that is wrong with a wish."""
-    problems: list[str] = []
-    steps = _steps(wish, problems)
-    _check_numbers(wish, problems)
-    _check_record(wish, problems)
-    if not wish.integrator_name:
-        problems.append(f"--integrator {wish.integrator}: allowed are {listed(list(INTEGRATORS.values()))}")
-    if wish.integrator_name == "RK4" and "qacc" in wish.record:
-        problems.append("--record qacc: RK4 does not tell the acceleration at the beginning of a step; use Euler")
-    if steps and wish.every >= 1 and steps % wish.every:
-        problems.append(f"--every {wish.every}: does not divide the {steps} steps of a rollout")
-    return steps, problems
+class _OptionError(Exception):
+    """A value cannot be used; each of its arguments is a message that follows the option's name."""
 
 
-def _steps(wish: Wish, problems: list[str]) -> int:
-    """Number of time steps; 0 where a problem was noted."""
-    if not (math.isfinite(wish.timestep) and 0.0 < wish.timestep <= 1.0):
-        problems.append(f"--timestep {wish.timestep}: is not between 0 and 1 s")
-        return 0
-    if wish.steps is not None:
-        if wish.duration is not None:
-            problems.append("--steps and --duration: give one of them, not both")
-        elif wish.steps < 1:
-            problems.append(f"--steps {wish.steps}: is not at least 1")
-        elif wish.steps > MOST_STEPS:
-            problems.append(f"--steps {wish.steps}: is more than {MOST_STEPS:,}")
-        else:
-            return wish.steps
-        return 0
-    duration = DURATION if wish.duration is None else wish.duration
-    if not (math.isfinite(duration) and duration > 0.0):
-        problems.append(f"--duration {duration}: is not a time above 0 s")
-        return 0
-    if duration / wish.timestep > MOST_STEPS:
-        problems.append(f"--duration {duration:g}: is more than {MOST_STEPS:,} time steps of {wish.timestep:g} s")
-        return 0
-    steps = round(duration / wish.timestep)
-    if abs(steps * wish.timestep - duration) > 1e-9 * duration:
+def _whole(value: object, *, least: int, most: int | None = None, advice: str = "") -> int:
+    try:
+        number = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise _OptionError(f"must be a whole number, got {value!r}") from None
+    if number < least:
+        raise _OptionError(f"must be at least {least}, got {number}")
+    if most is not None and number > most:
+        raise _OptionError(f"must be at most {most:,}, got {number}{advice}")
+    return number
+
+
+def _number(value: object) -> float:
+    if isinstance(value, str | bool) or not hasattr(value, "__float__"):
+        raise _OptionError(f"must be a number, got {value!r}")
+    return float(value)
+
+
+def _timestep(value: object) -> float:
+    number = _number(value)
+    if not 0.0 < number <= 1.0:
+        raise _OptionError(f"must be above 0 s and at most 1 s, got {number}")
+    return number
+
+
+def _steps(duration: object, timestep: float) -> int:
+    """Return how many time steps a duration takes."""
+    length = DEFAULT_DURATION if duration is None else _number(duration)
+    if not (math.isfinite(length) and length > 0.0):
+        raise _OptionError(f"must be a finite time above 0 s, got {length}")
+    if length / timestep > MOST_STEPS:
+        raise _OptionError(f"must be at most {MOST_STEPS:,} time steps of {timestep:g} s, got {length:g}")
+    steps = round(length / timestep)
+    if abs(steps * timestep - length) > 1e-9 * length:
         near = max(1, steps)
-        problems.append(
-            f"--duration {duration:g}: is not a whole number of time steps of {wish.timestep:g} s; "
-            f"--steps {near} is {near * wish.timestep:g} s"
+        raise _OptionError(
+            f"must be a whole number of time steps of {timestep:g} s, got {length:g}; "
+            f"{near * timestep:g} s is {near} step{'s' if near > 1 else ''}"
         )
-        return 0
     return steps
 
 
-def _check_numbers(wish: Wish, problems: list[str]) -> None:
-    for name, value, least in (("rollouts", wish.rollouts, 1), ("every", wish.every, 1), ("seed", wish.seed, 0)):
-        if value < least:
-            problems.append(f"--{name} {value}: is not at least {least}")
-    if wish.rollouts > MOST_ROLLOUTS:
-        problems.append(
-            f"--rollouts {wish.rollouts}: is more than {MOST_ROLLOUTS:,}; make several runs of other seeds"
-        )
-    for name, share in wish.randomize.items():
-        if name not in RANDOMIZABLE:
-            hint = did_you_mean(name, RANDOMIZABLE)
-            problems.append(f"--randomize {name}: is not known.{hint} Allowed: {listed(RANDOMIZABLE)}")
-        elif not (math.isfinite(share) and 0.0 <= share < 1.0):
-            problems.append(f"--randomize {name}={share:g}: is not a share of at least 0 and below 1")
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise _OptionError(f"must be text, got {value!r}")
+    return value
 
 
-def _check_record(wish: Wish, problems: list[str]) -> None:
+def _integrator(value: object) -> str:
+    """Return an integrator as MuJoCo spells it."""
+    found = [name for name in INTEGRATORS if name.lower() == _text(value).lower()]
+    if not found:
+        guess = did_you_mean(_text(value), INTEGRATORS)
+        raise _OptionError(f"must be one of {listed(INTEGRATORS)}, got {value!r}.{guess}".rstrip("."))
+    return found[0]
+
+
+def _record(value: object) -> tuple[str, ...]:
+    """Return recorded quantities in the order of ``RECORDABLE``, each once."""
+    given = value.split(",") if isinstance(value, str) else value
+    if not isinstance(given, Iterable):
+        raise _OptionError(f"must be names, got {value!r}")
+    names = [name for name in (_text(name).strip() for name in given) if name]
+    if not names:
+        raise _OptionError(f"must not be empty. Allowed: {listed(RECORDABLE)}")
+    if unknown := _unknown(names, RECORDABLE):
+        raise _OptionError(*unknown)
+    return tuple(name for name in RECORDABLE if name in names)
+
+
+def _randomize(value: object) -> Mapping[str, float]:
+    """Return shares in the order of ``RANDOMIZABLE``."""
+    if not isinstance(value, Mapping):
+        raise _OptionError(f"must map names to shares, got {value!r}")
+    problems = _unknown(value, RANDOMIZABLE)
+    shares = {name: _number(value[name]) for name in RANDOMIZABLE if name in value}
     problems += [
-        f"--record {name}: is not known.{did_you_mean(name, RECORDABLE)} Allowed: {listed(RECORDABLE)}"
-        for name in wish.record
-        if name not in RECORDABLE
+        f"must have shares of at least 0 and below 1, got {name}={share:g}"
+        for name, share in shares.items()
+        if not 0.0 <= share < 1.0
     ]
-    if not wish.record:
-        problems.append(f"--record: names nothing. Allowed: {listed(RECORDABLE)}")
+    if problems:
+        raise _OptionError(*problems)
+    return MappingProxyType(shares)
+
+
+def _unknown(names: Iterable[Any], known: Sequence[str]) -> list[str]:
+    return [
+        f"must not contain {name!r}.{did_you_mean(_text(name), known)} Allowed: {listed(known)}"
+        for name in names
+        if name not in known
+    ]
+
+
+def _yes_or_no(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise _OptionError(f"must be True or False, got {value!r}")
+    return value
+
+
+def _option(default: Any, read: Callable[[Any], Any]) -> Any:
+    return field(default=default, metadata={"read": read})
+
+
+@dataclass(frozen=True, kw_only=True, init=False)
+class RolloutOptions:
+    """What is simulated in a run, and what is recorded.
+
+    The numbers of a run depend on these options, the robot, and the files that they name, and on nothing else.
+    """
+
+    rollouts: int = _option(
+        256, partial(_whole, least=1, most=MOST_ROLLOUTS, advice="; make several runs with other seeds")
+    )
+    """Number of rollouts."""
+    steps: int = _option(1000, partial(_whole, least=1, most=MOST_STEPS))
+    """Time steps of each rollout; by default as many as ``duration`` takes, 2 s."""
+    timestep: float = _option(0.002, _timestep)
+    """s."""
+    integrator: str = _option("implicitfast", _integrator)
+    """'Euler', 'RK4', 'implicit' or 'implicitfast'."""
+    controller: str = _option("sine", _text)
+    """``NAME`` or ``NAME:key=value,…``; ``MODULE:CLASS`` or ``MODULE:CLASS:key=value,…`` of your own."""
+    start: str = _option("home", _text)
+    """'home', 'zero', 'random', a configuration of the robot file, or a .csv or .npy file of states."""
+    seed: int = _option(0, partial(_whole, least=0))
+    """Seed of the random number generators. The same seed gives the same bits at any number of threads."""
+    record: tuple[str, ...] = _option(DEFAULT_RECORD, _record)
+    """What is recorded, in the order of ``RECORDABLE``; may be given as one text with commas."""
+    every: int = _option(1, partial(_whole, least=1))
+    """Every N-th state is recorded; divides ``steps``."""
+    randomize: Mapping[str, float] = field(
+        default_factory=lambda: MappingProxyType({}), metadata={"read": _randomize}
+    )
+    """Greatest relative change of ``RANDOMIZABLE`` quantities; each link or joint of a rollout has its own factor."""
+    floating_base: bool = _option(False, _yes_or_no)
+    """Whether base_link floats."""
+
+    def __init__(self, **given: Unpack[RolloutKeywords]) -> None:
+        """Check the options.
+
+        Args:
+            **given: The fields, or in place of ``steps`` the ``duration`` of a rollout, s.
+
+        Raises:
+            SettingsError: Options are wrong; the error has a line for each.
+        """
+        values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        duration = values.pop("duration", None)
+        wrong: dict[str, Sequence[object]] = {}
+        for option in fields(self):
+            value = MappingProxyType({}) if option.name == "randomize" else option.default
+            if option.name in values:
+                try:
+                    value = option.metadata["read"](values[option.name])
+                except _OptionError as error:
+                    wrong[option.name] = error.args
+            object.__setattr__(self, option.name, value)
+        known = RolloutKeywords.__annotations__
+        wrong |= {name: [f"is not an option.{did_you_mean(name, known)}"] for name in values if name not in known}
+        if duration is not None and "steps" in values:
+            wrong["duration"] = ["must not be given together with steps"]
+        elif "steps" not in values and "timestep" not in wrong:
+            try:
+                object.__setattr__(self, "steps", _steps(duration, self.timestep))
+            except _OptionError as error:
+                wrong["duration"] = error.args
+        if not {"steps", "duration", "timestep", "every"} & {*wrong} and self.steps % self.every:
+            wrong["every"] = [f"must divide the {self.steps} steps of a rollout, got {self.every}"]
+        if self.integrator == "RK4" and "qacc" in self.record:
+            wrong["record"] = ["must not contain 'qacc' with RK4, which overwrites the acceleration; use Euler"]
+        if wrong:
+            raise SettingsError((name, str(problem)) for name, problems in wrong.items() for problem in problems)
+
+    @property
+    def records(self) -> int:
+        """Number of recorded intervals, K; states are recorded at K + 1 instants."""
+        return self.steps // self.every
+
+    def replace(self, **changes: Unpack[RolloutKeywords]) -> RolloutOptions:
+        """Return the same options with some changed."""
+        kept: Any = {option.name: getattr(self, option.name) for option in fields(self)}
+        return RolloutOptions(**{**kept, **changes})
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON values, which ``from_json`` reads."""
+        values = {option.name: getattr(self, option.name) for option in fields(self)}
+        return {**values, "record": list(self.record), "randomize": dict(self.randomize)}
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> RolloutOptions:
+        """Make options from JSON values, such as the attribute ``settings`` of a dataset; other keys are ignored."""
+        known: Any = {option.name: values[option.name] for option in fields(cls) if option.name in values}
+        return cls(**known)

@@ -1,14 +1,24 @@
-"""The robot as it is simulated: what controllers and records need to know of a compiled model."""
+"""The robot as it is simulated: a compiled model, with what controllers and recorders need to know of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass, field
+from typing import Final
 
 import mujoco
 import numpy as np
 
+from dh2sim.errors import EngineError
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.model.variants import with_actuators
+from dh2sim.robot.spec import ActuatorType
 from dh2sim.typing import Array, read_only
+
+FREE_TURN: Final = math.pi
+"""rad: half the range of a joint that turns without limits."""
+FREE_SLIDE: Final = 1.0
+"""m: half the range of a joint that slides without limits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,45 +59,56 @@ class Plant:
         """Number of moving joints."""
         return len(self.joints)
 
+    @property
+    def free_half_ranges(self) -> Array:
+        """Half of the range that each joint is given where it has no limits, rad or m, shape (n,)."""
+        return np.where(np.array(self.turns, dtype=bool), FREE_TURN, FREE_SLIDE)
 
-def make_plant(
-    model: mujoco.MjModel,
-    *,
-    velocity: Sequence[float],
-    kp: Sequence[float],
-    kv: Sequence[float],
-    home: Sequence[float],
-) -> Plant:
-    """Describe a compiled model that ``to_mjcf`` wrote.
+
+def compile_plant(mjcf: str, robot: RobotModel) -> Plant:
+    """Compile the text that ``to_mjcf`` wrote of a robot.
+
+    Raises:
+        EngineError: MuJoCo refuses it.
+    """
+    try:
+        compiled = mujoco.MjModel.from_xml_string(mjcf)
+    except ValueError as error:
+        raise EngineError(
+            f"MuJoCo refuses the robot as it would be simulated: {' '.join(str(error).split())}"
+        ) from error
+    return make_plant(compiled, robot)
+
+
+def make_plant(compiled: mujoco.MjModel, robot: RobotModel) -> Plant:
+    """Describe a robot that was compiled from what ``to_mjcf`` wrote.
 
     Args:
-        model: the compiled model.
-        velocity: velocity limits of the moving joints, rad/s or m/s.
-        kp: their stiffness for controllers with motors, N·m/rad or N/m.
-        kv: their damping for controllers with motors, N·m·s/rad or N·s/m.
-        home: home configuration, rad or m.
+        compiled: The compiled model.
+        robot: The robot, which has what an MJCF cannot hold: velocity limits, home, and gains where it has motors.
     """
-    floating = model.njnt > 0 and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE
+    floating = compiled.njnt > 0 and compiled.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE
     first = 1 if floating else 0
-    ids = range(first, model.njnt)
-    limited = np.array([bool(model.jnt_limited[i]) for i in ids], dtype=bool)
-    ranges = model.jnt_range[first:].reshape(-1, 2)
-    controlled = model.actuator_ctrllimited.astype(bool)
-    controls = model.actuator_ctrlrange.reshape(-1, 2)
+    ids = range(first, compiled.njnt)
+    limited = np.array([bool(compiled.jnt_limited[i]) for i in ids], dtype=bool)
+    ranges = compiled.jnt_range[first:].reshape(-1, 2)
+    controlled = compiled.actuator_ctrllimited.astype(bool)
+    controls = compiled.actuator_ctrlrange.reshape(-1, 2)
+    stiff = with_actuators(robot, ActuatorType.POSITION).moving_joints
     return Plant(
-        model=model,
-        timestep=float(model.opt.timestep),
+        model=compiled,
+        timestep=float(compiled.opt.timestep),
         floating=bool(floating),
-        joints=tuple(model.joint(i).name for i in ids),
-        turns=tuple(model.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE for i in ids),
-        actuators=tuple(model.actuator(i).name for i in range(model.nu)),
-        driven=tuple(int(model.actuator_trnid[i, 0]) - first for i in range(model.nu)),
+        joints=tuple(compiled.joint(i).name for i in ids),
+        turns=tuple(compiled.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE for i in ids),
+        actuators=tuple(compiled.actuator(i).name for i in range(compiled.nu)),
+        driven=tuple(int(compiled.actuator_trnid[i, 0]) - first for i in range(compiled.nu)),
         lower=read_only(np.where(limited, ranges[:, 0], -np.inf)),
         upper=read_only(np.where(limited, ranges[:, 1], np.inf)),
-        velocity=read_only(velocity),
-        kp=read_only(kp),
-        kv=read_only(kv),
-        home=read_only(home),
+        velocity=read_only([joint.velocity for joint in robot.moving_joints]),
+        kp=read_only([joint.actuator.kp for joint in stiff]),
+        kv=read_only([joint.actuator.kv for joint in stiff]),
+        home=robot.home,
         control_lower=read_only(np.where(controlled, controls[:, 0], -np.inf)),
         control_upper=read_only(np.where(controlled, controls[:, 1], np.inf)),
     )

@@ -1,6 +1,6 @@
-"""Models that differ from rollout to rollout.
+"""Random numbers of each rollout, and models that differ from rollout to rollout.
 
-Random numbers: every rollout has its own, for every purpose, whoever simulates it and with which others.
+Every rollout has a generator of its own for each purpose, so that its numbers depend on no other rollout.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from dh2sim.simulate.options import RANDOMIZABLE, RolloutOptions
 from dh2sim.simulate.plant import Plant
-from dh2sim.simulate.settings import RANDOMIZABLE, Settings
 from dh2sim.typing import Array
 
 
 class Purpose(IntEnum):
-    """What random numbers are drawn for; one does not disturb the other."""
+    """What random numbers are drawn for; each purpose has its own stream."""
 
     START = 0
     RANDOMIZE = 1
@@ -39,7 +39,7 @@ class Generators(Sequence[np.random.Generator]):
     """The generators of some rollouts, each made when it is first asked for: that takes longer than a time step."""
 
     def __init__(self, seed: int, rollouts: range, purpose: Purpose) -> None:
-        """Name them."""
+        """Make none yet."""
         self._seed, self._rollouts, self._purpose = seed, rollouts, purpose
         self._made: dict[int, np.random.Generator] = {}
 
@@ -71,21 +71,21 @@ FIELDS = {
 """Which fields of an MjModel each quantity multiplies."""
 
 
-def scales(plant: Plant, settings: Settings, rollouts: range) -> dict[str, Array]:
-    """Draw the factors of every randomised quantity, uniformly from 1 - x to 1 + x.
+def scales(plant: Plant, options: RolloutOptions, rollouts: range) -> dict[str, Array]:
+    """Draw the factors of every randomized quantity, uniformly from 1 - x to 1 + x.
 
     Returns:
         By quantity, shape (batch, links with mass, joints or actuators); the gain of a motor is left alone.
     """
-    if not settings.randomize:
+    if not options.randomize:
         return {}
     counts = {"mass": len(links(plant)), "gain": len(plant.actuators)}
-    drawn: dict[str, list[Array]] = {name: [] for name in settings.randomize}
-    for source in Generators(settings.seed, rollouts, Purpose.RANDOMIZE):
-        for name in RANDOMIZABLE:  # always all of them, so that one does not depend on which others are wanted
+    drawn: dict[str, list[Array]] = {name: [] for name in options.randomize}
+    for source in Generators(options.seed, rollouts, Purpose.RANDOMIZE):
+        for name in RANDOMIZABLE:  # always all of them, so that one does not depend on which others are randomized
             values = source.uniform(-1.0, 1.0, counts.get(name, plant.n))
             if name in drawn:
-                drawn[name].append(1.0 + settings.randomize[name] * values)
+                drawn[name].append(1.0 + options.randomize[name] * values)
     factors = {name: np.array(values) for name, values in drawn.items()}
     if "gain" in factors:
         factors["gain"][:, plant.model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE] = 1.0  # motors have none

@@ -1,18 +1,14 @@
-"""Runs: block after block simulated, and each put where it is safe while the next one is on its way.
-
-A run in memory.
-"""
+"""Runs in memory and on disk; on disk each block is written while the next one is simulated."""
 
 from __future__ import annotations
 
-import operator
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, SupportsIndex
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -21,11 +17,10 @@ from dh2sim.extras import require_extra
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import load_robot
-from dh2sim.simulate.block import Block, simulate_block
+from dh2sim.simulate.block import Block, Job, simulate_block
 from dh2sim.simulate.dataset_layout import Layout
-from dh2sim.simulate.options import Wish, names_of
-from dh2sim.simulate.prepare import Job, prepare
-from dh2sim.simulate.settings import DEFAULT_RECORD
+from dh2sim.simulate.options import RolloutKeywords, RolloutOptions
+from dh2sim.simulate.prepare import prepare
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def to_dataset(layout: Layout, arrays: Block) -> xr.Dataset:
-    """Put the variables of a whole run together; the same dataset as one that was written and opened."""
+    """Return a whole run as a dataset, equal to one that was written and opened."""
     import xarray as xr
 
     coordinates: dict[str, Any] = {
@@ -48,7 +43,7 @@ def to_dataset(layout: Layout, arrays: Block) -> xr.Dataset:
 
 
 Advance = Callable[[int], None]
-"""Told how many rollouts are done since it was last called."""
+"""Called with the number of rollouts that are done since the last call."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,92 +51,59 @@ class Progress:
     """How far a run has come."""
 
     finished: bool
-    """Whether all blocks are safe; False if it was asked to stop before."""
+    """Whether all blocks are written; False if the run was stopped before."""
     rollouts: int
-    """Simulated this time, and safe."""
+    """Number of rollouts simulated and written this time."""
     seconds: float
-    """Wall time from the first block's beginning until the last was safe."""
+    """Wall time, from the start of the first block until the last was written."""
 
 
 def rollout(
-    model: RobotModel | str | Path,
+    model: RobotModel | str | PathLike[str],
     *,
-    out: str | Path | None = None,
-    rollouts: int = 256,
-    steps: int | None = None,
-    duration: float | None = None,
-    timestep: float = 0.002,
-    integrator: str = "implicitfast",
-    controller: str = "sine",
-    start: str = "home",
-    seed: int = 0,
-    record: Sequence[str] = DEFAULT_RECORD,
-    every: int = 1,
-    randomize: Mapping[str, float] = MappingProxyType({}),
-    floating_base: bool = False,
+    out: str | PathLike[str] | None = None,
     threads: int = 0,
     resume: bool = False,
     overwrite: bool = False,
     advance: Advance | None = None,
+    **options: Unpack[RolloutKeywords],
 ) -> xr.Dataset:
     """Simulate many rollouts of a robot.
 
     Args:
-        model: the robot, or its file or name.
-        out: where to write the run, a folder by convention named ``….zarr``; None to keep it in memory.
-        rollouts: how many.
-        steps: time steps of each; by default as many as ``duration`` takes.
-        duration: s; by default 2.
-        timestep: s.
-        integrator: 'Euler', 'RK4', 'implicit' or 'implicitfast'.
-        controller: ``NAME`` or ``NAME:key=value,…``, or ``module:name`` of one's own.
-        start: 'home', 'zero', 'random', a configuration of the robot file, or a .csv or .npy file of states.
-        seed: of all random numbers. The same seed gives the same bits, whatever the number of threads.
-        record: of 'qpos', 'qvel', 'ctrl', 'tool_pose', 'reference', 'qacc', 'torque', 'energy', 'contacts'; also as
-            one text with commas.
-        every: a state in so many is recorded.
-        randomize: greatest relative change, by rollout, of 'mass', 'friction', 'damping', 'armature', 'gain'.
-        floating_base: whether base_link floats.
-        threads: 0 for one a processor.
-        resume: carry on with what stands at ``out``, if anything does.
-        overwrite: replace a run that stands at ``out``.
-        advance: told how many rollouts are done.
+        model: The robot, or its file or name.
+        out: Folder to write the run to, by convention named ``….zarr``; None to keep it in memory.
+        threads: Number of threads, 0 for one a processor. The result does not depend on it.
+        resume: Whether to continue the run at ``out``, if there is one.
+        overwrite: Whether to replace the run at ``out``.
+        advance: Called with the number of rollouts that are done since the last call.
+        **options: What is simulated and recorded, the fields of ``RolloutOptions``: ``rollouts`` (256), ``steps`` or
+            ``duration`` (2 s), ``timestep`` (0.002 s), ``integrator``, ``controller`` ('sine'), ``start`` ('home'),
+            ``seed`` (0), ``record``, ``every`` (1), ``randomize``, ``floating_base``.
 
     Returns:
         The dataset, as ``docs/dataset.md`` describes it; read lazily from ``out`` if that is given.
 
     Raises:
-        SettingsError: the settings cannot be met.
-        ControllerError: there is no such controller, or it does what it must not.
-        RunExistsError: something stands at ``out`` already, and neither ``resume`` nor ``overwrite`` is given.
-        RunDiffersError: the run to be resumed has other settings.
-        OutputError: the run cannot be written; what was written before is safe.
+        SettingsError: Options are wrong, or do not fit the robot.
+        ControllerError: The controller fails.
+        RunExistsError: There is something at ``out``, and neither ``resume`` nor ``overwrite`` is given.
+        RunDiffersError: The run to be resumed has other options.
+        OutputError: The run cannot be written; what was written before is safe.
         MissingExtraError: xarray is not installed.
     """
     require_extra("data", "xarray", what="a run as an xarray dataset")
+    checked = RolloutOptions(**options)
     if not isinstance(model, RobotModel):
         model = build_model(load_robot(model))
-    wish = Wish(
-        rollouts=_whole("rollouts", rollouts),
-        steps=None if steps is None else _whole("steps", steps),
-        duration=duration,
-        timestep=timestep,
-        integrator=integrator,
-        controller=controller,
-        start=start,
-        seed=_whole("seed", seed),
-        record=names_of(record),
-        every=_whole("every", every),
-        randomize=MappingProxyType(dict(randomize)),
-        floating_base=floating_base,
-    )
-    job = prepare(model, wish)
+    job = prepare(model, checked)
     if out is None:
         try:
-            whole = range(job.settings.rollouts)
-            arrays = simulate_block(job.mjcf, job.settings, whole, threads=threads, advance=advance)
+            arrays = simulate_block(job, range(job.options.rollouts), threads=threads, advance=advance)
         except MemoryError as error:
-            raise SettingsError("the run does not fit into memory; give 'out' to write it block by block") from error
+            raise SettingsError(
+                [("", "the run does not fit into memory; give 'out' to write it block by block")]
+            ) from error
         return to_dataset(job.layout, arrays)
     from dh2sim.simulate.store.reader import open_dataset
 
@@ -150,25 +112,18 @@ def rollout(
     return open_dataset(Path(out))
 
 
-def _whole(name: str, value: SupportsIndex) -> int:
-    try:
-        return operator.index(value)
-    except TypeError:
-        raise SettingsError(f"--{name} {value!r}: is not a whole number") from None
-
-
 def open_run(job: Job, path: Path, *, resume: bool = False, overwrite: bool = False) -> RunWriter:
-    """Make a run on disk, or open one that is to be carried on with.
+    """Create a run on disk, or open one to continue it.
 
     Raises:
-        SettingsError: both ``resume`` and ``overwrite`` are given.
-        RunError: something else stands there, or it does not fit.
-        OutputError: it cannot be written.
+        SettingsError: Both ``resume`` and ``overwrite`` are given.
+        RunError: There is something else, or a run with other options.
+        OutputError: It cannot be written.
     """
     from dh2sim.simulate.store.writer import RunWriter
 
     if resume and overwrite:
-        raise SettingsError("--resume and --overwrite: give one of them, not both")
+        raise SettingsError([("resume", "must not be given together with overwrite")])
     if resume:
         return RunWriter.resume(path, job.layout)
     return RunWriter.create(path, job.layout, overwrite=overwrite)
@@ -182,22 +137,22 @@ def fill(
     advance: Advance | None = None,
     stopping: Callable[[], bool] = lambda: False,
 ) -> Progress:
-    """Simulate every block that a run lacks.
+    """Simulate every block that is missing from a run.
 
     Args:
-        writer: of the run.
-        job: what the run was made from.
-        threads: 0 for one a processor.
-        advance: told how many rollouts are done; those that the run holds already count at once.
-        stopping: asked before every block whether to stop there; the block at hand is always finished.
+        writer: Writes to the run.
+        job: The run.
+        threads: Number of threads, 0 for one a processor.
+        advance: Called with the number of rollouts that are done; those of an earlier run count at once.
+        stopping: Asked before every block whether to stop there; a block that has begun is finished.
 
     Raises:
-        ControllerError: the controller does what it must not.
-        OutputError: a block cannot be written; those before it are safe.
+        ControllerError: The controller fails.
+        OutputError: A block cannot be written; those before it are safe.
     """
-    tell = advance or (lambda _: None)
+    report = advance or (lambda _: None)
     pending = writer.pending()
-    tell(job.settings.rollouts - sum(len(writer.layout.rollouts(block)) for block in pending))
+    report(job.options.rollouts - sum(len(writer.layout.rollouts(block)) for block in pending))
     done = 0
     begun = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as pool:
@@ -207,7 +162,7 @@ def fill(
                 break
             rollouts = writer.layout.rollouts(block)
             started = time.perf_counter()
-            arrays = simulate_block(job.mjcf, job.settings, rollouts, threads=threads, advance=tell)
+            arrays = simulate_block(job, rollouts, threads=threads, advance=report)
             seconds = time.perf_counter() - started
             if written is not None:
                 written.result()

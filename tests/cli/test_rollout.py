@@ -120,19 +120,22 @@ def test_a_finished_run_has_nothing_to_resume(folder: Path) -> None:
 
 def test_every_mistake_is_told_at_once(folder: Path) -> None:
     mistakes = ["--steps", "10", "--every", "3", "--rollouts", "0", "--record", "qpos,qve", "--integrator", "rk5"]
-    more = ["--controller", "sine:amplitud=1", "--start", "hme", "--randomize", "mas=0.1,gain=2", "--seed", "-1"]
+    more = ["--randomize", "mas=0.1,gain=2", "--seed", "-1"]
     assert told(dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *mistakes, *more)) == [
-        "--rollouts 0: is not at least 1",
-        "--seed -1: is not at least 0",
-        "--randomize mas: is not known. Did you mean 'mass'? Allowed: mass, friction, damping, armature, gain",
-        "--randomize gain=2: is not a share of at least 0 and below 1",
-        f"--record qve: is not known. Did you mean 'qvel'? Allowed: {KNOWN}",
-        "--integrator rk5: allowed are Euler, RK4, implicit, implicitfast",
-        "--every 3: does not divide the 10 steps of a rollout",
+        "--rollouts must be at least 1, got 0",
+        "--integrator must be one of Euler, RK4, implicit, implicitfast, got 'rk5'. Did you mean 'RK4'?",
+        "--seed must be at least 0, got -1",
+        f"--record must not contain 'qve'. Did you mean 'qvel'? Allowed: {KNOWN}",
+        "--randomize must not contain 'mas'. Did you mean 'mass'? Allowed: mass, friction, damping, armature, gain",
+        "--randomize must have shares of at least 0 and below 1, got gain=2",
+        "--every must divide the 10 steps of a rollout, got 3",
+    ]
+    unknown = ["--controller", "sine:amplitud=1", "--start", "hme"]
+    assert told(dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *unknown)) == [
         "controller 'sine': unknown option 'amplitud'. Did you mean 'amplitude'? "
         "Options: harmonics=5, frequency=0.1, amplitude=0.3, fade=1",
-        "--start hme: there is no such start. Did you mean 'home'? "
-        "Allowed: home, zero, random, up, or a .csv or .npy file of joint positions",
+        "--start must be one of home, zero, random, up, or a .csv or .npy file of joint positions, got 'hme'. "
+        "Did you mean 'home'?",
     ]
     assert sorted(path.name for path in folder.iterdir()) == ["rich.yaml"]
 
@@ -142,22 +145,22 @@ def test_every_mistake_is_told_at_once(folder: Path) -> None:
     [
         (
             ["--rollouts", "1000000000000"],
-            "--rollouts 1000000000000: is more than 10,000,000; make several runs of other seeds",
+            "--rollouts must be at most 10,000,000, got 1000000000000; make several runs with other seeds",
         ),
-        (["--duration", "1e300"], "--duration 1e+300: is more than 1,000,000,000,000 time steps of 0.002 s"),
-        (["--steps", "1" + "0" * 30], f"--steps 1{'0' * 30}: is more than 1,000,000,000,000"),
-        (["--timestep", "nan"], "--timestep nan: is not between 0 and 1 s"),
-        (["--timestep", "-1"], "--timestep -1.0: is not between 0 and 1 s"),
-        (["--record", ","], f"--record: names nothing. Allowed: {KNOWN}"),
-        (["--resume", "--overwrite"], "--resume and --overwrite: give one of them, not both"),
+        (["--duration", "1e300"], "--duration must be at most 1,000,000,000,000 time steps of 0.002 s, got 1e+300"),
+        (["--steps", "1" + "0" * 30], f"--steps must be at most 1,000,000,000,000, got 1{'0' * 30}"),
+        (["--timestep", "nan"], "--timestep must be above 0 s and at most 1 s, got nan"),
+        (["--timestep", "-1"], "--timestep must be above 0 s and at most 1 s, got -1.0"),
+        (["--record", ","], f"--record must not be empty. Allowed: {KNOWN}"),
+        (["--resume", "--overwrite"], "--resume must not be given together with overwrite"),
         (
             ["--timestep", "1e-9"],
-            "one rollout would record 283.1 GB, and at most 1 GB can be held; record a state in so many (--every) or "
-            "fewer quantities (--record)",
+            "one rollout would record 283.1 GB, and at most 1 GB are possible; record fewer states (every) or fewer "
+            "quantities (record)",
         ),
         (
             ["--controller", "pd", "--randomize", "gain=0.1"],
-            "--randomize gain: the robot as simulated has no gain, and 0 times a factor is 0",
+            "--randomize must not contain 'gain': the robot as simulated has no gain to multiply",
         ),
         (
             ["--controller", "random:rate=1e6"],

@@ -78,7 +78,9 @@ def test_rows_of_different_lengths_are_no_array() -> None:
 def test_a_reference_without_velocities_is_an_error() -> None:
     with pytest.raises(ControllerError) as caught:
         rollout(robots.arm(), rollouts=3, steps=7, controller=f"{DRIVERS}:Half")
-    assert str(caught.value) == f"controller '{DRIVERS}:Half': its reference is no pair of positions and velocities"
+    assert (
+        str(caught.value) == f"controller '{DRIVERS}:Half': its reference must be a pair of positions and velocities"
+    )
 
 
 def test_a_reference_that_is_not_recorded_is_not_asked_for() -> None:

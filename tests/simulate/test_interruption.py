@@ -19,7 +19,7 @@ from dh2sim.cli.common import BAD_INPUT, INTERRUPTED
 from dh2sim.model.build import build_model
 from dh2sim.robot.read import load_robot
 from dh2sim.simulate.description import summarize
-from dh2sim.simulate.options import Wish
+from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.run import fill
 from dh2sim.simulate.store.reader import open_dataset
@@ -36,8 +36,8 @@ WAIT = 60.0
 def _begin(folder: Path) -> tuple[Path, RunWriter]:
     """A run that has not begun, of blocks so small that there are many; whoever resumes it keeps them."""
     (folder / "small.yaml").write_text(small(), encoding="utf-8")
-    wish = Wish(rollouts=ROLLOUTS, steps=STEPS, controller=CONTROLLER, start="random")
-    job = prepare(build_model(load_robot(folder / "small.yaml")), wish)
+    options = RolloutOptions(rollouts=ROLLOUTS, steps=STEPS, controller=CONTROLLER, start="random")
+    job = prepare(build_model(load_robot(folder / "small.yaml")), options)
     path = folder / "run.zarr"
     return path, RunWriter.create(path, replace(job.layout, block=BLOCK))
 
@@ -46,8 +46,8 @@ def _begin(folder: Path) -> tuple[Path, RunWriter]:
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path, writer = _begin(tmp_path_factory.mktemp("undisturbed"))
     with writer:
-        wish = Wish(rollouts=ROLLOUTS, steps=STEPS, controller=CONTROLLER, start="random")
-        fill(writer, prepare(build_model(load_robot(path.parent / "small.yaml")), wish))
+        options = RolloutOptions(rollouts=ROLLOUTS, steps=STEPS, controller=CONTROLLER, start="random")
+        fill(writer, prepare(build_model(load_robot(path.parent / "small.yaml")), options))
     return path
 
 

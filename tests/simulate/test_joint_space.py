@@ -21,7 +21,7 @@ def test_the_force_that_it_asks_for_makes_the_acceleration_that_is_wanted(robot:
     model = mujoco.MjModel.from_xml_string(to_mjcf(built, MjcfOptions(floating_base=floating)))
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT)
     n = len(built.moving_joints)
-    plant = make_plant(model, velocity=[1.0] * n, kp=[1.0] * n, kv=[1.0] * n, home=[0.0] * n)
+    plant = make_plant(model, built)
     random = np.random.default_rng(5)
     data = mujoco.MjData(model)
     data.qpos[model.nq - n :], data.qvel[:] = random.uniform(-1, 1, n), random.uniform(-1, 1, model.nv)

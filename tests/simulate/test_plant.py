@@ -6,9 +6,8 @@ import pytest
 from dh2sim.errors import EngineError
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import ActuatorType, Convention, Limits, RobotSpec, Row
-from dh2sim.simulate.block import plant_of
-from dh2sim.simulate.options import Wish
-from dh2sim.simulate.plant import Plant
+from dh2sim.simulate.options import RolloutOptions
+from dh2sim.simulate.plant import Plant, compile_plant
 from dh2sim.simulate.prepare import prepare
 from tests.model.samples import CONTINUOUS, FIXED, PRISMATIC, REVOLUTE, model
 from tests.simulate import robots
@@ -16,8 +15,10 @@ from tests.simulate import robots
 
 def plant(name: str = "odd", *, controller: str = "tests.simulate.drivers:Wave", floating: bool = False) -> Plant:
     robot = model(name) if name != "arm" else robots.arm(ActuatorType.VELOCITY)
-    job = prepare(robot, Wish(rollouts=1, steps=1, timestep=0.003, controller=controller, floating_base=floating))
-    return plant_of(job.mjcf, job.settings)
+    job = prepare(
+        robot, RolloutOptions(rollouts=1, steps=1, timestep=0.003, controller=controller, floating_base=floating)
+    )
+    return job.plant
 
 
 @pytest.mark.parametrize("floating", [False, True], ids=["fixed", "floating"])
@@ -92,8 +93,8 @@ def test_actuators_of_some_joints_only_know_which() -> None:
         )
     )
     robot = build_model(RobotSpec(name="some", rows=rows))
-    job = prepare(robot, Wish(rollouts=1, steps=1, controller="random"))
-    made = plant_of(job.mjcf, job.settings)
+    job = prepare(robot, RolloutOptions(rollouts=1, steps=1, controller="random"))
+    made = job.plant
     assert made.actuators == ("slide_motor", "wheel_velocity")
     assert made.driven == (1, 2)
     labels = {item.name: list(item.values) for item in job.layout.coordinates}
@@ -115,9 +116,9 @@ def test_gains_are_those_that_position_actuators_would_have() -> None:
 
 
 def test_a_model_that_mujoco_refuses_is_an_error_in_one_line() -> None:
-    job = prepare(model("odd"), Wish(rollouts=1, steps=1))
+    job = prepare(model("odd"), RolloutOptions(rollouts=1, steps=1))
     with pytest.raises(EngineError) as caught:
-        plant_of(job.mjcf.replace('type="slide"', 'type="slid"', 1), job.settings)
+        compile_plant(job.mjcf.replace('type="slide"', 'type="slid"', 1), model("odd"))
     assert str(caught.value).startswith("MuJoCo refuses the robot as it would be simulated: ")
     assert "slid" in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""From a robot and a wish to what a run needs."""
+"""From a robot and options to a job."""
 
 from __future__ import annotations
 
@@ -21,15 +21,16 @@ from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import builtin_robots
 from dh2sim.robot.spec import ActuatorType
-from dh2sim.simulate.options import Wish
-from dh2sim.simulate.prepare import Job, prepare
+from dh2sim.simulate.block import Job
+from dh2sim.simulate.options import RolloutOptions
+from dh2sim.simulate.prepare import prepare
 from tests.export.robots import write
 from tests.model.samples import ODD_ROBOT, model
 from tests.simulate import robots
 
 
 def job(robot: RobotModel | None = None, **how: Any) -> Job:
-    return prepare(robot or model("stanford"), Wish(**{"rollouts": 3, "steps": 4, **how}))
+    return prepare(robot or model("stanford"), RolloutOptions(**{"rollouts": 3, "steps": 4, **how}))
 
 
 def refused(robot: RobotModel | None = None, **how: Any) -> str:
@@ -57,7 +58,7 @@ def test_a_controller_gets_the_actuators_that_it_asks_for(controller: str, kind:
     assert tags == ([] if kind is ActuatorType.NONE else [kind.value] * 2)
 
 
-def test_the_model_is_simulated_as_wished() -> None:
+def test_the_model_is_simulated_with_the_options() -> None:
     made = job(timestep=0.005, integrator="rk4", record=("energy",))
     compiled = mujoco.MjModel.from_xml_string(made.mjcf)
     assert compiled.opt.timestep == 0.005
@@ -83,8 +84,10 @@ def test_the_model_and_its_scene_need_no_other_file(name: str, floating: bool) -
 def test_attributes_tell_where_a_run_comes_from(tmp_path: Path) -> None:
     path = write(tmp_path, "name: small\nconvention: standard\njoints: [{type: revolute, a: 0.3}]\n")
     robot = build_model(dh2sim.load_robot(path))
-    wish = Wish(rollouts=3, steps=4, seed=2**70, randomize={"mass": 0.25}, controller="sine:amplitude=0.5")
-    attributes = prepare(robot, wish, command="dh2sim rollout small.yaml").layout.attributes
+    options = RolloutOptions(
+        rollouts=3, steps=4, seed=2**70, randomize={"mass": 0.25}, controller="sine:amplitude=0.5"
+    )
+    attributes = prepare(robot, options, command="dh2sim rollout small.yaml").layout.attributes
     assert attributes["dh2sim_run"] == 1
     assert attributes["robot"] == "small"
     assert attributes["robot_file"] == path.read_text(encoding="utf-8")
@@ -108,11 +111,13 @@ def test_a_robot_that_was_not_read_from_a_file_has_no_text_of_one() -> None:
 
 
 def test_settings_hold_everything_that_the_numbers_depend_on() -> None:
-    settings = job(every=2, start="random", record=("ctrl", "qpos")).settings.to_json()
+    settings = job(every=2, start="random", record=("ctrl", "qpos")).layout.attributes["settings"]
     robot = model("stanford")
     assert settings == {
         "rollouts": 3,
         "steps": 4,
+        "timestep": 0.002,
+        "integrator": "implicitfast",
         "every": 2,
         "seed": 0,
         "controller": "sine",
@@ -122,20 +127,18 @@ def test_settings_hold_everything_that_the_numbers_depend_on() -> None:
         "home": robot.home.tolist(),
         "record": ["qpos", "ctrl"],
         "randomize": {},
+        "floating_base": False,
         "velocity_limits": [joint.velocity for joint in robot.moving_joints],
         "kp": [joint.actuator.kp for joint in robot.moving_joints],
         "kv": [joint.actuator.kv for joint in robot.moving_joints],
     }
 
 
-def test_everything_that_is_wrong_is_told_at_once() -> None:
-    told = refused(rollouts=0, record=("qpos", "qve"), controller="sin", start="hme", every=3).splitlines()
-    assert [line.split(":")[0] for line in told] == [
-        "--rollouts 0",
-        "--record qve",
-        "--every 3",
-        "there is no controller 'sin'. Did you mean 'sine'? Known controllers",
-        "--start hme",
+def test_what_does_not_fit_the_robot_is_reported_at_once() -> None:
+    problems = refused(controller="sin", start="hme").splitlines()
+    assert [problem[:31] for problem in problems] == [
+        "there is no controller 'sin'. D",
+        "start must be one of home, zero",
     ]
 
 
@@ -155,10 +158,9 @@ def test_a_robot_without_a_joint_that_moves_is_refused() -> None:
 def test_a_rollout_that_would_record_more_than_memory_holds_is_refused_before_it_takes_any(
     how: dict[str, Any], size: str
 ) -> None:
-    told = refused(robots.arm(), **how)
-    assert told == (
-        f"one rollout would record {size} GB, and at most 1 GB can be held; record a state in so many (--every) or "
-        "fewer quantities (--record)"
+    assert refused(robots.arm(), **how) == (
+        f"one rollout would record {size} GB, and at most 1 GB are possible; record fewer states (every) or fewer "
+        "quantities (record)"
     )
 
 
@@ -167,10 +169,10 @@ def test_long_rollouts_may_be_recorded_now_and_then() -> None:
     assert made.layout.sizes["step"] == 1001
 
 
-def test_two_wishes_alike_make_the_same_run_but_for_its_date() -> None:
+def test_the_same_options_make_the_same_run_but_for_its_date() -> None:
     one, other = job(start="random"), job(start="random")
     assert one.mjcf == other.mjcf
-    assert one.settings == other.settings
+    assert one.options == other.options
     assert {**one.layout.attributes, "created": ""} == {**other.layout.attributes, "created": ""}
 
 
@@ -179,5 +181,5 @@ def test_a_start_of_a_file_is_told_apart_by_its_digest(tmp_path: Path) -> None:
     digests = []
     for q in (0.1, 0.2):
         np.save(path, [q, 0.0])
-        digests.append(job(robots.arm(), start=str(path)).settings.start_digest)
+        digests.append(job(robots.arm(), start=str(path)).initial.digest)
     assert digests[0] != digests[1]

@@ -14,7 +14,7 @@ import dh2sim
 import dh2sim.simulate
 from dh2sim.errors import ControllerError, RunDiffersError, RunExistsError, SettingsError, UnknownRobotError
 from dh2sim.simulate import open_dataset, rollout
-from dh2sim.simulate.options import Wish
+from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.run import fill, open_run
 from tests.model.samples import model
@@ -70,7 +70,7 @@ def test_an_unknown_robot_is_told() -> None:
 def test_numbers_that_count_are_whole(name: str, value: Any, shown: str) -> None:
     with pytest.raises(SettingsError) as caught:
         rollout("planar_2r", **{name: value})
-    assert str(caught.value) == f"--{name} {shown}: is not a whole number"
+    assert str(caught.value) == f"{name} must be a whole number, got {shown}"
 
 
 def test_numbers_may_be_numpys(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_threads_do_not_matter(threads: int) -> None:
     assert run.equals(rollout("planar_2r", rollouts=3, steps=4))
 
 
-def test_a_run_is_not_overwritten_unless_wished(tmp_path: Path) -> None:
+def test_a_run_is_not_overwritten_unless_asked_to(tmp_path: Path) -> None:
     path = tmp_path / "run.zarr"
     rollout("planar_2r", rollouts=2, steps=4, out=path)
     before = contents(path)
@@ -112,7 +112,7 @@ def test_resuming_and_replacing_exclude_each_other(tmp_path: Path) -> None:
     path = tmp_path / "run.zarr"
     with pytest.raises(SettingsError) as caught:
         rollout("planar_2r", rollouts=2, steps=4, out=path, resume=True, overwrite=True)
-    assert str(caught.value) == "--resume and --overwrite: give one of them, not both"
+    assert str(caught.value) == "resume must not be given together with overwrite"
     assert not path.exists()
 
 
@@ -131,7 +131,7 @@ def test_a_run_larger_than_memory_is_told_so() -> None:
 
 def test_blocks_are_filled_until_one_is_asked_to_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dh2sim.simulate.prepare.BLOCK_BYTES", 2**14)
-    job = prepare(model("planar_2r"), Wish(rollouts=100, steps=4))
+    job = prepare(model("planar_2r"), RolloutOptions(rollouts=100, steps=4))
     answers = iter([False, False, True])
     with open_run(job, tmp_path / "run.zarr") as writer:
         blocks = writer.layout.blocks

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from dh2sim.simulate import block, rollout
 from dh2sim.simulate import loops as closed_loop
 from dh2sim.simulate import loops as open_loop
-from dh2sim.simulate.block import simulate_block
-from dh2sim.simulate.options import Wish
-from dh2sim.simulate.prepare import Job, prepare
+from dh2sim.simulate.block import Job, simulate_block
+from dh2sim.simulate.options import RolloutOptions
+from dh2sim.simulate.prepare import prepare
 from tests.program import environment
 from tests.simulate import robots
 
@@ -27,7 +27,7 @@ ROLLOUTS = 9
 
 
 def job(controller: str, *, rollouts: int = ROLLOUTS, **how: Any) -> Job:
-    wish = {
+    options = {
         "steps": 50,
         "controller": controller,
         "start": "random",
@@ -37,11 +37,11 @@ def job(controller: str, *, rollouts: int = ROLLOUTS, **how: Any) -> Job:
         "timestep": 0.01,
         **how,
     }
-    return prepare(robots.worm(), Wish(rollouts=rollouts, **wish))
+    return prepare(robots.worm(), RolloutOptions(rollouts=rollouts, **options))
 
 
 def simulated(of: Job, rollouts: range, threads: int = 1) -> Mapping[str, NDArray[Any]]:
-    return simulate_block(of.mjcf, of.settings, rollouts, threads=threads)
+    return simulate_block(of, rollouts, threads=threads)
 
 
 def assert_same(

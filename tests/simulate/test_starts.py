@@ -96,8 +96,8 @@ def test_a_start_outside_the_limits_is_refused(name: str) -> None:
     assert (
         str(caught.value)
         == {
-            "zero": "--start zero: joint_1 would start at 0 rad, outside its limits 0.25 to 1.5 rad",
-            "tilted": "--start tilted: joint_2 would start at 0.9 m, outside its limits -0.5 to 0.75 m",
+            "zero": "start zero: joint_1 would start at 0 rad, outside its limits 0.25 to 1.5 rad",
+            "tilted": "start tilted: joint_2 would start at 0.9 m, outside its limits -0.5 to 0.75 m",
         }[name]
     )
 

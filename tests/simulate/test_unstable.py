@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from dh2sim.simulate import block, rollout
 from dh2sim.simulate import loops as open_loop
 from dh2sim.simulate.block import simulate_block
 from dh2sim.simulate.dataset_layout import STATUS
-from dh2sim.simulate.options import Wish
+from dh2sim.simulate.options import RolloutOptions
+from dh2sim.simulate.plant import compile_plant
 from dh2sim.simulate.prepare import prepare
 from dh2sim.typing import Array
 from tests.simulate import plain, robots
@@ -169,7 +171,7 @@ def test_the_controllers_that_come_along_look_at_a_failed_rollout_without_a_warn
 @pytest.mark.parametrize("floating", [False, True], ids=["fixed", "floating"])
 @pytest.mark.parametrize("controller", [f"{DRIVERS}:MotorWave", f"{DRIVERS}:Spring", "gravity-compensation", "pd"])
 def test_a_simulation_that_mujoco_gives_up_on_is_an_error_of_its_own(controller: str, floating: bool) -> None:
-    wish = Wish(
+    options = RolloutOptions(
         rollouts=4,
         steps=60,
         start="curled",
@@ -177,11 +179,11 @@ def test_a_simulation_that_mujoco_gives_up_on_is_an_error_of_its_own(controller:
         record=("qpos", "contacts"),
         floating_base=floating,
     )
-    job = prepare(robots.worm(), wish)
+    job = prepare(robots.worm(), options)
     # too little memory for the contacts that come
     mjcf = job.mjcf.replace("<worldbody>", '<size memory="9K"/><worldbody>')
     assert mjcf != job.mjcf
-    found = simulate_block(mjcf, job.settings, range(4))
+    found = simulate_block(replace(job, plant=compile_plant(mjcf, robots.worm())), range(4))
     assert set(found["status"].tolist()) == {STATUS["error"]}
     assert (found["stop_step"] >= 0).all()
     assert np.isnan(found["qpos"][:, -1]).all()

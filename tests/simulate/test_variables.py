@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from dh2sim.simulate.dataset_layout import STATUS, Layout
-from dh2sim.simulate.options import Wish
+from dh2sim.simulate.options import RECORDABLE, RolloutOptions
 from dh2sim.simulate.prepare import prepare
-from dh2sim.simulate.settings import RECORDABLE
 from tests.model.samples import model
 from tests.simulate import robots
 
@@ -20,7 +19,9 @@ EVERYTHING = {"record": RECORDABLE, "controller": "pd", "integrator": "Euler"}
 
 
 def layout(**how: Any) -> Layout:
-    return prepare(model("odd"), Wish(**{"rollouts": 7, "steps": 12, "every": 3, "timestep": 0.01, **how})).layout
+    return prepare(
+        model("odd"), RolloutOptions(**{"rollouts": 7, "steps": 12, "every": 3, "timestep": 0.01, **how})
+    ).layout
 
 
 def dimensions(of: Layout) -> dict[str, tuple[str, ...]]:
@@ -144,5 +145,5 @@ def test_rollouts_of_blocks_are_all_rollouts_in_order() -> None:
 
 
 def test_a_worm_has_links_of_its_own() -> None:
-    made = prepare(robots.worm(), Wish(rollouts=1, steps=1, randomize={"mass": 0.1})).layout
+    made = prepare(robots.worm(), RolloutOptions(rollouts=1, steps=1, randomize={"mass": 0.1})).layout
     assert made.sizes["link"] == 5

@@ -17,7 +17,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import load_robot
 from dh2sim.simulate import rollout
 from dh2sim.simulate.block import simulate_block
-from dh2sim.simulate.options import Wish
+from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.store.writer import RunWriter
 from dh2sim.view.motion.replay import open_replay
@@ -136,11 +136,11 @@ def test_a_rollout_that_is_not_there_is_named(path: Path, model: RobotModel) -> 
 
 def test_rollouts_that_have_not_been_run_are_left_out(tmp_path: Path, model: RobotModel) -> None:
     out = tmp_path / "run.zarr"
-    job = prepare(model, Wish(rollouts=3, steps=4, record=("qpos",)))
+    job = prepare(model, RolloutOptions(rollouts=3, steps=4, record=("qpos",)))
     with RunWriter.create(out, replace(job.layout, block=1)) as writer:
         with pytest.raises(RunError, match=f"^'{re.escape(str(out))}': no rollout has been run yet$"):
             open_replay(out, model)
-        writer.write(1, simulate_block(job.mjcf, job.settings, range(1, 2)), 0.1)
+        writer.write(1, simulate_block(job, range(1, 2)), 0.1)
         replay = open_replay(out, model)
         assert replay.rollouts == (1,)
         assert replay.duration(1) == pytest.approx(4 * STEP)

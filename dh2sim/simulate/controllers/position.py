@@ -25,7 +25,6 @@ from dh2sim.simulate.controllers.trajectories import (
     centers,
     cubic_spline_weights,
     follow,
-    free_ranges,
     half_ranges,
     minimum_jerk,
     pieces,
@@ -133,7 +132,7 @@ class RandomSpline:
         self._lower, self._upper = plant.control_lower, plant.control_upper
         joints = driven_joints(plant)
         position, velocity = of_type(plant, ActuatorType.POSITION), of_type(plant, ActuatorType.VELOCITY)
-        free = np.where(position, free_ranges(plant)[joints], np.where(velocity, plant.velocity[joints], 1.0))
+        free = np.where(position, plant.free_half_ranges[joints], np.where(velocity, plant.velocity[joints], 1.0))
         reach = INSIDE * amplitude * half_ranges(self._lower, self._upper, free)
         start = holding_controls(batch, against_gravity=False)
         center = centers(start, reach, self._lower, self._upper)
@@ -198,7 +197,7 @@ class Sine:
         total, speed = np.zeros(sizes.shape[1:]), np.zeros(sizes.shape[1:])
         for rate, size in zip(self._rates, sizes, strict=True):
             total, speed = total + size, speed + rate * size
-        reach = INSIDE * amplitude * half_ranges(plant.lower, plant.upper, free_ranges(plant))
+        reach = INSIDE * amplitude * half_ranges(plant.lower, plant.upper, plant.free_half_ranges)
         # on the way to the series: rate of the weight times the distance, and the series' own velocity
         away = np.abs(centers(batch.q0, reach, plant.lower, plant.upper) - batch.q0)
         fastest = MINIMUM_JERK_PEAK / fade * (away + reach) + reach * speed / total

@@ -18,7 +18,6 @@ import numpy as np
 from dh2sim.errors import ControllerError
 from dh2sim.simulate.controllers.options import Within
 from dh2sim.simulate.controllers.protocol import RolloutBatch
-from dh2sim.simulate.plant import Plant
 from dh2sim.typing import Array
 
 MINIMUM_JERK_PEAK: Final = 1.875
@@ -120,21 +119,12 @@ def runs_of(piece: Array) -> list[tuple[int, slice]]:
 
 INSIDE: Final = 1.0 - 1e-9
 """Share of what limits allow that is used, so that rounding never leads out of them."""
-FREE_TURN: Final = math.pi
-"""rad: half the range of a joint that turns without limits."""
-FREE_SLIDE: Final = 1.0
-"""m: half the range of a joint that slides without limits."""
 
 
 def half_ranges(lower: Array, upper: Array, free: Array) -> Array:
     """Return half of each range, or ``free`` where a range is not limited; all of shape (m,)."""
     limited = np.isfinite(lower) & np.isfinite(upper)
     return np.where(limited, 0.5 * np.where(limited, upper, 0.0) - 0.5 * np.where(limited, lower, 0.0), free)
-
-
-def free_ranges(plant: Plant) -> Array:
-    """Return half of the range that joints without limits move in, rad or m, shape (n,)."""
-    return np.where(np.array(plant.turns, dtype=bool), FREE_TURN, FREE_SLIDE)
 
 
 def centers(start: Array, reach: Array, lower: Array, upper: Array) -> Array:
@@ -230,7 +220,7 @@ class SmoothReference:
         self._period = period
         self._motions = math.floor(batch.steps * plant.timestep / period) + 1
         self._lower, self._upper = widened(batch)
-        reach = INSIDE * amplitude * half_ranges(plant.lower, plant.upper, free_ranges(plant))
+        reach = INSIDE * amplitude * half_ranges(plant.lower, plant.upper, plant.free_half_ranges)
         center = centers(batch.q0, reach, plant.lower, plant.upper)
         targets = center + reach * uniform(batch.generators, self._motions, plant.n)
         # nobody is quicker than the velocity limit, even where a start outside the limits makes the way longer

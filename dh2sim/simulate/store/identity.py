@@ -36,7 +36,10 @@ def differences(attributes: Mapping[str, Any], seal: Seal, layout: Layout) -> li
     found = list(_robot(there, here))
     settings = list(_settings(there.get("settings") or {}, here.get("settings") or {}, same_robot=not found))
     physics = [_is(name, there.get(name), here.get(name)) for name in ("timestep", "integrator")]
-    found += [*settings, *filter(None, physics), *_versions(there.get("versions") or {}, here.get("versions") or {})]
+    found += [
+        *dict.fromkeys([*settings, *filter(None, physics)]),
+        *_versions(there.get("versions") or {}, here.get("versions") or {}),
+    ]
     if not found and there.get("mjcf") != here.get("mjcf"):
         found.append("the model is another one")
     if not found and dict(seal.variables) != stored_variables(layout):

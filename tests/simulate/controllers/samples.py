@@ -51,13 +51,11 @@ def plant(spec: RobotSpec, *, timestep: float = 0.002) -> Plant:
     model = dh2sim.build_model(spec)
     compiled = mujoco.MjModel.from_xml_string(dh2sim.to_mjcf(model))
     compiled.opt.timestep = timestep
-    joints = model.moving_joints
-    return make_plant(
-        compiled,
-        velocity=[joint.velocity for joint in joints],
-        kp=[50.0 + 10.0 * i for i in range(len(joints))],
-        kv=[0.5 + 0.1 * i for i in range(len(joints))],
-        home=model.home.tolist(),
+    made = make_plant(compiled, model)
+    return replace(
+        made,
+        kp=read_only([50.0 + 10.0 * i for i in range(made.n)]),
+        kv=read_only([0.5 + 0.1 * i for i in range(made.n)]),
     )
 
 

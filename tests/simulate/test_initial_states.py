@@ -10,15 +10,15 @@ import pytest
 
 from dh2sim.errors import SettingsError
 from dh2sim.simulate import rollout
-from dh2sim.simulate.initial_states import Start, read_start
+from dh2sim.simulate.initial_states import InitialStates, read_initial_states
 
 JOINTS = ("joint_1", "slide")
 CONFIGURATIONS = {"home": np.array([0.1, 0.2]), "folded": np.array([0.3, 0.4])}
 COLUMNS = "Columns are joints, rad or m, and optionally slide_velocity and so on"
 
 
-def read(text: str | Path, rollouts: int = 3) -> Start:
-    return read_start(str(text), JOINTS, CONFIGURATIONS, rollouts)
+def read(text: str | Path, rollouts: int = 3) -> InitialStates:
+    return read_initial_states(str(text), JOINTS, CONFIGURATIONS, rollouts)
 
 
 def refused(text: str | Path, rollouts: int = 3) -> str:
@@ -53,29 +53,29 @@ def npy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
 @pytest.mark.parametrize("name", ["home", "zero", "random"])
 def test_these_words_need_no_file(name: str) -> None:
     start = read(name)
-    assert (start.name, start.states, start.digest) == (name, None, "")
+    assert (start.name, start.given, start.digest) == (name, None, "")
 
 
 def test_a_configuration_is_a_state_at_rest_for_all() -> None:
     start = read("folded")
-    assert start.states is not None
-    assert start.states.tolist() == [[[0.3, 0.4], [0.0, 0.0]]]
-    assert start.digest == hashlib.sha256(start.states.tobytes()).hexdigest()
-    assert not start.states.flags.writeable
+    assert start.given is not None
+    assert start.given.tolist() == [[[0.3, 0.4], [0.0, 0.0]]]
+    assert start.digest == hashlib.sha256(start.given.tobytes()).hexdigest()
+    assert not start.given.flags.writeable
 
 
 def test_a_csv_file_names_joints_in_any_order(csv: Callable[[str], str]) -> None:
     start = read(csv("slide, joint_1\n0.5,1e-1\n\n-0.25,-2\n0,0\n"))
-    assert start.states is not None
+    assert start.given is not None
     assert start.name == "s.csv"
-    assert start.states[:, 0].tolist() == [[0.1, 0.5], [-2.0, -0.25], [0.0, 0.0]]
-    assert not start.states[:, 1].any()
+    assert start.given[:, 0].tolist() == [[0.1, 0.5], [-2.0, -0.25], [0.0, 0.0]]
+    assert not start.given[:, 1].any()
 
 
 def test_a_csv_file_may_give_velocities(csv: Callable[[str | bytes], str]) -> None:
     start = read(csv("\ufeffjoint_1,slide,slide_velocity\r\n1,2,3\r\n".encode()))
-    assert start.states is not None
-    assert start.states.tolist() == [[[1.0, 2.0], [0.0, 3.0]]]
+    assert start.given is not None
+    assert start.given.tolist() == [[[1.0, 2.0], [0.0, 3.0]]]
 
 
 @pytest.mark.parametrize(
@@ -91,9 +91,9 @@ def test_a_csv_file_may_give_velocities(csv: Callable[[str | bytes], str]) -> No
 )
 def test_an_npy_file_holds_positions_or_states(array: Any, states: Any, npy: Callable[..., str]) -> None:
     start = read(npy(array))
-    assert start.states is not None
-    assert start.states.dtype == np.float64
-    assert start.states.tolist() == states
+    assert start.given is not None
+    assert start.given.dtype == np.float64
+    assert start.given.tolist() == states
 
 
 def test_the_same_states_have_the_same_digest(csv: Callable[[str], str], npy: Callable[..., str]) -> None:
@@ -104,49 +104,49 @@ def test_the_same_states_have_the_same_digest(csv: Callable[[str], str], npy: Ca
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("fold", " Did you mean 'folded'?"),
+        ("fold", ". Did you mean 'folded'?"),
         ("here", ""),
         ("", ""),
         ("s.txt", ""),
     ],
 )
-def test_what_is_no_start_is_refused_with_what_there_is(text: str, words: str) -> None:
+def test_an_unknown_start_is_refused_with_those_that_are_known(text: str, words: str) -> None:
     assert refused(text) == (
-        f"--start {text}: there is no such start.{words} Allowed: home, zero, random, folded, or a .csv or .npy file "
-        "of joint positions"
+        f"start must be one of home, zero, random, folded, or a .csv or .npy file of joint positions, got {text!r}"
+        f"{words}"
     )
 
 
 @pytest.mark.parametrize("name", ["s.csv", "s.npy", "no/such/s.CSV"])
 def test_a_file_that_is_not_there_is_named(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
-    assert refused(path) == f"--start {path}: cannot be read: No such file or directory"
+    assert refused(path) == f"start {path}: cannot be read: No such file or directory"
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
     (tmp_path / "s.csv").mkdir()
-    assert refused(tmp_path / "s.csv") == f"--start {tmp_path / 's.csv'}: cannot be read: Is a directory"
+    assert refused(tmp_path / "s.csv") == f"start {tmp_path / 's.csv'}: cannot be read: Is a directory"
 
 
 @pytest.mark.parametrize(
     ("text", "problems"),
     [
-        ("", ["1: column 'joint_1' is missing", "1: column 'slide' is missing"]),
-        ("joint_1\n1\n", ["1: column 'slide' is missing"]),
+        ("", ["1: missing column 'joint_1'", "1: missing column 'slide'"]),
+        ("joint_1\n1\n", ["1: missing column 'slide'"]),
         (
             "joint_1,slid,turn\n0,0,0\n",
             [
                 "1: unknown column 'slid'. Did you mean 'slide'?",
                 "1: unknown column 'turn'.",
-                "1: column 'slide' is missing",
+                "1: missing column 'slide'",
             ],
         ),
-        ("joint_1,slide,joint_1\n0,0,0\n", ["1: column 'joint_1' stands there twice"]),
+        ("joint_1,slide,joint_1\n0,0,0\n", ["1: duplicate column 'joint_1'"]),
     ],
 )
-def test_every_wrong_column_is_told(text: str, problems: list[str], csv: Callable[[str], str]) -> None:
-    told = refused(csv(text)).splitlines()
-    assert told == [*(f"--start s.csv:{problem}" for problem in problems), COLUMNS]
+def test_every_wrong_column_is_reported(text: str, problems: list[str], csv: Callable[[str], str]) -> None:
+    found = refused(csv(text)).splitlines()
+    assert found == [*(f"start s.csv:{problem}" for problem in problems), COLUMNS]
 
 
 @pytest.mark.parametrize(
@@ -156,19 +156,19 @@ def test_every_wrong_column_is_told(text: str, problems: list[str], csv: Callabl
         ("joint_1,slide\n1,2\n1,2,3\n", ":3: has 3 cells, the header 2"),
         ("joint_1,slide\n1,2\n\n1,two\n", ":4: slide: 'two' is not a number"),
         ("joint_1,slide\n1,\n", ":2: slide: '' is not a number"),
-        ("joint_1,slide\n1,2\ninf,2\n0,0\n", ": state 2, joint_1: is not a finite number"),
-        ("joint_1,slide\n1,nan\n", ": state 1, slide: is not a finite number"),
-        ("joint_1,slide\n", ": holds 0 states; allowed are 1, or one for each of 3 rollouts"),
-        ("joint_1,slide\n1,2\n1,2\n", ": holds 2 states; allowed are 1, or one for each of 3 rollouts"),
+        ("joint_1,slide\n1,2\ninf,2\n0,0\n", ": state 2, joint_1: must be a finite number"),
+        ("joint_1,slide\n1,nan\n", ": state 1, slide: must be a finite number"),
+        ("joint_1,slide\n", ": must contain 1 state, or one for each of 3 rollouts, got 0"),
+        ("joint_1,slide\n1,2\n1,2\n", ": must contain 1 state, or one for each of 3 rollouts, got 2"),
     ],
 )
-def test_a_wrong_cell_is_told_with_its_place(text: str, words: str, csv: Callable[[str], str]) -> None:
-    assert refused(csv(text)) == f"--start s.csv{words}"
+def test_a_wrong_cell_is_reported_with_its_place(text: str, words: str, csv: Callable[[str], str]) -> None:
+    assert refused(csv(text)) == f"start s.csv{words}"
 
 
 @pytest.mark.parametrize("data", [b"\xff\xfe\x00j", b"joint_1,slide\n0," + b"1" * 200_000], ids=["bytes", "long"])
 def test_what_is_no_text_or_has_endless_cells_is_no_csv_file(data: bytes, csv: Callable[[bytes], str]) -> None:
-    assert refused(csv(data)).startswith("--start s.csv: is no CSV file: ")
+    assert refused(csv(data)).startswith("start s.csv: is not a CSV file: ")
 
 
 @pytest.mark.parametrize(
@@ -185,20 +185,20 @@ def test_what_is_no_text_or_has_endless_cells_is_no_csv_file(data: bytes, csv: C
 )
 def test_an_array_of_another_shape_or_kind_is_refused(array: Any, found: str, npy: Callable[..., str]) -> None:
     assert refused(npy(array)) == (
-        "--start s.npy: expected numbers of shape (2,) or (rollouts, 2), joint positions in rad and m, or "
-        f"(rollouts, 2, 2), positions and velocities; found {found}"
+        "start s.npy: must contain numbers of shape (2,) or (rollouts, 2), joint positions in rad and m, or "
+        f"(rollouts, 2, 2), positions and velocities; got {found}"
     )
 
 
 def test_an_array_of_as_many_states_as_rollouts_or_one_is_wanted(npy: Callable[..., str]) -> None:
     name = npy(np.zeros((4, 2)))
-    assert read(name, 4).states is not None
-    assert refused(name) == "--start s.npy: holds 4 states; allowed are 1, or one for each of 3 rollouts"
+    assert read(name, 4).given is not None
+    assert refused(name) == "start s.npy: must contain 1 state, or one for each of 3 rollouts, got 4"
 
 
 def test_no_code_hides_in_an_array(npy: Callable[..., str]) -> None:
     assert refused(npy(np.array([None, 1]), allow_pickle=True)) == (
-        "--start s.npy: is no array of NumPy: Object arrays cannot be loaded when allow_pickle=False"
+        "start s.npy: is not a NumPy array: Object arrays cannot be loaded when allow_pickle=False"
     )
 
 
@@ -218,15 +218,15 @@ HUGE = "{'descr': '<f8', 'fortran_order': False, 'shape': (100000000000000, 2), 
 def test_a_file_that_is_no_array_is_refused(data: bytes, tmp_path: Path) -> None:
     path = tmp_path / "s.npy"
     path.write_bytes(data)
-    told = refused(path)
-    assert told.startswith(f"--start {path}: is no array of NumPy: ")
-    assert "\n" not in told
+    found = refused(path)
+    assert found.startswith(f"start {path}: is not a NumPy array: ")
+    assert "\n" not in found
 
 
 def test_an_archive_of_arrays_is_refused(tmp_path: Path) -> None:
     with (tmp_path / "s.npy").open("wb") as stream:
         np.savez(stream, q=np.zeros(2))
-    assert refused(tmp_path / "s.npy").startswith(f"--start {tmp_path / 's.npy'}: is no array of NumPy: ")
+    assert refused(tmp_path / "s.npy").startswith(f"start {tmp_path / 's.npy'}: is not a NumPy array: ")
 
 
 def test_rollouts_start_at_the_states_of_a_file(tmp_path: Path) -> None:
@@ -237,11 +237,11 @@ def test_rollouts_start_at_the_states_of_a_file(tmp_path: Path) -> None:
     assert np.array_equal(run.qvel.values[:, 0], states[:, 1])
 
 
-def test_a_state_outside_the_limits_is_told_with_its_rollout(tmp_path: Path) -> None:
+def test_a_state_outside_the_limits_is_found_with_its_rollout(tmp_path: Path) -> None:
     path = tmp_path / "s.npy"
     np.save(path, [[0.0, 0.0], [0.0, 9.0]])
     with pytest.raises(SettingsError) as caught:
         rollout("planar_2r", rollouts=2, steps=1, start=str(path))
     assert str(caught.value) == (
-        f"--start {path}: joint_2 of rollout 1 would start at 9 rad, outside its limits -2.79253 to 2.79253 rad"
+        f"start {path}: joint_2 of rollout 1 would start at 9 rad, outside its limits -2.79253 to 2.79253 rad"
     )
