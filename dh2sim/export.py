@@ -16,7 +16,7 @@ from dh2sim.errors import EngineError, MismatchError, ModelError
 from dh2sim.files import atomic_files
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
-from dh2sim.formats.urdf.write import DYNAMICS as URDF_DYNAMICS
+from dh2sim.formats.urdf.tree import DYNAMICS as URDF_DYNAMICS
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose

@@ -1,20 +1,24 @@
-"""What a reader makes of a URDF, an MJCF or a file of axes: one serial chain, and all that hangs on it."""
+"""What the readers make of a URDF, an MJCF or a file of axes: a serial chain with its links, limits and actuators."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
 from dh2sim.kinematics.serial_chain import SerialChain
-from dh2sim.model.mass import MassProperties
+from dh2sim.messages import Notes, listed
+from dh2sim.model.mass import MassProperties, is_possible
+from dh2sim.robot.schema import MESH_SUFFIXES
 from dh2sim.robot.spec import ActuatorSpec, Dynamics, Limits
 from dh2sim.typing import Array, read_only
 
 GREATEST: Final = 1e30
 """Of any number in a file: products of a few such still fit a double."""
+_SAME_SCALE: Final = 1e-6
+"""By which the three scales of a mesh may differ, relative to the greatest."""
 Color: TypeAlias = tuple[float, float, float, float]
 """Red, green, blue, alpha, each from 0 to 1."""
 
@@ -68,6 +72,27 @@ class SerialLink:
     mesh: SerialMesh | None = None
     color: Color | None = None
 
+    @classmethod
+    def of(cls, name: str, inertial: Inertial, look: Look) -> SerialLink:
+        """Return a link of a name, with its mass properties and its looks."""
+        return cls(
+            name=name,
+            mass=inertial.mass,
+            com=inertial.com,
+            inertia=inertial.inertia,
+            mesh=look.mesh,
+            color=look.color,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ChainJoints:
+    """The moving joints of an arm, and what the file says of each."""
+
+    chain: SerialChain
+    limits: tuple[Limits, ...]
+    dynamics: tuple[Dynamics, ...]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SerialRobot:
@@ -95,6 +120,34 @@ class SerialRobot:
     """Named joint vectors, rad and m, each of shape (number of joints,)."""
     notes: tuple[str, ...] = ()
     """What was chosen, changed or left out, a sentence each, for the user to read."""
+
+
+def possible_inertial(whole: MassProperties, name: str, notes: Notes) -> Inertial:
+    """Return the mass properties of a link; an inertia that no body can have is noted and left out."""
+    if is_possible(whole.inertia):
+        return Inertial(mass=whole.mass, com=whole.com, inertia=whole.inertia)
+    notes.group("An inertia that no body has is left out, of links {}.", name)
+    return Inertial(mass=whole.mass, com=whole.com)
+
+
+def can_show(suffix: str, scale: Sequence[float], name: str, notes: Notes) -> bool:
+    """Whether a robot file can show a mesh file; if not, it is noted.
+
+    Args:
+        suffix: Of the mesh file.
+        scale: Along x, y and z.
+        name: Of the link.
+        notes: Takes what is left out.
+    """
+    if suffix.lower() not in MESH_SUFFIXES:
+        sentence = f"Meshes are not carried over that are none of {listed(MESH_SUFFIXES)}: those of links {{}}."
+        notes.group(sentence, name, suffix[:20] or "no suffix")
+        return False
+    if min(scale) <= 0.0 or max(scale) - min(scale) > _SAME_SCALE * max(scale):
+        detail = " ".join(f"{value:g}" for value in scale)
+        notes.group("Meshes that are mirrored or scaled unevenly are not carried over: {}.", name, detail)
+        return False
+    return True
 
 
 def properties(link: SerialLink) -> MassProperties | None:

@@ -1,7 +1,4 @@
-"""The joints of an MJCF's arm: poses with fixed bodies merged, axes, limits and dynamics.
-
-What drives the joints of an MJCF's arm: servos and motors that a robot file knows, and limits of force.
-"""
+"""The joints of an MJCF's arm: poses with fixed bodies merged, axes, limits, dynamics, and what drives them."""
 
 from __future__ import annotations
 
@@ -15,8 +12,8 @@ from dh2sim.errors import ImportedFileError, Problem
 from dh2sim.formats.mjcf.chain import Selection
 from dh2sim.formats.mjcf.compile import Compiled
 from dh2sim.formats.mjcf.includes import MjcfFiles
-from dh2sim.formats.mjcf.tree import MjcfJoint, MjcfTree, Motion
-from dh2sim.formats.serial_robot import GREATEST
+from dh2sim.formats.mjcf.tree import DYNAMICS, MjcfJoint, MjcfTree, Motion
+from dh2sim.formats.serial_robot import GREATEST, ChainJoints
 from dh2sim.formats.xml_read import place
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import compose, identity
@@ -189,15 +186,6 @@ def _name(model: mujoco.MjModel, i: int) -> str:
     return model.actuator(i).name or f"actuator {i + 1}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ChainJoints:
-    """The moving joints of the arm, and what the file says of each."""
-
-    chain: SerialChain
-    limits: tuple[Limits, ...]
-    dynamics: tuple[Dynamics, ...]
-
-
 def check_joints(tree: MjcfTree, selection: Selection, files: MjcfFiles) -> None:
     """Check that every joint from base to tip can be a row of a table, and that every number is fit for use.
 
@@ -338,19 +326,15 @@ def _range(model: mujoco.MjModel, joint: MjcfJoint, name: str, notes: Notes) -> 
 
 def _dynamics(compiled: Compiled, joint: MjcfJoint, name: str, drive: Drive, notes: Notes) -> Dynamics:
     model, dof = compiled.model, int(compiled.model.jnt_dofadr[joint.id])
-    damping = float(model.dof_damping[dof]) + drive.damping
     if joint.id in compiled.unknown_damping:
-        damping = 0.0
         notes.group("A damping ratio stands for no damping, as masses are not known, for joints {}.", name)
     if np.any(model.dof_dampingpoly[dof]) or drive.nonlinear:
         notes.group("Only the linear part of the damping is carried over, of joints {}.", name)
     if model.jnt_stiffness[joint.id] or np.any(model.jnt_stiffnesspoly[joint.id]):
         notes.group("Springs are not carried over, of joints {}.", name, f"{model.jnt_stiffness[joint.id]:g}")
-    values = {
-        "damping": damping,
-        "friction": float(model.dof_frictionloss[dof]),
-        "armature": float(model.dof_armature[dof]) + drive.armature,
-    }
+    values = {name: float(getattr(model, f"dof_{attribute}")[dof]) for name, attribute in DYNAMICS.items()}
+    values["damping"] = 0.0 if joint.id in compiled.unknown_damping else values["damping"] + drive.damping
+    values["armature"] += drive.armature
     for what, value in values.items():
         if not 0.0 <= value <= GREATEST:
             notes.group(f"A {what} that cannot be used was made 0, for joints {{}}.", name, f"{value!r}")

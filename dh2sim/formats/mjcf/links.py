@@ -10,11 +10,10 @@ import numpy as np
 
 from dh2sim.formats.mjcf.compile import Compiled, MeshFile
 from dh2sim.formats.mjcf.tree import WORLD, MjcfBody, MjcfTree, pose
-from dh2sim.formats.serial_robot import Color, Inertial, Look, SerialMesh
+from dh2sim.formats.serial_robot import Color, Inertial, Look, SerialMesh, can_show, possible_inertial
 from dh2sim.kinematics.transforms import compose, invert, rotate_tensor
 from dh2sim.messages import Notes, listed
-from dh2sim.model.mass import MassProperties, combine, in_frame, is_possible
-from dh2sim.robot.schema import MESH_SUFFIXES
+from dh2sim.model.mass import MassProperties, combine, in_frame
 from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:
@@ -43,16 +42,13 @@ def read_inertial(compiled: Compiled, tree: MjcfTree, body: MjcfBody, name: str,
         notes.group("The file gives no mass for links {}.", name)
         return Inertial()
     whole = known[0] if len(known) == 1 else combine(known)
-    if not is_finite(whole):
+    if not _is_finite(whole):
         notes.group("Masses that cannot be used are left out, of links {}.", name)
         return Inertial()
-    if not is_possible(whole.inertia):
-        notes.group("An inertia that no body has is left out, of links {}.", name)
-        return Inertial(mass=whole.mass, com=whole.com)
-    return Inertial(mass=whole.mass, com=whole.com, inertia=whole.inertia)
+    return possible_inertial(whole, name, notes)
 
 
-def is_finite(body: MassProperties) -> bool:
+def _is_finite(body: MassProperties) -> bool:
     """Whether all numbers are finite."""
     return bool(np.isfinite([body.mass, *body.com, *body.inertia.ravel()]).all())
 
@@ -74,8 +70,6 @@ def weight_of(compiled: Compiled, tree: MjcfTree, bodies: Sequence[int]) -> str:
     return tree.links.weighed(bodies, mass)
 
 
-_SAME: Final = 1e-6
-"""By which the three scales of a mesh may differ, relative to the greatest."""
 _GREY: Final = (0.5, 0.5, 0.5, 1.0)
 """MuJoCo's colour of a geom for which the file gives none."""
 
@@ -134,7 +128,7 @@ def _primitive(compiled: Compiled, geom: int) -> str | None:
 def _mesh(
     compiled: Compiled, geom: int, T_link_body: Array, name: str, has_one: bool, notes: Notes
 ) -> SerialMesh | None:
-    """Return the mesh of a geom, if it is one that can be used and the first; tell of others."""
+    """Return the mesh of a geom, if it is one that can be used and the first; others are noted."""
     import mujoco
 
     model = compiled.model
@@ -152,13 +146,7 @@ def _mesh(
         return None
     if file is None:
         notes.group("Meshes that are written in the file itself are not carried over, of links {}.", name)
-    elif PurePosixPath(file.path.name).suffix.lower() not in MESH_SUFFIXES:
-        sentence = f"Meshes are not carried over that are none of {listed(MESH_SUFFIXES)}: those of links {{}}."
-        notes.group(sentence, name, file.path.suffix[:20] or "no suffix")
-    elif min(file.scale) <= 0.0 or max(file.scale) - min(file.scale) > _SAME * max(file.scale):
-        detail = " ".join(f"{value:g}" for value in file.scale)
-        notes.group("Meshes that are mirrored or scaled unevenly are not carried over: {}.", name, detail)
-    else:
+    elif can_show(file.path.suffix, file.scale, name, notes):
         T = compose(T_link_body, T_body_file(model, geom, file))
         if np.isfinite(T).all():
             return SerialMesh(uri=file.uri, path=file.path, scale=file.scale[0], T_link_mesh=T)

@@ -276,7 +276,7 @@ def _links(
     compiled: Compiled, tree: MjcfTree, selection: Selection, names: tuple[str, ...], notes: Notes
 ) -> tuple[SerialLink, ...]:
     """Return the base and a link for every joint: the body for its last joint, one without mass for those before."""
-    # nobody uses the base's mass, so that nothing is said of it
+    # a robot file has no mass of the base, so that nothing is noted of it
     links = [_link(compiled, tree, selection.base, selection.base.name or "base", Notes(), notes)]
     for body in selection.bodies:
         if not body.joints:
@@ -291,11 +291,8 @@ def _links(
 def _link(
     compiled: Compiled, tree: MjcfTree, body: MjcfBody, name: str, mass_notes: Notes, notes: Notes
 ) -> SerialLink:
-    weight = read_inertial(compiled, tree, body, name, mass_notes)
-    look = read_look(compiled, tree, body, name, notes)
-    return SerialLink(
-        name=name, mass=weight.mass, com=weight.com, inertia=weight.inertia, mesh=look.mesh, color=look.color
-    )
+    inertial = read_inertial(compiled, tree, body, name, mass_notes)
+    return SerialLink.of(name, inertial, read_look(compiled, tree, body, name, notes))
 
 
 def _gravity(compiled: Compiled, tree: MjcfTree, selection: Selection, files: MjcfFiles, notes: Notes) -> Array:

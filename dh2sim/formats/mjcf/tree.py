@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 WORLD: Final = 0
 """Number of the world, the root of all bodies."""
+DYNAMICS: Final = {"damping": "damping", "friction": "frictionloss", "armature": "armature"}
+"""Attributes of an MJCF's joint for its dynamics, by the names of a robot file."""
 _SNAP: Final = 4e-16
 """What rounding may leave where a component of a rotation is 0, 1 or -1."""
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
-from typing import Final
 
 from dh2sim.errors import ModelError
 from dh2sim.formats.mjcf.sites import add_site, needs_body, placed
+from dh2sim.formats.mjcf.tree import DYNAMICS
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.transforms import compose
 from dh2sim.model.build import ModelLike, model_of
@@ -64,9 +64,6 @@ def add_keyframes(mujoco: ET.Element, model: RobotModel, *, floating_base: bool 
         if controls:
             key.set("ctrl", numbers(controls))
 
-
-DYNAMICS: Final = {"damping": "damping", "friction": "frictionloss", "armature": "armature"}
-"""Attributes of an MJCF's joint for its dynamics, by their names in a robot file."""
 
 MOST_BODIES = 496
 """MuJoCo's XML reader refuses a deeper nesting of bodies; base_link is one of them."""

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
+from dh2sim.formats.serial_robot import ChainJoints
 from dh2sim.formats.urdf.chain import Selection
-from dh2sim.formats.urdf.tree import UrdfJoint, read_axis, read_bound, read_number, read_only_child, read_pose
+from dh2sim.formats.urdf.tree import (
+    DYNAMICS,
+    UrdfJoint,
+    read_axis,
+    read_bound,
+    read_number,
+    read_only_child,
+    read_pose,
+)
 from dh2sim.formats.xml_read import Element, XmlReport
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import compose, identity
@@ -17,7 +25,6 @@ from dh2sim.robot.spec import Dynamics, JointType, Limits
 from dh2sim.typing import read_only
 
 _LIMITS: Final = ("lower", "upper", "effort", "velocity")
-_DYNAMICS: Final = ("damping", "friction")
 _ELEMENTS: Final = (
     "origin",
     "parent",
@@ -30,16 +37,7 @@ _ELEMENTS: Final = (
     "safety_controller",
 )
 _UNIT: Final = 1e-3
-"""By which an axis may miss length 1 without a word: files print a few digits."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ChainJoints:
-    """The moving joints of the arm, and what the file says of each."""
-
-    chain: SerialChain
-    limits: tuple[Limits, ...]
-    dynamics: tuple[Dynamics, ...]
+"""By which an axis may miss length 1 without a note: files print a few digits."""
 
 
 def read_joints(selection: Selection, report: XmlReport, notes: Notes) -> ChainJoints:
@@ -150,13 +148,13 @@ def _dynamics(joint: UrdfJoint, report: XmlReport, notes: Notes) -> Dynamics:
     element = read_only_child(joint.element, "dynamics", joint.path, report)
     if element is None:
         return Dynamics()
-    _check_attributes(element, _DYNAMICS, f"{joint.path}.dynamics", report)
+    _check_attributes(element, DYNAMICS, f"{joint.path}.dynamics", report)
     values = {}
-    for attribute in _DYNAMICS:
+    for attribute in DYNAMICS:
         value = 0.0
         if attribute in element.attributes:
             value = read_number(element, attribute, f"{joint.path}.dynamics", report)
         if value < 0.0:
             notes.group(f"A negative {attribute} was made 0, for joints {{}}.", joint.name, f"{value!r}")
         values[attribute] = value if value > 0.0 else 0.0
-    return Dynamics(damping=values["damping"], friction=values["friction"])
+    return Dynamics(**values)

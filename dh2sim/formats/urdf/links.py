@@ -11,14 +11,13 @@ from typing import Final
 import numpy as np
 
 from dh2sim.formats.mesh_paths import FindMesh
-from dh2sim.formats.serial_robot import Color, Inertial, Look, SerialMesh
+from dh2sim.formats.serial_robot import Color, Inertial, Look, SerialMesh, can_show, possible_inertial
 from dh2sim.formats.urdf.chain import Selection
 from dh2sim.formats.urdf.tree import UrdfJoint, UrdfTree, read_number, read_numbers, read_only_child, read_pose
 from dh2sim.formats.xml_read import Element, XmlReport, place
 from dh2sim.kinematics.transforms import compose, identity, move_point, rotate_tensor
-from dh2sim.messages import Notes, listed, shown
+from dh2sim.messages import Notes, shown
 from dh2sim.model.mass import MassProperties, combine, is_possible
-from dh2sim.robot.schema import MESH_SUFFIXES
 from dh2sim.typing import Array, read_only
 
 
@@ -129,7 +128,7 @@ def read_inertial(body: Body, report: XmlReport, notes: Notes) -> Inertial:
     whole = known[0][0] if len(known) == 1 else combine(mass for mass, _ in known)
     unknown = [mass.mass for mass, has_inertia in known if not has_inertia]
     if not unknown:
-        return _checked(whole, body.name, notes)
+        return possible_inertial(whole, body.name, notes)
     if math.fsum(unknown) > _POINT_MASS_SHARE * whole.mass:
         if len(known) > 1:
             notes.group(
@@ -137,14 +136,7 @@ def read_inertial(body: Body, report: XmlReport, notes: Notes) -> Inertial:
             )
         return Inertial(mass=whole.mass, com=whole.com)
     notes.group("Light parts of unknown inertia were counted as point masses, in links {}.", body.name)
-    return _checked(whole, body.name, notes)
-
-
-def _checked(whole: MassProperties, name: str, notes: Notes) -> Inertial:
-    if is_possible(whole.inertia):
-        return Inertial(mass=whole.mass, com=whole.com, inertia=whole.inertia)
-    notes.group("An inertia that no body has is left out, of links {}.", name)
-    return Inertial(mass=whole.mass, com=whole.com)
+    return possible_inertial(whole, body.name, notes)
 
 
 def _read_part(part: Part, report: XmlReport, notes: Notes) -> tuple[MassProperties, bool] | None:
@@ -191,10 +183,6 @@ def _tensor(inertial: Element, path: str, report: XmlReport) -> Array | None:
         for name in ("ixy", "ixz", "iyz")
     )
     return read_only([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-_SAME: Final = 1e-6
-"""By which the three scales of a mesh may differ, relative to the greatest."""
 
 
 def read_materials(robot: Element) -> Mapping[str, Color]:
@@ -257,15 +245,10 @@ def _mesh(
     T = compose(part.T_link_part, read_pose(visual, path, report))
     if report.problems:
         return None
-    suffix = PurePosixPath(uri).suffix
     if has_one:
         notes.group("A link shows one mesh; further ones are not carried over, of links {}.", part.name)
-    elif suffix.lower() not in MESH_SUFFIXES:
-        sentence = f"Meshes are not carried over that are none of {listed(MESH_SUFFIXES)}: those of links {{}}."
-        notes.group(sentence, part.name, suffix[:20] or "no suffix")
-    elif min(scale) <= 0.0 or max(scale) - min(scale) > _SAME * max(scale):
-        detail = " ".join(f"{value:g}" for value in scale)
-        notes.group("Meshes that are mirrored or scaled unevenly are not carried over: {}.", part.name, detail)
+    elif not can_show(PurePosixPath(uri).suffix, scale, part.name, notes):
+        return None
     elif (file := find_mesh(uri)) is None:
         notes.group(f"Meshes were not found in {_folder(uri)}, of links {{}}.", part.name)
     else:

@@ -115,23 +115,13 @@ def read_urdf(
 def _links(
     tree: UrdfTree, bodies: tuple[Body, ...], find_mesh: FindMesh, report: XmlReport, notes: Notes
 ) -> tuple[SerialLink, ...]:
-    """Return the base and the moving links. Nobody uses the base's mass, so that nothing is said of it."""
+    """Return the base and the moving links; a robot file has no mass of the base, so that nothing is noted of it."""
     materials = read_materials(tree.robot)
     links = []
     for body in bodies:
         is_base = body is bodies[0]
-        weight = read_inertial(body, XmlReport(report.file) if is_base else report, Notes() if is_base else notes)
-        look = read_look(body, materials, find_mesh, report, notes)
-        links.append(
-            SerialLink(
-                name=body.name,
-                mass=weight.mass,
-                com=weight.com,
-                inertia=weight.inertia,
-                mesh=look.mesh,
-                color=look.color,
-            )
-        )
+        inertial = read_inertial(body, XmlReport(report.file) if is_base else report, Notes() if is_base else notes)
+        links.append(SerialLink.of(body.name, inertial, read_look(body, materials, find_mesh, report, notes)))
     return tuple(links)
 
 

@@ -135,6 +135,8 @@ def _plain(word: str) -> float:
     return float(word) if _NUMBER.fullmatch(word) else 0.0
 
 
+DYNAMICS: Final = ("damping", "friction")
+"""What a URDF holds of a joint's dynamics, by the names of a robot file."""
 JOINT_TYPES: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 _EXPANDED: Final = ("link", "joint", "material")

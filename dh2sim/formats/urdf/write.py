@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from typing import Final
 
+from dh2sim.formats.urdf.tree import DYNAMICS
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.transforms import compose, identity, invert, pose_from_rpy, rpy_from_rotation
 from dh2sim.model.build import ModelLike, model_of
@@ -18,8 +18,6 @@ from dh2sim.typing import Array, read_only
 T_FLANGE_DHN = pose_from_rpy([0, 0, 0], [0, math.pi / 2, 0])
 """REP-199: x of the flange points out of it, as z of tool0 does; pose of the last DH frame in the flange."""
 T_DHN_FLANGE = invert(T_FLANGE_DHN)
-DYNAMICS: Final = ("damping", "friction")
-"""What a URDF holds of a joint's dynamics, by the same names."""
 
 
 def to_urdf(model: ModelLike, *, dh_frames: bool = True) -> str:
