@@ -13,7 +13,7 @@ _HOMES = {
     "Dh2simError": "errors",
     "Dynamics": "robot.spec",
     "Fixed": "robot_facade",
-    "ImportOptions": "importing.importing",
+    "ImportOptions": "importing.sources",
     "KinematicChain": "kinematics.chain",
     "Limits": "robot.spec",
     "LinkSpec": "robot.spec",
@@ -33,7 +33,7 @@ _HOMES = {
     "forward_kinematics": "kinematics.forward",
     "frame_poses": "kinematics.forward",
     "geometric_jacobian": "kinematics.forward",
-    "import_robot": "importing.importing",
+    "import_robot": "importing.sources",
     "load_robot": "robot.read",
     "parse_robot": "robot.read",
     "recover_table": "kinematics.frame_assignment.recover",
@@ -53,8 +53,8 @@ if TYPE_CHECKING:
     from dh2sim.formats.mjcf.write import to_mjcf as to_mjcf
     from dh2sim.formats.urdf.write import to_urdf as to_urdf
     from dh2sim.importing.convert import convert_robot as convert_robot
-    from dh2sim.importing.importing import ImportOptions as ImportOptions
-    from dh2sim.importing.importing import import_robot as import_robot
+    from dh2sim.importing.sources import ImportOptions as ImportOptions
+    from dh2sim.importing.sources import import_robot as import_robot
     from dh2sim.kinematics.chain import KinematicChain as KinematicChain
     from dh2sim.kinematics.chain import build_chain as build_chain
     from dh2sim.kinematics.forward import forward_kinematics as forward_kinematics

@@ -9,7 +9,10 @@ import difflib
 import functools
 import itertools
 from collections.abc import Iterable
-from typing import Final
+from enum import StrEnum
+from typing import Final, TypeVar
+
+from dh2sim.errors import Dh2simError
 
 _LONGEST_SHOWN: Final = 60
 _LONGEST_GUESSED: Final = 60
@@ -65,6 +68,21 @@ def _closest(name: str, known: tuple[str, ...]) -> str | None:
     folded = {candidate.casefold(): candidate for candidate in known}
     matches = difflib.get_close_matches(name, folded, n=1, cutoff=0.6)
     return folded[matches[0]] if matches else None
+
+
+Choice = TypeVar("Choice", bound=StrEnum)
+
+
+def member(kind: type[Choice], value: Choice | str, what: str) -> Choice:
+    """Return the member of an enumeration that a value names; ``what`` is its name for the message.
+
+    Raises:
+        Dh2simError: There is none.
+    """
+    for choice in kind:
+        if choice == value:
+            return choice
+    raise Dh2simError(f"unknown {what} {value!r}.{did_you_mean(str(value), kind)} Allowed: {listed(kind)}")
 
 
 class Notes:

@@ -8,17 +8,16 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.errors import ConfigurationError, Dh2simError, OutputError
-from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.errors import ConfigurationError, OutputError
+from dh2sim.messages import did_you_mean, listed, member, shown
 from dh2sim.robot.spec import (
     ActuatorSpec,
     AngleUnit,
@@ -42,13 +41,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from dh2sim.export import ExportReport, Format
-    from dh2sim.importing.importing import ImportOptions
+    from dh2sim.importing.sources import ImportOptions
     from dh2sim.kinematics.chain import KinematicChain
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.validate.report import RobotReport
     from dh2sim.view.server import Viewer
 
-Choice = TypeVar("Choice", bound=StrEnum)
 FilePath: TypeAlias = str | os.PathLike[str]
 PoseLike: TypeAlias = Pose | ArrayLike
 """A pose; or a position, m, shape (3,); or a homogeneous transform, shape (4, 4)."""
@@ -143,7 +141,7 @@ class Robot:
         Raises:
             Dh2simError: Something of it is wrong; the text says what and where.
         """
-        default = _member(Convention, convention, "convention")
+        default = member(Convention, convention, "convention")
         spec = RobotSpec(
             name=name,
             rows=tuple(_row(row, i, default) for i, row in enumerate(rows)),
@@ -206,14 +204,14 @@ class Robot:
         Raises:
             Dh2simError: The file is wrong or holds no serial arm; the text says what and where.
         """
-        from dh2sim.importing.importing import ImportOptions
+        from dh2sim.importing.sources import ImportOptions
 
         options = ImportOptions(
             base=base,
             tip=tip,
-            convention=_member(Convention, convention, "convention"),
+            convention=convention,
             tolerance=tolerance,
-            package_paths=tuple(Path(folder) for folder in package_paths),
+            package_paths=tuple(package_paths),
             name=name,
         )
         return cls._imported(path, options)
@@ -256,12 +254,12 @@ class Robot:
         Raises:
             Dh2simError: The table is wrong or says too little; the text says what and where.
         """
-        from dh2sim.importing.importing import ImportOptions
+        from dh2sim.importing.sources import ImportOptions
 
         options = ImportOptions(
-            convention=None if convention is None else _member(Convention, convention, "convention"),
-            angle=None if angle is None else _member(AngleUnit, angle, "angle"),
-            length=None if length is None else _member(LengthUnit, length, "length"),
+            convention=convention,
+            angle=angle,
+            length=length,
             tolerance=tolerance,
             name=name,
         )
@@ -269,9 +267,9 @@ class Robot:
 
     @classmethod
     def _imported(cls, path: FilePath, options: ImportOptions) -> Self:
-        from dh2sim.importing.importing import import_robot
+        from dh2sim.importing.sources import import_robot
 
-        imported = import_robot(Path(path), options)
+        imported = import_robot(path, options)
         return cls.from_spec(imported.spec, notes=imported.notes)
 
     @property
@@ -410,7 +408,7 @@ class Robot:
         """
         from dh2sim.export import Format, export_robot
 
-        wanted = list(dict.fromkeys(_member(Format, format_, "format") for format_ in formats))
+        wanted = list(dict.fromkeys(member(Format, format_, "format") for format_ in formats))
         return export_robot(self.model, Path(out), formats=wanted, dh_frames=dh_frames, verified=verify)
 
     def validate(self, *, samples: int = 1000, seed: int = 0, tolerance: float = 1e-12) -> RobotReport:
@@ -486,7 +484,7 @@ class Robot:
         """
         from dh2sim.importing.convert import convert_robot
 
-        converted = convert_robot(self.spec, _member(Convention, convention, "convention"))
+        converted = convert_robot(self.spec, member(Convention, convention, "convention"))
         return self.from_spec(converted.spec, notes=converted.notes)
 
     def save(self, path: FilePath, *, overwrite: bool = False) -> None:
@@ -562,7 +560,7 @@ def _row(row: TableRow | Row, index: int, convention: Convention) -> Row:
     return Row(
         name=f"joint_{index + 1}" if row.name is None else row.name,
         type=row.type,
-        convention=convention if own is None else _member(Convention, own, f"rows[{index}].convention"),
+        convention=convention if own is None else member(Convention, own, f"rows[{index}].convention"),
         a=row.a,
         alpha=row.alpha,
         d=row.d,
@@ -585,15 +583,3 @@ def _pose(pose: PoseLike) -> Pose:
 
         return Pose(xyz=read_only(array[:3, 3]), rpy=read_only(rpy_from_rotation(array[:3, :3])))
     return Pose(xyz=read_only(array))
-
-
-def _member(kind: type[Choice], value: Choice | str, what: str) -> Choice:
-    """Return the member of an enumeration that a value names.
-
-    Raises:
-        Dh2simError: There is none.
-    """
-    for member in kind:
-        if member == value:
-            return member
-    raise Dh2simError(f"unknown {what} {value!r}.{did_you_mean(str(value), kind)} Allowed: {listed(kind)}")

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim.importing.importing import import_robot
+from dh2sim.importing.sources import import_robot
 from dh2sim.typing import Array
 from scripts.imported_robots import check
 from scripts.real_arms.arm import Arm

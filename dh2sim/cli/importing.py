@@ -68,7 +68,7 @@ def import_robot(
       dh2sim import table.md --convention modified --angle deg -o arm.yaml
       dh2sim import - --convention standard < table.csv
     """
-    from dh2sim.importing.importing import STDIN, ImportOptions, import_data, read_file
+    from dh2sim.importing.sources import STDIN, ImportOptions, import_data, read_file
     from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
 
     require_free(out, force=force)
@@ -153,7 +153,7 @@ def frames(
       dh2sim frames axes.yaml
       dh2sim frames axes.yaml --explain -o arm.yaml
     """
-    from dh2sim.importing.importing import import_axes, read_file
+    from dh2sim.importing.sources import import_axes, read_file
     from dh2sim.robot.axes_file import read_axes
     from dh2sim.robot.spec import Convention
 

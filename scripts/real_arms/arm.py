@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from dh2sim.importing.importing import ImportOptions
+from dh2sim.importing.sources import ImportOptions
 from dh2sim.robot.spec import Convention
 from scripts.real_arms.packages import Package
 

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from dh2sim.importing.importing import import_robot
 from dh2sim.importing.result import Imported
+from dh2sim.importing.sources import import_robot
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
 from dh2sim.robot.spec import Convention, Row

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dh2sim.importing.explain import explanation
-from dh2sim.importing.importing import ImportOptions, import_data
 from dh2sim.importing.result import Imported
+from dh2sim.importing.sources import ImportOptions, import_data
 from dh2sim.kinematics.serial_chain import serial_link_poses
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
 from dh2sim.typing import Array

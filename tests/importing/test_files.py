@@ -11,8 +11,8 @@ import pytest
 
 from dh2sim.errors import Dh2simError, ImportedFileError, MismatchError
 from dh2sim.importing import serial
-from dh2sim.importing.importing import ImportOptions, import_data, import_robot
 from dh2sim.importing.serial import assemble
+from dh2sim.importing.sources import ImportOptions, import_data, import_robot
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import AngleUnit, Convention, RobotSpec
 
@@ -111,12 +111,12 @@ def test_a_table_is_a_table(tmp_path: Path) -> None:
     [
         (
             "<sdf version='1.9'/>",
-            "arm.urdf: a file of <sdf> is not read. Read are URDF (<robot>), MJCF (<mujoco>), and tables in "
+            "arm.urdf: a file of <sdf> cannot be imported. Allowed: URDF (<robot>), MJCF (<mujoco>), and tables in "
             "Markdown, CSV or TSV. Convert it to URDF first.",
         ),
         (
             "<html><body/></html>",
-            "arm.urdf: a file of <html> is not read. Read are URDF (<robot>), MJCF (<mujoco>), and tables in "
+            "arm.urdf: a file of <html> cannot be imported. Allowed: URDF (<robot>), MJCF (<mujoco>), and tables in "
             "Markdown, CSV or TSV.",
         ),
     ],
@@ -160,6 +160,16 @@ def test_a_file_in_another_encoding_is_read_or_refused_as_what_it_is() -> None:
         assert import_data(utf16, "arm.urdf", ImportOptions()).spec.name == "two_arm"
     except ImportedFileError as error:
         assert str(error).startswith("arm.urdf:1:1: ")  # noqa: PT017
+
+
+def test_options_may_be_strings_and_unknown_ones_are_refused() -> None:
+    options = ImportOptions(convention="modified", tip="fore")
+    assert import_data(ARM.encode(), "arm.urdf", options).spec.convention is Convention.MODIFIED
+    with pytest.raises(Dh2simError) as caught:
+        import_data(b"theta,d,a,alpha\nq1,0,1,0\n", "t.csv", ImportOptions(convention="standrad", length="m"))
+    assert str(caught.value) == (
+        "unknown convention 'standrad'. Did you mean 'standard'? Allowed: standard, modified, hayati"
+    )
 
 
 def test_a_residual_above_the_tolerance_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,8 +14,8 @@ from dh2sim.draw.frame_figure.robot import ring_around
 from dh2sim.draw.frame_figure.scene import make_scene
 from dh2sim.draw.frame_figure.view import best_view, look_from
 from dh2sim.errors import OutputError, PictureError
-from dh2sim.importing.importing import ImportOptions, import_axes, import_data
 from dh2sim.importing.result import Imported
+from dh2sim.importing.sources import ImportOptions, import_axes, import_data
 from dh2sim.robot.axes_file import read_axes
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, Limits
 from dh2sim.typing import Array

@@ -16,8 +16,8 @@ import pinocchio as pin
 import pytest
 
 from dh2sim.formats.urdf.write import to_urdf
-from dh2sim.importing.importing import ImportOptions, import_robot
 from dh2sim.importing.result import Imported
+from dh2sim.importing.sources import ImportOptions, import_robot
 from dh2sim.model.build import build_model
 from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import Convention, RobotSpec

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import to_urdf
-from dh2sim.importing.importing import ImportOptions, import_robot
+from dh2sim.importing.sources import ImportOptions, import_robot
 from dh2sim.kinematics.forward import joint_poses
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from dh2sim.importing.importing import import_table
+from dh2sim.importing.sources import import_table
 from dh2sim.robot.spec import Convention
 
 ROUNDED = b"theta,d (m),a (m),alpha (rad)\nq1,0.4,0,-1.571\nq2,0.15000004,0.3,0.5\n"

@@ -1,9 +1,4 @@
-"""Files of other formats to robot files: which reader a file needs, and what it is given.
-
-Tables as people write them to robot files.
-
-Joint axes, as a file of axes gives them, to robot files.
-"""
+"""Robot files from other sources: a URDF, an MJCF, a table as people write it, or joint axes."""
 
 from __future__ import annotations
 
@@ -27,6 +22,7 @@ from dh2sim.kinematics.frame_assignment.result import Tolerances
 from dh2sim.kinematics.frame_assignment.rounding import simple_angle, simple_length
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import pose_from_rpy
+from dh2sim.messages import Choice, member
 from dh2sim.robot.axes_file import AxesSpec
 from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
@@ -50,15 +46,15 @@ def import_table(
     Args:
         data: The file's content.
         file: Its name, for messages and for the robot's name; '-' for standard input.
-        convention: That the table is in, where it does not say.
+        convention: Of the table, where it does not say.
         angle: Unit of its angles, where it does not say.
         length: Unit of its lengths, where it does not say.
         name: Of the robot.
         tolerance: Where it is greater than the default, numbers within it of a simple one are made simple, rad and m.
-        folder: Where the robot file will stand.
+        folder: Of the robot file, to which paths of meshes are relative.
 
     Raises:
-        ImportedFileError: The table is wrong, or says too little.
+        ImportedFileError: The table is wrong, or leaves open what has to be known.
     """
     own_name = robot_name(Path(file).stem if name is None else name)
     read = read_table(data, file=file, name=own_name, convention=convention, angle=angle, length=length)
@@ -107,8 +103,8 @@ def import_axes(
         axes: As read from their file.
         convention: Of the table; by default the file's, or else standard.
         tolerance: Greatest residual, rad, and m for a reach of up to 1 m, then of the reach.
-        explain: Whether every step is told at the head of the robot file.
-        folder: Where the robot file will stand.
+        explain: Whether to explain every step at the top of the robot file.
+        folder: Of the robot file, to which paths of meshes are relative.
 
     Raises:
         MismatchError: The residual is above the tolerance.
@@ -129,9 +125,9 @@ def import_axes(
 
 
 def serial_robot(axes: AxesSpec) -> SerialRobot:
-    """Return the robot that joint axes describe; every link's frame stands on its axis, turned like base_link.
+    """Return the robot that joint axes describe; every link's frame is on its axis, turned like base_link.
 
-    A sliding joint without a point stands where the joint before it does.
+    A sliding joint without a point is where the joint before it is.
     """
     joints = []
     place = np.zeros(3)
@@ -176,21 +172,21 @@ _HIDDEN = re.compile(rb"<\?.*?\?>|<!--.*?-->|<![^>]*>", re.DOTALL)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportOptions:
-    """What an import is asked for."""
+    """Which part of a file to import, and how."""
 
     base: str | None = None
     """Link or body that becomes base_link; by default the root."""
     tip: str | None = None
     """Link, body or site that becomes tool0; by default where the arm ends."""
-    convention: Convention | None = None
-    """Of the table to make (default standard), or that a table to read is in."""
-    angle: AngleUnit | None = None
-    """Of a table's angles, where the table does not say."""
-    length: LengthUnit | None = None
-    """Of a table's lengths, where the table does not say."""
+    convention: Convention | str | None = None
+    """Of the table to make (default standard), or of the table to read where it does not say."""
+    angle: AngleUnit | str | None = None
+    """Unit of a table's angles, where the table does not say."""
+    length: LengthUnit | str | None = None
+    """Unit of a table's lengths, where the table does not say."""
     tolerance: float = TOLERANCE
     """Greatest residual, rad, and m for a reach of up to 1 m, then of the reach."""
-    package_paths: Sequence[Path] = ()
+    package_paths: Sequence[str | os.PathLike[str]] = ()
     """Folders in which ``package://`` is looked for first."""
     name: str | None = None
     """Of the robot, instead of the file's."""
@@ -203,11 +199,11 @@ def import_robot(
 
     Args:
         path: The file; its content says what it is.
-        options: What is asked for.
-        folder: Where the robot file will stand, which paths of meshes are relative to; by default they are absolute.
+        options: Which part of it, and how.
+        folder: Of the robot file, to which paths of meshes are relative; by default they are absolute.
 
     Raises:
-        ImportedFileError: The file is wrong, or says too little.
+        ImportedFileError: The file is wrong, or leaves open what has to be known.
         MismatchError: The table that was made is not the file's kinematics to within the tolerance.
         Dh2simError: The file cannot be read, or is of another format.
     """
@@ -232,7 +228,7 @@ def read_file(path: Path) -> bytes:
 
 
 def import_data(data: bytes, file: str, options: ImportOptions, *, folder: Path | None = None) -> Imported:
-    """As ``import_robot``, for content that was read already; ``file`` is its path, or '-' for standard input."""
+    """Import content that was read already, as ``import_robot``; ``file`` is its path, or '-' for standard input."""
     root = _root_element(data)
     match root:
         case "robot":
@@ -244,8 +240,8 @@ def import_data(data: bytes, file: str, options: ImportOptions, *, folder: Path 
         case _:
             hint = " Convert it to URDF first." if root == "sdf" else ""
             raise Dh2simError(
-                f"{file}: a file of <{root}> is not read. Read are URDF (<robot>), MJCF (<mujoco>), and tables in "
-                f"Markdown, CSV or TSV.{hint}"
+                f"{file}: a file of <{root}> cannot be imported. Allowed: URDF (<robot>), MJCF (<mujoco>), and "
+                f"tables in Markdown, CSV or TSV.{hint}"
             )
 
 
@@ -266,7 +262,7 @@ def _read_urdf(data: bytes, file: str, options: ImportOptions) -> SerialRobot:
 
     _refuse_units(file, "URDF", options)
     directory = Path.cwd() if file == STDIN else Path(file).parent
-    find_mesh = mesh_finder(directory, options.package_paths)
+    find_mesh = mesh_finder(directory, [Path(folder) for folder in options.package_paths])
     return read_urdf(data, file=file, base=options.base, tip=options.tip, find_mesh=find_mesh)
 
 
@@ -287,7 +283,7 @@ def _refuse_units(file: str, kind: str, options: ImportOptions) -> None:
 def _serial(robot: SerialRobot, data: bytes, options: ImportOptions, folder: Path | None) -> Imported:
     return import_serial(
         robot,
-        convention=options.convention or Convention.STANDARD,
+        convention=_choice(Convention, options.convention, "convention") or Convention.STANDARD,
         tolerance=options.tolerance,
         folder=folder,
         name=options.name,
@@ -295,8 +291,11 @@ def _serial(robot: SerialRobot, data: bytes, options: ImportOptions, folder: Pat
     )
 
 
-def _table(data: bytes, file: str, options: ImportOptions, folder: Path | None) -> Imported:
+def _choice(kind: type[Choice], value: Choice | str | None, what: str) -> Choice | None:
+    return None if value is None else member(kind, value, what)
 
+
+def _table(data: bytes, file: str, options: ImportOptions, folder: Path | None) -> Imported:
     if options.base is not None or options.tip is not None:
         raise Dh2simError(
             f"{file}: base and tip are links of a URDF or an MJCF; this is read as a table, without links"
@@ -304,9 +303,9 @@ def _table(data: bytes, file: str, options: ImportOptions, folder: Path | None) 
     return import_table(
         data,
         file=file,
-        convention=options.convention,
-        angle=options.angle,
-        length=options.length,
+        convention=_choice(Convention, options.convention, "convention"),
+        angle=_choice(AngleUnit, options.angle, "angle"),
+        length=_choice(LengthUnit, options.length, "length"),
         name=options.name,
         tolerance=options.tolerance,
         folder=folder,
