@@ -1,4 +1,4 @@
-"""Where the mesh files of a URDF are: ``package://`` and other names turned into paths."""
+"""Paths of a URDF's mesh files: ``package://`` and other names resolved."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Final, TypeAlias
 from urllib.parse import unquote
 
 FindMesh: TypeAlias = Callable[[str], Path | None]
-"""Returns the file that a mesh name stands for, or None."""
+"""Returns the file of a mesh name, or None."""
 
 _PACKAGES: Final = ("package://", "model://")
-_MOST_FOLDERS: Final = 1000
-"""Looked into for a package one level further down: a workspace groups packages in repositories."""
+_MAX_FOLDERS: Final = 1000
+"""Searched for a package one level further down: a workspace groups packages in repositories."""
 
 
 def mesh_finder(directory: Path, package_paths: Sequence[Path] = ()) -> FindMesh:
@@ -38,7 +38,7 @@ def mesh_finder(directory: Path, package_paths: Sequence[Path] = ()) -> FindMesh
     def find(uri: str) -> Path | None:
         try:
             return _find(uri)
-        except (OSError, ValueError):  # a name that no file can have, or a folder that cannot be read
+        except (OSError, ValueError):  # an impossible file name, or a folder that cannot be read
             return None
 
     def _find(uri: str) -> Path | None:
@@ -58,7 +58,7 @@ def mesh_finder(directory: Path, package_paths: Sequence[Path] = ()) -> FindMesh
 
 
 def _spellings(name: str) -> Sequence[str]:
-    """A path as it is, and with ``%20`` and the like replaced."""
+    """Return a path as it is, and with ``%20`` and the like replaced."""
     return list(dict.fromkeys((name, unquote(name))))
 
 
@@ -67,7 +67,7 @@ def _first(paths: Iterator[Path] | Sequence[Path]) -> Path | None:
 
 
 def _environment() -> list[Path]:
-    """The folders of packages that ROS 1 and ROS 2 are told of."""
+    """Return the folders of packages in the environment variables of ROS 1 and ROS 2."""
     ros_1 = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
     ros_2 = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     paths = [Path(path) for path in ros_1 if path] + [Path(path, "share") for path in ros_2 if path]
@@ -75,7 +75,7 @@ def _environment() -> list[Path]:
 
 
 def _folders(package: str, roots: Sequence[Path], home: Path) -> Iterator[Path]:
-    """Folders that may be the package, the likeliest first."""
+    """Yield folders that may be the package, the likeliest first."""
     for root in roots:
         yield from _in(root, package)
         yield from (folder / package for folder in _subfolders(root) if (folder / package).is_dir())
@@ -94,7 +94,7 @@ def _subfolders(root: Path) -> list[Path]:
     try:
         with os.scandir(root) as entries:
             names = sorted(
-                entry.name for entry, _ in zip(entries, range(_MOST_FOLDERS), strict=False) if entry.is_dir()
+                entry.name for entry, _ in zip(entries, range(_MAX_FOLDERS), strict=False) if entry.is_dir()
             )
     except OSError:
         return []

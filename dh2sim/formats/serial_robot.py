@@ -16,7 +16,7 @@ from dh2sim.robot.spec import ActuatorSpec, Dynamics, Limits
 from dh2sim.typing import Array, read_only
 
 GREATEST: Final = 1e30
-"""Of any number in a file: products of a few such still fit a double."""
+"""Of any number in a file: a product of a few of them is still a finite double."""
 _SAME_SCALE: Final = 1e-6
 """By which the three scales of a mesh may differ, relative to the greatest."""
 Color: TypeAlias = tuple[float, float, float, float]
@@ -39,7 +39,7 @@ class SerialMesh:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Inertial:
-    """Mass properties as far as they are known, in a link of the arm; None where the file says nothing of use."""
+    """Mass properties as far as they are known, in a link of the arm; None where the file does not give them."""
 
     mass: float | None = None
     """kg, greater than 0."""
@@ -51,7 +51,7 @@ class Inertial:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Look:
-    """How a link looks; None where nothing of the file can be carried over."""
+    """The appearance of a link; None where nothing of the file can be carried over."""
 
     mesh: SerialMesh | None = None
     color: Color | None = None
@@ -59,7 +59,7 @@ class Look:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SerialLink:
-    """A link of the chain, with everything that is fixed to it; None where the file says nothing."""
+    """A link of the chain, with everything that is fixed to it; None where the file does not give it."""
 
     name: str
     """As in the file."""
@@ -87,7 +87,7 @@ class SerialLink:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ChainJoints:
-    """The moving joints of an arm, and what the file says of each."""
+    """The moving joints of an arm, with the limits and the dynamics of each."""
 
     chain: SerialChain
     limits: tuple[Limits, ...]
@@ -99,13 +99,13 @@ class SerialRobot:
     """A serial robot as a file of another format describes it; SI units."""
 
     name: str
-    """As in the file; it need not be a name that a robot file allows."""
+    """As in the file; a robot file may not allow it."""
     description: str
     """Such as ``URDF panda.urdf, from panda_link0 to panda_link8``."""
     chain: SerialChain
     """Starts in the base's frame, ends in the tip's."""
     base: SerialLink
-    """The base; its mass is not used by a robot file."""
+    """The base; a robot file has no place for its mass."""
     links: tuple[SerialLink, ...]
     """One for every joint of the chain: the link that it carries, in the frame of ``SerialJoint.T_parent_link``."""
     limits: tuple[Limits, ...]
@@ -113,7 +113,7 @@ class SerialRobot:
     dynamics: tuple[Dynamics, ...]
     """One for every joint."""
     actuators: tuple[ActuatorSpec, ...] | None = None
-    """One for every joint; None where the format says nothing of actuators."""
+    """One for every joint; None where the format has no actuators."""
     gravity: Array = field(default_factory=lambda: read_only([0, 0, -9.81]))
     """m/s² in the base's frame, shape (3,)."""
     configurations: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
@@ -126,7 +126,7 @@ def possible_inertial(whole: MassProperties, name: str, notes: Notes) -> Inertia
     """Return the mass properties of a link; an inertia that no body can have is noted and left out."""
     if is_possible(whole.inertia):
         return Inertial(mass=whole.mass, com=whole.com, inertia=whole.inertia)
-    notes.group("An inertia that no body has is left out, of links {}.", name)
+    notes.group("Impossible inertias are left out, of links {}.", name)
     return Inertial(mass=whole.mass, com=whole.com)
 
 

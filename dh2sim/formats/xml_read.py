@@ -1,6 +1,6 @@
-"""XML that somebody else wrote, as an immutable tree of elements that know their line and column.
+"""XML from outside as an immutable tree of elements that know their line and column.
 
-On expat itself, because the tree builders of the standard library forget where an element stood. Nothing outside the
+Uses expat itself, because the tree builders of the standard library forget where an element was. Nothing outside the
 text is ever opened, and nothing in it is expanded: a document type that declares anything is refused.
 """
 
@@ -27,7 +27,7 @@ MAX_ATTRIBUTE: Final = 1_000_000
 MAX_PROLOG: Final = 1_000_000
 """Bytes before the first element."""
 MAX_PROBLEMS: Final = 100
-"""Problems told of one file."""
+"""Problems reported of one file."""
 
 ENCODINGS: Final = ("utf-8", "us-ascii", "iso-8859-1", "utf-16", "utf-16le", "utf-16be", "windows-1252")
 
@@ -68,7 +68,7 @@ class XmlReport:
     """Collects the problems of one XML file."""
 
     def __init__(self, file: str) -> None:
-        """Start with none; ``file`` is the name that messages begin with."""
+        """Start with none; ``file`` is the name in messages."""
         self.file = file
         self.problems: list[Problem] = []
 
@@ -79,7 +79,7 @@ class XmlReport:
         )
 
     def guess(self, name: str, known: Iterable[str]) -> str:
-        """Return ``" Did you mean 'x'?"`` or nothing, which it is where nobody will read it."""
+        """Return ``" Did you mean 'x'?"``; empty where there is no guess, or too many problems to show it."""
         return did_you_mean(name, known) if len(self.problems) < MAX_PROBLEMS else ""
 
     def check(self) -> None:
@@ -93,7 +93,7 @@ class XmlReport:
         return self._error()
 
     def _error(self) -> ImportedFileError:
-        """All problems, each told once; of very many the first in the file."""
+        """Return all problems, each of them once; of very many the first in the file."""
         problems = sorted(dict.fromkeys(self.problems))
         if len(problems) > MAX_PROBLEMS:
             more = f"... and {len(problems) - MAX_PROBLEMS} more problems"
@@ -136,14 +136,14 @@ def _feed(builder: _Builder, data: bytes) -> None:
     fed = 0
     while not builder.began and fed < len(data):
         if fed >= MAX_PROLOG:
-            raise _RefusedError(1, 1, f"no element begins in the first {MAX_PROLOG} bytes")
+            raise _RefusedError(1, 1, f"no element in the first {MAX_PROLOG} bytes")
         builder.parser.Parse(data[fed : fed + _PIECE], False)
         fed += _PIECE
     builder.parser.Parse(data[fed:], True)
 
 
 class _RefusedError(Exception):
-    """The file is refused for what stands at a place."""
+    """The file is refused for something at a place."""
 
     def __init__(self, line: int, column: int, message: str) -> None:
         super().__init__(message)
@@ -223,7 +223,7 @@ class _Builder:
 
 
 def _not_utf_8(builder: _Builder, data: bytes) -> str | None:
-    """Say what is wrong where expat's "invalid token" means a byte of another encoding, else None."""
+    """Return the message where expat's "invalid token" means a byte of another encoding, else None."""
     if (builder.encoding or "utf-8").lower() != "utf-8" or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return None
     at = builder.parser.ErrorByteIndex
@@ -241,6 +241,6 @@ def _error(file: str, line: int, column: int, message: str) -> ImportedFileError
 
 
 def place(tag: str, name: str) -> str:
-    """Return how the path of a problem begins, such as ``joint[elbow]``."""
+    """Return the start of the path of a problem, such as ``joint[elbow]``."""
     plain = name.isprintable() and 0 < len(name) <= 60
     return f"{tag}[{name if plain else shown(name)}]"

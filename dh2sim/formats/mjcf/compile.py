@@ -1,8 +1,6 @@
-"""An MJCF compiled by MuJoCo itself, also where meshes and other files that only show the robot are missing.
+"""An MJCF compiled by MuJoCo itself, even if meshes and other files that only show the robot are missing.
 
-What an MJCF takes from other files than XML: meshes, height fields, pictures; and how to do without them.
-
-Works on MuJoCo's ``MjSpec``, the model before it is compiled.
+Missing meshes, height fields and pictures are removed from MuJoCo's ``MjSpec``, the model before it is compiled.
 """
 
 from __future__ import annotations
@@ -28,7 +26,7 @@ if TYPE_CHECKING:
 MAX_ASSET_BYTES: Final = 500_000_000
 """Of a mesh or a height field; a larger file counts as missing."""
 _BALL: Final = 0.01
-"""Radius of what stands for a geom without its mesh, m."""
+"""Radius of the ball that replaces a geom without its mesh, m."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,11 +46,11 @@ class MeshFile:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Lost:
-    """What a model lacks because files are missing; its elements have numbers only once it is compiled."""
+class MissingParts:
+    """What a model lacks because files are missing; elements are numbered only once it is compiled."""
 
     geoms: tuple[tuple[Any, str], ...]
-    """Geoms, and the names of their files; a ball stands for each."""
+    """Geoms, and the names of their files; a ball replaces each."""
     masses: tuple[Any, ...]
     """Bodies whose mass would come from such geoms."""
 
@@ -79,7 +77,7 @@ def find_assets(spec: Any, files: MjcfFiles) -> Assets:
 
 
 def _found(asset: Any, spec: Any, files: MjcfFiles) -> Path | None:
-    """Return the file of an asset; which of the models that attach one another names it, MuJoCo does not tell."""
+    """Return the file of an asset; MuJoCo does not say which of several attached models names it."""
     name = asset.file.replace("\\", "/")
     if spec.strippath:
         name = name.rpartition("/")[2]
@@ -111,7 +109,7 @@ def mesh_files(spec: Any, assets: Assets) -> dict[int, MeshFile]:
 
 
 def drop_pictures(spec: Any) -> None:
-    """Remove textures, skins and keyframes: nothing of a serial arm needs them, and their files may be missing."""
+    """Remove textures, skins and keyframes: a serial arm does not need them, and their files may be missing."""
     for texture in list(spec.textures):
         spec.delete(texture)
     for material in spec.materials:
@@ -121,15 +119,15 @@ def drop_pictures(spec: Any) -> None:
     spec.nkey = 0
 
 
-def drop_files(spec: Any, assets: Assets, *, all_files: bool) -> Lost:
-    """Remove the meshes and height fields whose files are missing; a ball takes the place of each of their geoms.
+def drop_files(spec: Any, assets: Assets, *, all_files: bool) -> MissingParts:
+    """Remove the meshes and height fields whose files are missing; a ball replaces each of their geoms.
 
-    A geom that would give its body mass becomes a ball of 1 kg, so that MuJoCo does not complain of a body without.
+    A geom that would give its body mass becomes a ball of 1 kg, so that MuJoCo accepts the body.
 
     Args:
         spec: The model, not compiled yet.
         assets: Its files.
-        all_files: Whether to remove those whose files are there, too.
+        all_files: Whether to remove those whose files exist, too.
     """
     import mujoco
 
@@ -157,7 +155,7 @@ def drop_files(spec: Any, assets: Assets, *, all_files: bool) -> Lost:
     _delete(spec, spec.hfields, fields)
     if masses and spec.compiler.settotalmass > 0.0:  # all are scaled by the sum
         masses = [body for body in spec.bodies if body.name != "world"]
-    return Lost(geoms=tuple(geoms), masses=tuple(masses))
+    return MissingParts(geoms=tuple(geoms), masses=tuple(masses))
 
 
 def _delete(spec: Any, assets: Iterable[Any], names: set[str]) -> None:
@@ -193,26 +191,26 @@ class Compiled:
     mesh_files: Mapping[int, MeshFile]
     """By the number of the mesh."""
     lost_geoms: Mapping[int, str]
-    """Geoms whose file was not used, by number, with the file's name; a ball stands for each."""
+    """Geoms whose file was not used, by number, with the file's name; a ball replaces each."""
     meshes_refused: bool
-    """Whether MuJoCo could not use files that are there, so that none was used."""
+    """Whether MuJoCo could not use files that exist, so that none was used."""
     unknown_masses: frozenset[int]
     """Bodies whose mass would come from such geoms."""
     unknown_damping: frozenset[int]
-    """Joints whose damping and stiffness MuJoCo computes from masses, where masses are not known."""
+    """Joints whose damping and stiffness MuJoCo computes from masses, where masses are unknown."""
     unknown_kv: frozenset[int]
     """Actuators, likewise."""
     keyframes: tuple[str, ...]
 
 
 def compile_mjcf(files: MjcfFiles, notes: Notes) -> Compiled:
-    """Let MuJoCo read and compile a model.
+    """Read and compile a model with MuJoCo.
 
-    Textures, skins and keyframes are left out. Meshes and height fields whose files are missing are too; where
-    MuJoCo cannot use a file that is there, all are.
+    Textures, skins and keyframes are left out, and so are meshes and height fields whose files are missing; all of
+    them are where MuJoCo cannot use a file that exists.
 
     Args:
-        files: The model's files, looked through.
+        files: The model's files, scanned.
         notes: Takes MuJoCo's warnings.
 
     Raises:
@@ -231,7 +229,7 @@ def compile_mjcf(files: MjcfFiles, notes: Notes) -> Compiled:
             compiled = _compiled(_parsed(files), assets, all_files=True)
         except Exception:
             raise _refused(files, reason) from None
-        notes.add(f"MuJoCo cannot use the model's meshes, so that none was used: {_told(reason)[0]}.")
+        notes.add(f"MuJoCo cannot use the model's meshes, so that none was used: {_mujoco_message(reason)[0]}.")
         return compiled
 
 
@@ -244,7 +242,7 @@ def _parsed(files: MjcfFiles) -> Any:
         raise _refused(files, error) from None
     spec.compiler.fusestatic = False
     spec.compiler.discardvisual = False
-    # what only costs memory or time
+    # settings that only cost memory or time
     spec.compiler.LRopt.mode = mujoco.mjtLRMode.mjLRMODE_NONE
     spec.memory = spec.nstack = spec.njmax = spec.nconmax = -1
     spec.nuserdata = 0
@@ -258,7 +256,7 @@ def _compiled(spec: Any, assets: Assets, *, all_files: bool) -> Compiled:
     drop_pictures(spec)
     lost = drop_files(spec, assets, all_files=all_files)
     springs = [joint for joint in spec.joints if min(joint.springdamper) > 0.0] if lost.masses else []
-    # a damping ratio stands in place of a negative gain
+    # a positive number in place of the negative gain is a damping ratio
     servos = [servo for servo in spec.actuators if servo.biasprm[2] > 0.0] if lost.masses else []
     model = spec.compile()
     return Compiled(
@@ -275,8 +273,8 @@ def _compiled(spec: Any, assets: Assets, *, all_files: bool) -> Compiled:
 
 
 def _refused(files: MjcfFiles, error: Exception) -> ImportedFileError:
-    """MuJoCo's complaint, with its line where that is one of the file itself; what is included has line 0."""
-    message, line = _told(error)
+    """Return MuJoCo's error, with its line where that is one of the file itself; included files have line 0."""
+    message, line = _mujoco_message(error)
     if line and files.models > 1:
         message, line = f"{message} (line {line}, of this model or of one that it attaches)", 0
     problem = Problem(
@@ -285,8 +283,8 @@ def _refused(files: MjcfFiles, error: Exception) -> ImportedFileError:
     return ImportedFileError([problem])
 
 
-def _told(error: Exception) -> tuple[str, int]:
-    """MuJoCo's words in one line, and the line that they name or 0."""
+def _mujoco_message(error: Exception) -> tuple[str, int]:
+    """Return MuJoCo's message in one line, and the line that it names or 0."""
     text = str(error)
     found = _LINE.search(text)
     parts = [" ".join(_NOISE.sub("", _LINE.sub("", part)).split()) for part in text.splitlines()]
@@ -297,18 +295,18 @@ def _told(error: Exception) -> tuple[str, int]:
 
 @contextmanager
 def _warnings_noted(notes: Notes) -> Iterator[None]:
-    """Make notes of MuJoCo's warnings, which it would print, or append to a file in the current folder."""
+    """Note MuJoCo's warnings, which it would print, or append to a file in the current folder."""
     import mujoco
 
     before = mujoco.get_mju_user_warning()
-    told: list[str] = []
-    mujoco.set_mju_user_warning(told.append)
+    messages: list[str] = []
+    mujoco.set_mju_user_warning(messages.append)
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             yield
-        told += [str(warning.message) for warning in caught]
+        messages += [str(warning.message) for warning in caught]
     finally:
         mujoco.set_mju_user_warning(before)
-    for text in dict.fromkeys(told):
+    for text in dict.fromkeys(messages):
         notes.add(f"MuJoCo warns: {' '.join(text.split()).rstrip('.')}.")

@@ -1,7 +1,4 @@
-"""The files that an MJCF is made of, looked through before MuJoCo opens any: it includes files, and repeats parts.
-
-The bytes of an MJCF, or of a file that it includes.
-"""
+"""The files of an MJCF, scanned before MuJoCo opens any: which files it includes, and how large it becomes."""
 
 from __future__ import annotations
 
@@ -32,7 +29,7 @@ def read_utf_8(path: Path, name: str, before: int) -> bytes:
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
-            raise Dh2simError(f"{name}: is not a file that can be read")
+            raise Dh2simError(f"{name}: not a regular file")
         with path.open("rb") as stream:
             data = stream.read(max(MAX_BYTES - before, 0) + 1)
     except (OSError, ValueError) as error:
@@ -59,17 +56,17 @@ def refused(file: str, line: int, message: str) -> ImportedFileError:
     return ImportedFileError([Problem(file=file, line=line, column=1, path="", message=message)])
 
 
-MOST_FILES: Final = 200
-MOST_ELEMENTS: Final = 200_000
-"""Once includes, attachments and repetitions are carried out."""
-MOST_NESTED: Final = 510
+MAX_FILES: Final = 200
+MAX_ELEMENTS: Final = 200_000
+"""After includes, attachments and repetitions."""
+MAX_NESTING: Final = 510
 """Elements, through all includes. MuJoCo's own limit in one file is 500."""
-MOST_MODELS: Final = 10
+MAX_MODELS: Final = 10
 """Models that are attached to one another."""
 
 
 class Place(NamedTuple):
-    """Where an element stands."""
+    """Where an element is."""
 
     file: str
     """As messages call it."""
@@ -79,18 +76,18 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MjcfFiles:
-    """An MJCF and all that it includes, found harmless."""
+    """An MJCF and all that it includes, scanned and found harmless."""
 
     path: Path
     """The file itself, absolute."""
     file: str
     """What messages call it."""
     folders: tuple[Path, ...]
-    """Where it and every model that it attaches stand; their meshes are looked for from there."""
+    """Of the file and of every model that it attaches; their meshes are looked for from there."""
     models: int
     """Number of models: the file itself and those that are attached."""
     places: Mapping[tuple[str, str], Place] = field(repr=False)
-    """Where the element of a tag and a name stands."""
+    """Of elements, by tag and name."""
 
     def error(self, message: str, *, path: str = "", element: tuple[str, str] | None = None) -> ImportedFileError:
         """Return an error at an element, given by tag and name, or at the file's beginning."""
@@ -102,7 +99,7 @@ class MjcfFiles:
         return Problem(file=place.file, line=place.line, column=place.column, path=path, message=message)
 
 
-def look_through(path: Path, *, file: str) -> MjcfFiles:
+def scan_files(path: Path, *, file: str) -> MjcfFiles:
     """Read an MJCF and the files that it includes or attaches, without MuJoCo.
 
     Args:
@@ -110,7 +107,7 @@ def look_through(path: Path, *, file: str) -> MjcfFiles:
         file: Its name, for messages.
 
     Raises:
-        ImportedFileError: No MJCF; a file outside the folder of the model is included; a plugin is asked for; or
+        ImportedFileError: Not an MJCF; a file outside the folder of the model is included; a plugin is requested; or
             the whole is larger than the limits above.
         Dh2simError: A file cannot be read.
     """
@@ -127,7 +124,7 @@ def look_through(path: Path, *, file: str) -> MjcfFiles:
 
 
 class _Search:
-    """What is known of the files of all models so far."""
+    """The files of all models so far."""
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -149,7 +146,7 @@ class _Search:
         if root.tag != "mujoco":
             what = ": this is a URDF, not an MJCF" if root.tag == "robot" else ""
             raise XmlReport(name).failure(root, "", f"expected <mujoco>, found <{root.tag[:60]}>{what}")
-        self._counts[path] = _Model(self, path, name).carried_out(root)
+        self._counts[path] = _Model(self, path, name).expanded_size(root)
         self._open.pop()
         return self._counts[path]
 
@@ -158,21 +155,21 @@ class _Search:
         """Number of models."""
         return len(self._counts)
 
-    def may_attach(self, path: Path) -> str | None:
-        """Return why a model must not be attached to those that are being gone through, or None."""
+    def attach_problem(self, path: Path) -> str | None:
+        """Return why a model must not be attached to those that are being scanned, or None."""
         if path in self._open:
             return "a model cannot be attached to itself"
-        return f"models are attached more than {MOST_MODELS} deep" if len(self._open) > MOST_MODELS else None
+        return f"models are attached more than {MAX_MODELS} deep" if len(self._open) > MAX_MODELS else None
 
     def tree(self, path: Path, name: str) -> Element:
-        """Return the root element of a file, and remember where its named elements stand."""
+        """Return the root element of a file, and record the places of its named elements."""
         if path in self.trees:
             return self.trees[path]
         data = read_utf_8(path, name, self._bytes)
         self._bytes += len(data)
         root = self.trees[path] = parse_xml(data, file=name)
-        if len(self.trees) > MOST_FILES:
-            raise refused(self.file, 1, f"the model is made of more than {MOST_FILES} files")
+        if len(self.trees) > MAX_FILES:
+            raise refused(self.file, 1, f"the model is made of more than {MAX_FILES} files")
         for element in root.walk():
             tag, own = element.tag, element.attributes.get("name", "")
             if own:
@@ -192,7 +189,7 @@ class _Model:
         self._attached: dict[str, int] = {}
         self._here = (path.parent, XmlReport(name))
 
-    def carried_out(self, root: Element) -> int:
+    def expanded_size(self, root: Element) -> int:
         """Return the number of elements that MuJoCo makes of the model."""
         self._count(root)  # models may be attached before they are named
         self._included.clear()
@@ -200,12 +197,12 @@ class _Model:
 
     def _count(self, element: Element) -> int:
         self._search.nested += 1
-        if self._search.nested > MOST_NESTED:
-            raise self._failure(element, f"elements are nested more than {MOST_NESTED} deep")
+        if self._search.nested > MAX_NESTING:
+            raise self._failure(element, f"elements are nested more than {MAX_NESTING} deep")
         total = _own_count(element)
         match element.tag:
             case "plugin":
-                message = "<plugin> is refused: no plugin is run. Remove it and what needs it, and import again"
+                message = "<plugin> is refused: plugins are never run. Remove it and what needs it, and import again"
                 raise self._failure(element, message)
             case "include":
                 total += self._include(element)
@@ -219,8 +216,8 @@ class _Model:
             total += self._count(child)
         if element.tag == "replicate":
             total *= max(1, _whole(element.attributes.get("count", "1")))
-        if total > MOST_ELEMENTS:
-            raise self._failure(element, f"this makes more than {MOST_ELEMENTS} elements once it is carried out")
+        if total > MAX_ELEMENTS:
+            raise self._failure(element, f"this makes more than {MAX_ELEMENTS} elements once it is expanded")
         self._search.nested -= 1
         return total
 
@@ -242,8 +239,8 @@ class _Model:
 
     def _model(self, element: Element) -> int:
         path, name = self._found(element)
-        if (why := self._search.may_attach(path)) is not None:
-            raise self._failure(element, f"{shown(name)} is not read: {why}")
+        if (why := self._search.attach_problem(path)) is not None:
+            raise self._failure(element, f"{shown(name)} is refused: {why}")
         count = self._search.model(path, name)
         own = self._search.tree(path, name).attributes.get("model", "")
         self._attached[element.attributes.get("name", own)] = count
@@ -252,14 +249,14 @@ class _Model:
     def _found(self, element: Element) -> tuple[Path, str]:
         """Return the file that an element names, and what messages call it.
 
-        MuJoCo looks in the model's folder first, then in that of the file that the element stands in.
+        MuJoCo looks in the model's folder first, then in that of the file with the element.
         """
         given = self._check_inside(element)
         for folder in dict.fromkeys((self._path.parent, self._here[0])):
             path = Path(os.path.normpath(folder / given))
             if os.path.lexists(path):
                 return path, os.path.join(os.path.dirname(self._name), os.path.relpath(path, self._path.parent))
-        raise self._failure(element, f"there is no file {shown(given)} in {self._path.parent}", "file")
+        raise self._failure(element, f"no file {shown(given)} in {self._path.parent}", "file")
 
     def _check_inside(self, element: Element) -> str:
         """Return the file that an element names, which must be in the model's folder."""
@@ -272,7 +269,7 @@ class _Model:
 
 
 def _own_count(element: Element) -> int:
-    """What MuJoCo makes of an element itself: soft bodies and made-up meshes consist of many parts."""
+    """Return the number of parts that MuJoCo makes of an element itself, such as a soft body or a built-in mesh."""
     if element.tag in ("flexcomp", "composite"):
         return _product(element.attributes.get("count", "1"))
     if element.tag == "mesh" and "builtin" in element.attributes:
@@ -288,7 +285,7 @@ def _product(text: str) -> int:
 
 
 def _whole(text: str) -> int:
-    """The whole number that a text begins with, as far as it is one; MuJoCo complains of others."""
+    """Return a text as a whole number, 1 where it is not a number: MuJoCo complains of those."""
     try:
         value = float(text)
     except ValueError:

@@ -25,12 +25,12 @@ from dh2sim.typing import Array, read_only
 if TYPE_CHECKING:
     import mujoco
 
-_ODD: Final = "Actuators that a robot file has no place for are left out: {}."
+_UNSUPPORTED: Final = "Actuators that a robot file has no place for are left out: {}."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drive:
-    """What drives a joint, and what that adds to the joint."""
+    """What drives a joint, and what that adds to its dynamics."""
 
     actuator: ActuatorSpec
     effort: float | None = None
@@ -72,7 +72,7 @@ def _drive(compiled: Compiled, joint: MjcfJoint, name: str, drivers: list[int], 
     if len(drivers) == 1:
         actuator = _read(compiled, drivers[0], notes)
     for i in drivers if len(drivers) > 1 else ():
-        notes.group(_ODD, _name(model, i), f"one of {len(drivers)} on joint {shown(name)}")
+        notes.group(_UNSUPPORTED, _name(model, i), f"one of {len(drivers)} on joint {shown(name)}")
     gears = [float(model.actuator_gear[i, 0]) for i in drivers]
     squares = [(i, gear * gear) for i, gear in zip(drivers, gears, strict=True)]
     if actuator.type in (ActuatorType.POSITION, ActuatorType.VELOCITY):
@@ -90,7 +90,7 @@ def _read(compiled: Compiled, i: int, notes: Notes) -> ActuatorSpec:
     """Return an actuator that is the only one of its joint."""
     model = compiled.model
     gain, bias = model.actuator_gainprm[i].tolist(), model.actuator_biasprm[i].tolist()
-    reason = _oddity(model, i)
+    reason = _unsupported(model, i)
     if reason is None:
         if _is_motor(model, i):
             if gain[0] == 1.0:
@@ -102,17 +102,17 @@ def _read(compiled: Compiled, i: int, notes: Notes) -> ActuatorSpec:
                 kv = None if i in compiled.unknown_kv else damping
                 if kv is None:
                     notes.group(
-                        "A damping ratio is left out, as masses are not known, of actuators {}.", _name(model, i)
+                        "A damping ratio is left out, as masses are unknown, of actuators {}.", _name(model, i)
                     )
                 return ActuatorSpec(type=ActuatorType.POSITION, kp=gain[0], kv=kv)
             if bias[1] == 0.0 and damping == gain[0]:
                 return ActuatorSpec(type=ActuatorType.VELOCITY, kv=damping)
-    notes.group(_ODD, _name(model, i), reason or "neither a motor nor a position or velocity servo")
+    notes.group(_UNSUPPORTED, _name(model, i), reason or "neither a motor nor a position or velocity servo")
     return ActuatorSpec(type=ActuatorType.NONE)
 
 
-def _oddity(model: mujoco.MjModel, i: int) -> str | None:
-    """Return what about an actuator a robot file cannot say, or None."""
+def _unsupported(model: mujoco.MjModel, i: int) -> str | None:
+    """Return what a robot file has no place for in an actuator, or None."""
     import mujoco
 
     gear = model.actuator_gear[i].tolist()
@@ -148,7 +148,7 @@ def _effort(model: mujoco.MjModel, joint: MjcfJoint, name: str, drivers: list[in
         control = int(model.actuator_ctrladr[i])
         if (
             _is_motor(model, i)
-            and _oddity(model, i) in (None, f"gear {gear:g}")
+            and _unsupported(model, i) in (None, f"gear {gear:g}")
             and model.actuator_ctrllimited[control]
         ):
             factor = gear * float(model.actuator_gainprm[i, 0])
@@ -260,7 +260,7 @@ def read_joints(
         drives: What drives each.
         notes: Takes what was left out.
     """
-    T = identity()  # of what is at hand in the link of the last joint
+    T = identity()  # of the current body in the link of the last joint
     joints, limits, dynamics = [], [], []
     rest = iter(zip(names, drives, strict=True))
     for body in selection.bodies:
@@ -294,7 +294,7 @@ def _type(model: mujoco.MjModel, joint: MjcfJoint) -> JointType:
 
 
 def _motion(joint: MjcfJoint, q: float) -> Array:
-    """Pose of the body moved by a joint, in the body before; shape (4, 4)."""
+    """Return the pose of the body moved by a joint, in the body before; shape (4, 4)."""
     if q == 0.0:
         return identity()
     x, y, z = joint.axis.tolist()
@@ -327,7 +327,7 @@ def _range(model: mujoco.MjModel, joint: MjcfJoint, name: str, notes: Notes) -> 
 def _dynamics(compiled: Compiled, joint: MjcfJoint, name: str, drive: Drive, notes: Notes) -> Dynamics:
     model, dof = compiled.model, int(compiled.model.jnt_dofadr[joint.id])
     if joint.id in compiled.unknown_damping:
-        notes.group("A damping ratio stands for no damping, as masses are not known, for joints {}.", name)
+        notes.group("A damping ratio counts as no damping, as masses are unknown, for joints {}.", name)
     if np.any(model.dof_dampingpoly[dof]) or drive.nonlinear:
         notes.group("Only the linear part of the damping is carried over, of joints {}.", name)
     if model.jnt_stiffness[joint.id] or np.any(model.jnt_stiffnesspoly[joint.id]):
@@ -343,7 +343,7 @@ def _dynamics(compiled: Compiled, joint: MjcfJoint, name: str, drive: Drive, not
 
 
 def note_solver(compiled: Compiled, joints: Collection[MjcfJoint], names: Sequence[str], notes: Notes) -> None:
-    """Note what says how MuJoCo holds a limit or friction, where that is not its default."""
+    """Note MuJoCo's settings for limits and friction where they are not its defaults."""
     model = compiled.model
     for joint, name in zip(joints, names, strict=True):
         dof = int(model.jnt_dofadr[joint.id])

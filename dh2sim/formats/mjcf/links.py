@@ -28,14 +28,14 @@ def read_inertial(compiled: Compiled, tree: MjcfTree, body: MjcfBody, name: str,
         tree: Its bodies.
         body: A link of the arm.
         name: Of the link.
-        notes: Takes what is not known.
+        notes: Takes what is unknown.
     """
     model = compiled.model
     parts = tree.rigid(body.id)
     if any(model.body_gravcomp[part] for part in parts):
         notes.group("Compensation of gravity is not carried over, of links {}.", name)
     if compiled.unknown_masses.intersection(parts):
-        notes.group("The mass is not known, as it would come from shapes that are missing, of links {}.", name)
+        notes.group("The mass is unknown, as it would come from missing shapes, of links {}.", name)
         return Inertial()
     known = [_in_link(model, tree, body, part) for part in parts if model.body_mass[part] > 0.0]
     if not known:
@@ -83,7 +83,7 @@ def read_look(compiled: Compiled, tree: MjcfTree, body: MjcfBody, name: str, not
     Args:
         compiled: The model.
         tree: Its bodies.
-        body: A link of the arm; what stands in the world is no part of one.
+        body: A link of the arm; geoms of the world are not part of one.
         name: Of the link.
         notes: Takes what was left out.
     """
@@ -116,7 +116,7 @@ def _only_shows(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def _primitive(compiled: Compiled, geom: int) -> str | None:
-    """Return the word for a shape that is no mesh, or None."""
+    """Return the kind of a shape that is not a mesh, or None."""
     import mujoco
 
     kind = int(compiled.model.geom_type[geom])
@@ -179,7 +179,7 @@ def _color(model: mujoco.MjModel, geom: int) -> Color | None:
 
 
 def _rgba(values: Array) -> Color:
-    """Four numbers as they were written: MuJoCo keeps them in single precision."""
+    """Return four numbers as they were written: MuJoCo keeps them in single precision."""
     red, green, blue, alpha = (float(str(np.float32(value))) for value in values)
     return red, green, blue, alpha
 

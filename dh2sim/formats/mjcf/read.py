@@ -15,7 +15,7 @@ from dh2sim.errors import ImportedFileError, Problem
 from dh2sim.formats.arm import described, note_gravity, note_left_out
 from dh2sim.formats.mjcf.chain import Selection, names_of, select_chain
 from dh2sim.formats.mjcf.compile import Compiled, compile_mjcf
-from dh2sim.formats.mjcf.includes import MjcfFiles, look_through
+from dh2sim.formats.mjcf.includes import MjcfFiles, scan_files
 from dh2sim.formats.mjcf.joints import check_joints, joint_names, note_solver, read_drives, read_joints
 from dh2sim.formats.mjcf.links import read_inertial, read_look, weight_of
 from dh2sim.formats.mjcf.tree import WORLD, MjcfBody, MjcfJoint, MjcfTree, read_tree
@@ -30,11 +30,13 @@ if TYPE_CHECKING:
 _ADVICE: Final = "no table can say that. Choose a base or tip that leaves it out, or remove it"
 
 
-def check_loops(model: mujoco.MjModel, tree: MjcfTree, selection: Selection, files: MjcfFiles, notes: Notes) -> None:
+def _check_constraints(
+    model: mujoco.MjModel, tree: MjcfTree, selection: Selection, files: MjcfFiles, notes: Notes
+) -> None:
     """Check that the joints between base and tip move as if nothing else tied the bodies together.
 
     A constraint between two bodies closes a loop through the joints between them; if none of these is on the arm,
-    the arm moves freely. A mocap body, which somebody leads by the hand, closes no loop.
+    the arm moves freely. A mocap body, which is moved from outside, closes no loop.
 
     Args:
         model: The compiled model.
@@ -102,7 +104,7 @@ class _Loops:
                 return None
 
     def _coupled(self, first: int, second: int) -> str | None:
-        """Joint ``first`` follows ``second``, or stands still; it may follow a joint of the arm without being one."""
+        """Return how joint ``first`` is coupled to ``second``, or held still, if it is one of the arm."""
         if first not in self._arm:
             return None
         one = shown(self._model.joint(first).name)
@@ -127,12 +129,12 @@ class _Loops:
         )
 
     def _between(self, one: int, other: int) -> list[MjcfJoint]:
-        """The joints on the way from one body to another."""
+        """Return the joints between two bodies."""
         up, down = (set(self._tree.links.way(WORLD, body) or ()) for body in (one, other))
         return self._tree.joints_of(sorted(up ^ down))
 
     def _of_tendon(self, tendon: int) -> list[MjcfJoint]:
-        """The joints of the arm that a tendon may pull at."""
+        """Return the joints of the arm that a tendon may act on."""
         model, kinds = self._model, self._mujoco.mjtWrap
         found: dict[int, None] = {}
         bodies: list[int] = []
@@ -150,8 +152,8 @@ class _Loops:
         return [self._arm[number] for number in found if number in self._arm]
 
 
-def note_leftovers(compiled: Compiled, tree: MjcfTree, selection: Selection, notes: Notes) -> None:
-    """Note what is merged, what is not on the arm, and what no robot file says."""
+def _note_unused(compiled: Compiled, tree: MjcfTree, selection: Selection, notes: Notes) -> None:
+    """Note what is merged, what is not on the arm, and what a robot file has no place for."""
     starts = [selection.base, *(body for body in selection.bodies if body.joints)]
     for body in starts:
         merged = [tree.bodies[part].label for part in tree.rigid(body.id)[1:]]
@@ -199,7 +201,7 @@ def _on(tree: MjcfTree, body: int) -> str:
 
 
 def _note_elements(compiled: Compiled, notes: Notes) -> None:
-    """One sentence on what a model may hold besides bodies, joints and actuators."""
+    """Note what a model holds besides bodies, joints and actuators."""
     model = compiled.model
     if compiled.keyframes:
         names = listed(shown(name) for name in compiled.keyframes if name) if any(compiled.keyframes) else ""
@@ -212,9 +214,9 @@ def _note_elements(compiled: Compiled, notes: Notes) -> None:
         "contact exclusion": model.nexclude,
         "soft body": model.nflex,
     }
-    told = [f"{count} {what if count == 1 else _plural(what)}" for what, count in counts.items() if count]
-    if told:
-        notes.add(f"Not carried over: {listed(told)}.")
+    others = [f"{count} {what if count == 1 else _plural(what)}" for what, count in counts.items() if count]
+    if others:
+        notes.add(f"Not carried over: {listed(others)}.")
     if model.opt.density or model.opt.viscosity or any(model.opt.wind.tolist()):
         notes.add("The medium around the robot (density, viscosity, wind) is not carried over.")
 
@@ -226,17 +228,17 @@ def _plural(word: str) -> str:
 def read_mjcf(path: Path, *, file: str, base: str | None = None, tip: str | None = None) -> SerialRobot:
     """Return the serial arm that an MJCF describes.
 
-    MuJoCo parses and compiles the file, after its text and those that it includes were looked through: defaults,
-    angles, frames and repetitions are its business. Bodies without a joint are merged: poses are multiplied, and
+    MuJoCo parses and compiles the file, after its text and those that it includes were scanned: it deals with
+    defaults, angles, frames and repetitions. Bodies without a joint are merged: poses are multiplied, and
     masses are combined into the body that carries them. Link frames are the bodies' frames, coordinates count as in
     the file's ``qpos``.
 
     Args:
         path: The file. Files that it includes must be in its folder or below; meshes and textures may be missing.
         file: Its name, for messages.
-        base: Name of the body that the arm begins at, or ``world``. By default the topmost body above the arm,
+        base: Name of the body at which the arm begins, or ``world``. By default the topmost body above the arm,
             where that has no joint or floats; else the world.
-        tip: Name of the site or else the body that it ends at. By default the site ``tool0``, or the only one of
+        tip: Name of the site or else the body at which it ends. By default the site ``tool0``, or the only one of
             ``attachment_site``, ``ee_site``, ``end_effector`` and ``tcp``; else where the only way with joints ends,
             or at a hand: a fork behind three joints or more, into branches of fewer joints.
 
@@ -245,22 +247,22 @@ def read_mjcf(path: Path, *, file: str, base: str | None = None, tip: str | None
         Dh2simError: The file, or one that it includes, cannot be read.
     """
     notes = Notes()
-    files = look_through(path, file=file)
+    files = scan_files(path, file=file)
     compiled = compile_mjcf(files, notes)
     tree = read_tree(compiled.model)
     selection = select_chain(tree, base, tip, files, notes)
     check_joints(tree, selection, files)
-    check_loops(compiled.model, tree, selection, files, notes)
+    _check_constraints(compiled.model, tree, selection, files, notes)
     names = joint_names(selection, notes)
     drives = read_drives(compiled, selection, names, notes)
     joints = read_joints(compiled, selection, names, drives, notes)
     note_solver(compiled, selection.joints, names, notes)
     links = _links(compiled, tree, selection, names, notes)
     gravity = _gravity(compiled, tree, selection, files, notes)
-    note_leftovers(compiled, tree, selection, notes)
+    _note_unused(compiled, tree, selection, notes)
     return SerialRobot(
         name=compiled.name or Path(file).name.partition(".")[0],
-        description=described("MJCF", file, links[0].name, _tip(selection, links)),
+        description=described("MJCF", file, links[0].name, _tip_name(selection, links)),
         chain=joints.chain,
         base=links[0],
         links=links[1:],
@@ -315,7 +317,7 @@ def _gravity(compiled: Compiled, tree: MjcfTree, selection: Selection, files: Mj
     return read_only(gravity)
 
 
-def _tip(selection: Selection, links: tuple[SerialLink, ...]) -> str:
+def _tip_name(selection: Selection, links: tuple[SerialLink, ...]) -> str:
     if selection.site is not None and selection.site.name:
         return selection.site.name
     return selection.tip.name or links[-1].name

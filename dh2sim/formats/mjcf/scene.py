@@ -1,4 +1,4 @@
-"""RobotModel -> an MJCF scene that shows the robot well: floor, light, and a camera that frames it."""
+"""RobotModel -> an MJCF scene around the robot: floor, light, and a camera that frames it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import read_only
 
 VIEW_DIRECTION = (1.0, -1.25, 0.62)
-"""From what is looked at to the camera."""
+"""From the camera's target to the camera."""
 FIELD_OF_VIEW = 40.0
 """Vertical, degrees."""
 
@@ -35,7 +35,7 @@ def to_scene(model: ModelLike) -> str:
         model: the robot, in any form.
 
     Returns:
-        The text of the file. The floor is at z = 0, or below the robot where it hangs lower at home.
+        The text of the file. The floor is at z = 0, or below the robot where that is lower at home.
     """
     model = model_of(model)
     extent = _extent(model)
@@ -50,7 +50,7 @@ def to_scene(model: ModelLike) -> str:
     child(visual, "quality", shadowsize="4096", offsamples="8")
     child(visual, "rgba", haze="0.86 0.89 0.93 1")
     child(visual, "map", znear="0.01", zfar="60", shadowclip="3")
-    _assets(root, cell)
+    _scene_assets(root, cell)
     world = child(root, "worldbody")
     _lights(world, extent)
     child(
@@ -75,10 +75,10 @@ def _extent(model: RobotModel) -> _Extent:
         for shape in link.shapes:
             start, end = (move_point(T, point) for point in shape.ends)
             slope = (end[2] - start[2]) / shape.length
-            # how far a disc of this radius, square to the axis, hangs below its centre
-            hang = shape.radius * math.sqrt(max(0.0, 1.0 - slope * slope))
+            # by how much a disc of this radius, square to the axis, is lower than its centre
+            drop = shape.radius * math.sqrt(max(0.0, 1.0 - slope * slope))
             points += [(start, shape.radius), (end, shape.radius)]
-            lowest = min(lowest, start[2] - hang, end[2] - hang)
+            lowest = min(lowest, start[2] - drop, end[2] - drop)
     low = [min(point[k] - r for point, r in points) for k in range(3)]
     high = [max(point[k] + r for point, r in points) for k in range(3)]
     centre = [_short(0.5 * (a + b)) for a, b in zip(low, high, strict=True)]
@@ -86,7 +86,7 @@ def _extent(model: RobotModel) -> _Extent:
     return _Extent(centre=(centre[0], centre[1], centre[2]), radius=_short(radius), lowest=_short(lowest))
 
 
-def _assets(root: ET.Element, cell: float) -> None:
+def _scene_assets(root: ET.Element, cell: float) -> None:
     asset = child(root, "asset")
     child(
         asset,
@@ -124,7 +124,7 @@ def _lights(world: ET.Element, extent: _Extent) -> None:
 
 
 def _pedestal(world: ET.Element, model: RobotModel, floor: float) -> None:
-    """Carries the base where the floor is lower; it only shows, and touches nothing."""
+    """Add a pedestal under the base where the floor is lower; it is only shown, and does not collide."""
     radius = 0.8 * max(shape.radius for shape in model.base.shapes)
     child(
         world,
@@ -158,5 +158,5 @@ def _camera(world: ET.Element, extent: _Extent) -> None:
 
 
 def _short(value: float) -> float:
-    """To four significant digits: nothing in a scene needs more, and every machine rounds to the same."""
+    """Round to four significant digits: a scene needs no more, and every machine rounds to the same."""
     return float(f"{value:.4g}")

@@ -78,7 +78,7 @@ class MjcfBody:
 
     @property
     def label(self) -> str:
-        """How a message calls it."""
+        """How messages call it."""
         return shown(self.name) if self.name else f"body {self.id} (without a name)"
 
 
@@ -108,7 +108,7 @@ class MjcfTree:
         return [joint for body in bodies for joint in self.bodies[body].joints]
 
     def drawn_pose(self, ancestor: int, body: int) -> Array:
-        """Return the pose of a body in one that it hangs on, as the file draws it, shape (4, 4)."""
+        """Return the pose of a body in one above it, as the file draws it, shape (4, 4)."""
         T = identity()
         for step in self.links.way(ancestor, body) or ():
             T = compose(T, self.bodies[step].T_parent_body)
@@ -119,7 +119,7 @@ def read_tree(model: mujoco.MjModel) -> MjcfTree:
     """Return the bodies of a compiled model."""
     joints: list[list[MjcfJoint]] = [[] for _ in range(model.nbody)]
     for i in range(model.njnt):
-        joint = _joint(model, i)
+        joint = _read_joint(model, i)
         joints[joint.body].append(joint)
     sites: list[list[MjcfSite]] = [[] for _ in range(model.nbody)]
     for i in range(model.nsite):
@@ -153,7 +153,7 @@ def read_tree(model: mujoco.MjModel) -> MjcfTree:
     return MjcfTree(bodies=bodies, links=links)
 
 
-def _joint(model: mujoco.MjModel, i: int) -> MjcfJoint:
+def _read_joint(model: mujoco.MjModel, i: int) -> MjcfJoint:
     motion = tuple(Motion)[int(model.jnt_type[i])]
     scalar = motion in (Motion.HINGE, Motion.SLIDE)
     return MjcfJoint(

@@ -30,7 +30,7 @@ _DECIMAL_COMMA: Final = re.compile(r"(?<=\d),(?=\d)")
 
 
 class CellError(ValueError):
-    """A cell cannot be read; the text is fit for a user."""
+    """A cell cannot be read; the message is for the user."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +38,7 @@ class Constant:
     """A symbol that the text around the table gives a value."""
 
     value: float
-    """In rad or m where the text says a unit, else as written."""
+    """In rad or m where the text gives a unit, else as written."""
     unit: Unit | None
     """Rad, m or None."""
     line: int
@@ -66,7 +66,7 @@ class Reading:
 
     @property
     def bare(self) -> bool:
-        """Whether the table has to say the unit of the number."""
+        """Whether the table has to give the unit of the number."""
         return self.unit is None and self.value != 0.0
 
 

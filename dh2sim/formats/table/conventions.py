@@ -1,4 +1,4 @@
-"""Which convention a table is in, from what the table and the words around it say; it is never guessed."""
+"""Which convention a table is in, from its headings and the text around it; never guessed."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from dh2sim.robot.spec import Convention
 
 _ABOVE: Final = 12
 _BELOW: Final = 4
-"""Lines around a table that are taken for its caption."""
+"""Lines around a table that count as its caption."""
 
 
 def _word(pattern: str) -> re.Pattern[str]:
-    """A whole word; an underscore is no part of one."""
+    """Return a pattern of a whole word; an underscore is not part of one."""
     return re.compile(rf"(?<![A-Za-z])(?:{pattern})(?![A-Za-z])", re.IGNORECASE)
 
 
@@ -31,7 +31,7 @@ _WORDS: Final = {
     ),
     Convention.MODIFIED: (_word("proximal|moddh|mod dh|dhmod|mdh|craig|craig's"), _word("modified|khalil")),
 }
-"""Words that decide by themselves, and words that do in a line about DH tables."""
+"""Words that decide by themselves, and words that decide in a line about DH tables."""
 _HOW: Final = (
     "pass convention='standard' or convention='modified'. Headings a_(i-1), alpha_(i-1) would say modified; "
     "docs/conventions.md shows how to find out"
@@ -39,15 +39,15 @@ _HOW: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
-    """A convention, and what says so."""
+class Evidence:
+    """A convention, and the evidence for it."""
 
     convention: Convention
     by: str
     """Such as ``the heading 'a_(i-1)'``."""
 
 
-def decide(
+def decide_convention(
     option: Convention | None,
     printed: Convention | None,
     columns: Columns,
@@ -55,21 +55,22 @@ def decide(
     table: range,
     findings: Findings,
 ) -> Convention | None:
-    """Return the convention of a table's rows, or None where that cannot be told (and ``findings`` says why).
+    """Return the convention of a table's rows, or None where it is ambiguous (``findings`` has the problem then).
 
     Args:
-        option: What the user says.
-        printed: What the first line of a toolbox's printout says.
-        columns: The columns; headings of index i - 1 say modified, headings of index i throughout standard.
+        option: The user's choice.
+        printed: From the first line of a toolbox's printout.
+        columns: The columns; headings of index i - 1 mean modified, headings of index i throughout standard.
         lines: The file.
         table: Numbers of the table's lines, counted from 1.
         findings: Takes problems and notes.
     """
     first = columns.headings[0].cell
-    said = [] if printed is None else [Said(printed, "the printout's first line")]
+    said = [] if printed is None else [Evidence(printed, "the printout's first line")]
     said += _by_headings(columns, findings)
     said += [] if printed is not None else _by_words(lines, table)
-    wanted = [Said(option, f"convention='{option}'")] if option in (Convention.STANDARD, Convention.MODIFIED) else []
+    asked = option in (Convention.STANDARD, Convention.MODIFIED)
+    wanted = [Evidence(option, f"convention='{option}'")] if option is not None and asked else []
     for one, other in itertools.pairwise([*wanted, *said]):
         if one.convention is not other.convention:
             message = f"{one.by} says {one.convention}, but {other.by} says {other.convention}"
@@ -88,11 +89,11 @@ def decide(
 
 
 def caption(lines: Sequence[str], table: range) -> list[str]:
-    """Return the lines around a table that may speak of it."""
+    """Return the lines around a table that may be about it."""
     return [lines[number - 1] for number in (*_above(lines, table), *_below(lines, table))]
 
 
-def _by_headings(columns: Columns, findings: Findings) -> list[Said]:
+def _by_headings(columns: Columns, findings: Findings) -> list[Evidence]:
     indices = {
         quantity: heading.index
         for quantity in (Quantity.A, Quantity.ALPHA, Quantity.D, Quantity.THETA)
@@ -106,8 +107,8 @@ def _by_headings(columns: Columns, findings: Findings) -> list[Said]:
     straight = [quantity for quantity in (Quantity.A, Quantity.ALPHA) if indices.get(quantity) == 0]
     if heading is not None and (shifted or straight):
         message = "a and alpha have index i - 1 in a modified table and i in a standard one, d and theta always i"
-        findings.wrong(heading.cell, "", f"the headings' indices do not go together: {message}")
-    return [] if heading is None else [Said(Convention.MODIFIED, f"the heading {shown(heading.cell.text)}")]
+        findings.wrong(heading.cell, "", f"the headings' indices contradict each other: {message}")
+    return [] if heading is None else [Evidence(Convention.MODIFIED, f"the heading {shown(heading.cell.text)}")]
 
 
 def _indexed_throughout(columns: Columns) -> bool:
@@ -115,16 +116,16 @@ def _indexed_throughout(columns: Columns) -> bool:
     return all(heading is not None and heading.index == 0 for heading in headings)
 
 
-def _by_words(lines: Sequence[str], table: range) -> list[Said]:
-    """Return what the caption says, the words above the table before those below; twice if it contradicts itself."""
+def _by_words(lines: Sequence[str], table: range) -> list[Evidence]:
+    """Return the evidence in the caption, the words above the table before those below; both if contradictory."""
     for numbers in (_above(lines, table), _below(lines, table)):
-        said: dict[Convention, Said] = {}
+        said: dict[Convention, Evidence] = {}
         for number in numbers:
             line = lines[number - 1][:1000]
             for convention, (strong, weak) in _WORDS.items():
                 found = strong.search(line) or (weak.search(line) if _SUBJECT.search(line) else None)
                 if found:
-                    said.setdefault(convention, Said(convention, f"{shown(found.group())} on line {number}"))
+                    said.setdefault(convention, Evidence(convention, f"{shown(found.group())} on line {number}"))
         if said:
             return list(said.values())
     return []

@@ -1,7 +1,4 @@
-"""What is wrong with a table, and what the user should know of how it was read.
-
-The text of a file to tables of cells that know where they stand.
-"""
+"""Tables of cells that know their place in the file, and the findings on them: problems and notes."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ MAX_ROWS: Final = 1000
 MAX_COLUMNS: Final = 50
 
 PREFIX: Final = re.compile(r"\s*(?:[%#>*]+|//+)?\s*")
-"""What stands before a table inside a comment or a quotation."""
+"""What comes before a table inside a comment or a quotation."""
 PIPES: Final = "|│┃║"
 _PIPE: Final = re.compile(r"(?<!\\)[|│┃║]")
 _DASHES: Final = frozenset("-=─━═")
@@ -28,7 +25,7 @@ _OLD_MARK: Final = re.compile(r"\((?:std|mod)\)$")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
-    """What stands between two separators."""
+    """The text between two separators."""
 
     text: str
     """Without the spaces around it."""
@@ -58,7 +55,7 @@ class Grid:
 
 
 def pipe_grids(lines: Sequence[str]) -> Iterator[Grid]:
-    """Yield the tables whose cells stand between pipes or the lines of a box, Markdown's among them."""
+    """Yield the tables with pipes or the lines of a box between their cells, as in Markdown."""
     rows: list[Cells] = []
     for number, line in enumerate([*lines, ""], start=1):
         body = line[_prefix(line) :]
@@ -97,7 +94,7 @@ def separated_grid(lines: Sequence[str], first: int, separator: str) -> Grid:
 
 
 def is_comment(line: str) -> bool:
-    """Return whether a line is a comment: it starts with ``#``, ``%`` or ``//``."""
+    """Whether a line is a comment: it starts with ``#``, ``%`` or ``//``."""
     return line.lstrip().startswith(("#", "%", "//"))
 
 
@@ -105,14 +102,14 @@ def split(line: str, number: int, separator: str, *, count: int = 0) -> Cells:
     """Return the cells of a line.
 
     Args:
-        line: The line; as a heading it may stand behind a comment sign.
+        line: The line; a heading may follow a comment sign.
         number: Its number, from 1.
         separator: ``,``, ``;``, a tab or a space.
         count: How many cells are expected, or 0: a table between spaces may have spaces in its cells, and then
             two or more separate them.
 
     Raises:
-        ValueError: A quote is never closed; the text says so.
+        ValueError: A quote is never closed.
     """
     if separator == " ":
         return _spaced(line, number, count)
@@ -157,7 +154,7 @@ def _between(line: str, start: int, pattern: str) -> Iterator[tuple[int, int]]:
 
 
 def _quoted(line: str, start: int, separator: str) -> Iterator[tuple[int, int]]:
-    """Yield where the cells are; a separator between double quotes is none, and two quotes are one."""
+    """Yield where the cells are; a separator between double quotes does not count, and two quotes are one."""
     inside = False
     for position in range(start, len(line)):
         if line[position] == '"':
@@ -195,7 +192,7 @@ class Findings:
     """Collects the problems and the notes of one file."""
 
     def __init__(self, file: str) -> None:
-        """Start with none; ``file`` is the name that messages begin with."""
+        """Start with none; ``file`` is the name in messages."""
         self.file = file
         self.problems: list[Problem] = []
         self.notes: list[str] = []
@@ -214,7 +211,7 @@ class Findings:
             self.notes.append(sentence)
 
     def error(self) -> ImportedFileError:
-        """Return all problems as one error, each told once."""
+        """Return all problems as one error, each of them once."""
         return ImportedFileError(dict.fromkeys(self.problems))
 
     def check(self) -> None:

@@ -1,9 +1,4 @@
-"""Which part of a text is the table of DH parameters.
-
-What a column holds, from its heading as people write it.
-
-Which column of a table holds what.
-"""
+"""Headings as people write them: what a column holds, and so which part of a text is the table of DH parameters."""
 
 from __future__ import annotations
 
@@ -55,7 +50,7 @@ class Quantity(StrEnum):
 
 
 PARAMETERS: Final = (Quantity.THETA, Quantity.D, Quantity.A, Quantity.ALPHA, Quantity.BETA, Quantity.R)
-"""The columns that tell a table of Denavit-Hartenberg parameters from others."""
+"""The columns by which a table of Denavit-Hartenberg parameters is recognised."""
 
 ANGLE_WORDS: Final = {
     **dict.fromkeys(("°", "deg", "degs", "degree", "degrees"), AngleUnit.DEG),
@@ -113,16 +108,16 @@ class Heading:
 
 
 def read_heading(cell: Cell) -> Heading:
-    r"""Return what a heading says: ``$\alpha_{i-1}$ (deg)`` is alpha, of index i - 1, in degrees."""
+    r"""Return what a heading means: ``$\alpha_{i-1}$ (deg)`` is alpha, of index i - 1, in degrees."""
     name = plain(cell.text).casefold().rstrip("*:. ")
-    name, unit = _without_unit(name)
+    name, unit = _split_unit(name)
     quantity, index = _quantity(name)
     return Heading(
         cell=cell, quantity=quantity, index=index, angle=ANGLE_WORDS.get(unit), length=LENGTH_WORDS.get(unit)
     )
 
 
-def _without_unit(name: str) -> tuple[str, str]:
+def _split_unit(name: str) -> tuple[str, str]:
     """Return a heading without its unit, and the unit or nothing."""
     if name in KNOWN:
         return name, ""
@@ -134,7 +129,7 @@ def _without_unit(name: str) -> tuple[str, str]:
 
 
 def _quantity(name: str) -> tuple[Quantity | None, int | None]:
-    """Return what a name without unit stands for, and its index."""
+    """Return the quantity that a name without unit means, and its index."""
     quantity, index = _symbol(name)
     if quantity is not None or len(name) > 60:
         return quantity, index
@@ -166,8 +161,7 @@ def _symbol(name: str) -> tuple[Quantity | None, int | None]:
     return None, None
 
 
-_ONE_OF: Final = "theta, d, a, alpha"
-_WORTH: Final = 3
+_FEWEST_PARAMETERS: Final = 3
 """Parameters that make a row of cells the headings of a DH table."""
 
 
@@ -196,12 +190,12 @@ def parameters_in(row: Cells) -> int:
 
 
 def are_headings(row: Cells) -> bool:
-    """Return whether a row of cells is the headings of a table of DH parameters."""
-    return parameters_in(row) >= _WORTH
+    """Whether a row of cells is the headings of a table of DH parameters."""
+    return parameters_in(row) >= _FEWEST_PARAMETERS
 
 
 def find_columns(row: Cells, findings: Findings) -> Columns:
-    """Return what the columns hold; what is missing, double or cannot be told goes to ``findings``."""
+    """Return what the columns hold; what is missing, double or ambiguous goes to ``findings``."""
     headings = [read_heading(cell) for cell in row]
     at: dict[Quantity, int] = {}
     for index, heading in enumerate(headings):
@@ -215,7 +209,7 @@ def find_columns(row: Cells, findings: Findings) -> Columns:
         else:
             message = f"two columns hold {heading.quantity}: this one, and the one headed {shown(row[first].text)}"
             findings.wrong(heading.cell, "", message)
-    _settle_r(headings, at, findings)
+    _decide_r(headings, at, findings)
     if Quantity.OFFSET in at and not at.keys() & {Quantity.D, Quantity.BETA}:
         at[Quantity.D] = at.pop(Quantity.OFFSET)
         findings.note(f"column {shown(row[at[Quantity.D]].text)} was read as d, since no other column is d")
@@ -232,7 +226,7 @@ def find_columns(row: Cells, findings: Findings) -> Columns:
     return Columns(headings=tuple(headings), at=at)
 
 
-def _settle_r(headings: Sequence[Heading], at: dict[Quantity, int], findings: Findings) -> None:
+def _decide_r(headings: Sequence[Heading], at: dict[Quantity, int], findings: Findings) -> None:
     """Take a column r for a, unless it may be Khalil's r, which is d (and his d is a)."""
     index = at.pop(Quantity.R, None)
     if index is None:
@@ -262,8 +256,8 @@ def _check_missing(headings: Sequence[Heading], at: Mapping[Quantity, int], find
             message = f"unknown heading {shown(heading.cell.text)}. Did you mean {shown(guess)}?"
             findings.wrong(heading.cell, "", message)
     found = listed(shown(heading.cell.text) for heading in headings)
-    message = f"no column for {' and '.join(missing)}; a DH table has columns for {_ONE_OF}. Found headings: {found}"
-    findings.wrong(headings[0].cell, "", message)
+    message = f"no column for {' and '.join(missing)}; a DH table has columns for theta, d, a, alpha"
+    findings.wrong(headings[0].cell, "", f"{message}. Found headings: {found}")
 
 
 def _note_unused(heading: Heading, findings: Findings) -> None:
@@ -271,10 +265,10 @@ def _note_unused(heading: Heading, findings: Findings) -> None:
 
 
 _SEPARATED: Final = (".csv", ".tsv", ".tab")
-_MOST_LINES: Final = 2000
-"""Lines that are looked at for the headings of a table between separators."""
+_MAX_HEADING_LINES: Final = 2000
+"""Lines that are searched for the headings of a table between separators."""
 _DELIMITER: Final = re.compile(r":?-+:?")
-"""A cell of the row that Markdown wants under the headings."""
+"""A cell of the row that Markdown has under the headings."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -298,7 +292,7 @@ def locate(lines: Sequence[str], file: str) -> Table | None:
 
     Args:
         lines: The file's lines.
-        file: Its name, whose ending is a hint where to look first.
+        file: Its name, whose ending decides where to look first.
     """
     pipes = tuple(pipe_grids(lines))
     if PurePath(file).suffix.casefold() in _SEPARATED:
@@ -333,7 +327,7 @@ def _between_pipes(pipes: Sequence[Grid]) -> Table | None:
 def _between_separators(lines: Sequence[str], pipes: Sequence[Grid]) -> Table | None:
     """Return the table under the first line that has headings; one in a comment only where no other has."""
     for comments in (False, True):
-        for index, line in enumerate(lines[:_MOST_LINES]):
+        for index, line in enumerate(lines[:_MAX_HEADING_LINES]):
             if is_comment(line) is not comments or not line.strip():
                 continue
             grids = [
@@ -358,7 +352,7 @@ def _has_headings(line: str, separator: str) -> bool:
 
 def _most_alike(lines: Sequence[str], pipes: Sequence[Grid]) -> Table | None:
     candidates = [(parameters_in(grid.rows[0][:MAX_COLUMNS]), -i, grid) for i, grid in enumerate(pipes[:100])]
-    for index, line in enumerate(lines[:_MOST_LINES]):
+    for index, line in enumerate(lines[:_MAX_HEADING_LINES]):
         for separator in "\t;,":
             if separator in line[:2000] and not is_comment(line):
                 grid = separated_grid(lines[: index + 1], index, separator)

@@ -1,7 +1,4 @@
-"""How each row of a table moves: which of its cells is the joint's coordinate.
-
-Position limits of a joint, from two columns or from one with both.
-"""
+"""How each row of a table moves: which of its cells is the joint's coordinate, and between which limits."""
 
 from __future__ import annotations
 
@@ -87,7 +84,7 @@ class LimitReader:
         return (found[0], found[1]) if len(found) == 2 else None
 
     def _cells(self, row: Cells) -> Iterator[tuple[Cell, Heading, Quantity]]:
-        """The cells that hold the limits, two columns before one."""
+        """Yield the cells that hold the limits: two columns are preferred to one."""
         pair = Quantity.LOWER in self._columns.at and Quantity.UPPER in self._columns.at
         for quantity in (Quantity.LOWER, Quantity.UPPER) if pair else (Quantity.LIMITS,):
             cell, heading = self._columns.cell(row, quantity), self._columns.heading(quantity)
@@ -116,7 +113,7 @@ class LimitReader:
                 if lower.unit is None and upper.unit is not None:
                     lower = replace(lower, unit=upper.unit)
                 return [lower, upper]
-        message = f"{shown(cell.text)} is no pair of limits; write it as '[-170, 170]', '-170 to 170' or '±170'"
+        message = f"{shown(cell.text)} is not a pair of limits; write it as '[-170, 170]', '-170 to 170' or '±170'"
         raise CellError(message)
 
 
@@ -124,7 +121,7 @@ COORDINATES: Final = {
     Quantity.THETA: re.compile(r"(?:theta|th|t|q|phi)[0-9]*[ijkn]?"),
     Quantity.D: re.compile(r"(?:d|s|r|q)[0-9]*[ijkn]?"),
 }
-"""What a joint's coordinate is called in the columns that may hold one, in small letters."""
+"""Names of a joint's coordinate in the columns that may hold one, in lower case."""
 _LIKELY, _SURE = 1, 2
 _MARK: Final = "mark the joint's coordinate with a star, as in theta1* or d3*, or add a column type with R or P"
 
@@ -138,7 +135,7 @@ class TableRow:
     readings: dict[Quantity, Reading] = field(default_factory=dict)
     """Of the cells that could be read."""
     type: JointType | None = None
-    """What the table says, until it is settled."""
+    """As the table gives it, until ``decide_motion`` has decided."""
     sign: int = 1
 
     def path(self, quantity: Quantity) -> str:
@@ -146,18 +143,20 @@ class TableRow:
         return f"row {self.number}, {quantity}"
 
     def strength(self, quantity: Quantity) -> int:
-        """Return how surely a cell is the joint's coordinate: 0 where it is a plain number."""
+        """Return how certain it is that a cell is the joint's coordinate: 0 for a plain number."""
         reading = self.readings.get(quantity)
         if reading is None or not (reading.starred or reading.symbol):
             return 0
         return _SURE if reading.starred or (reading.symbol or "").casefold().startswith("q") else _LIKELY
 
 
-def settle(rows: Sequence[TableRow], constants: Mapping[str, Constant], comma: bool, findings: Findings) -> None:
-    """Give every row its type and sign; what cannot be told goes to ``findings``.
+def decide_motion(
+    rows: Sequence[TableRow], constants: Mapping[str, Constant], comma: bool, findings: Findings
+) -> None:
+    """Give every row its type and sign; what is ambiguous goes to ``findings``.
 
     Args:
-        rows: The table; theta and d are read again where a symbol turns out to be no coordinate.
+        rows: The table; theta and d are read again where a symbol turns out not to be a coordinate.
         constants: Symbols that the text gives a value.
         comma: Whether numbers have a decimal comma.
         findings: Takes problems and notes.
@@ -167,8 +166,8 @@ def settle(rows: Sequence[TableRow], constants: Mapping[str, Constant], comma: b
     no_theta = all(row.readings[Quantity.THETA].empty for row in rows if Quantity.THETA in row.readings)
     for row in rows:
         if row.number in moving or row.type is not None:
-            _check_doubt(row, constants, no_theta=no_theta, findings=findings)
-            _settle_moving(row, constants, comma, findings)
+            _check_ambiguous(row, constants, no_theta=no_theta, findings=findings)
+            _decide_moving_row(row, constants, comma, findings)
         else:
             row.type = JointType.REVOLUTE if no_theta or not moving else JointType.FIXED
     if not moving and not typed and not no_theta:
@@ -183,8 +182,8 @@ def settle(rows: Sequence[TableRow], constants: Mapping[str, Constant], comma: b
     _check_coordinates(rows, findings)
 
 
-def _check_doubt(row: TableRow, constants: Mapping[str, Constant], *, no_theta: bool, findings: Findings) -> None:
-    """A symbol such as d1 may be the coordinate or a length; it is taken for the coordinate only where it must be."""
+def _check_ambiguous(row: TableRow, constants: Mapping[str, Constant], *, no_theta: bool, findings: Findings) -> None:
+    """Complain of a symbol such as d1 that may be the coordinate or a length, unless it must be the coordinate."""
     reading = row.readings.get(Quantity.D)
     if row.type is not None or row.strength(Quantity.D) != _LIKELY or row.strength(Quantity.THETA) or reading is None:
         return
@@ -192,12 +191,12 @@ def _check_doubt(row: TableRow, constants: Mapping[str, Constant], *, no_theta: 
     line = constants[symbol].line if symbol in constants else None
     if line is None and not no_theta:
         return
-    number = f"the number that line {line} gives" if line else "a length"
+    number = f"the number given on line {line}" if line else "a length"
     message = f"{shown(symbol)} may be the joint's coordinate or {number}; {_MARK}, or write the number"
     findings.wrong(reading.cell, row.path(Quantity.D), message)
 
 
-def _settle_moving(row: TableRow, constants: Mapping[str, Constant], comma: bool, findings: Findings) -> None:
+def _decide_moving_row(row: TableRow, constants: Mapping[str, Constant], comma: bool, findings: Findings) -> None:
     turn, slide = row.strength(Quantity.THETA), row.strength(Quantity.D)
     if turn == slide == _SURE:
         both = " and ".join(shown(row.readings[quantity].cell.text) for quantity in (Quantity.THETA, Quantity.D))
@@ -224,7 +223,7 @@ def _must_not_move(
     comma: bool,
     findings: Findings,
 ) -> None:
-    """Make a cell that is not the coordinate a number, or say why it is none."""
+    """Read a cell that is not the coordinate as a number, or complain that it is not one."""
     reading = row.readings.get(quantity)
     if reading is None or not row.strength(quantity):
         return
@@ -241,7 +240,7 @@ def _must_not_move(
 
 
 def _check_coordinates(rows: Sequence[TableRow], findings: Findings) -> None:
-    """Every coordinate belongs to one row; numbered ones may stand in another order than their numbers'."""
+    """Check that every coordinate belongs to one row; note where they are not numbered in the order of the rows."""
     seen: dict[str, TableRow] = {}
     numbers: list[int] = []
     for row in rows:

@@ -1,4 +1,4 @@
-"""Notation to plain characters: LaTeX, Markdown, HTML and Unicode become what arithmetic is written in."""
+"""Notation to plain characters: LaTeX, Markdown, HTML and Unicode become plain arithmetic."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Final, TypeAlias
 
 LONGEST_CELL: Final = 400
-"""Characters of a cell that are looked at; no number is longer."""
+"""Characters of a cell that are read; no number is longer."""
 
 _BEFORE: Final = str.maketrans(
     {

@@ -1,4 +1,4 @@
-"""What Corke's Robotics Toolboxes print around a table: name and convention, base and tool, configurations."""
+"""Printouts of Corke's Robotics Toolboxes around a table: name and convention, base and tool, configurations."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Printout:
 
 
 def find_printout(lines: Sequence[str], table: range) -> Printout | None:
-    """Return what the first line of the printout says that a table belongs to, or None where it is none."""
+    """Return the first line of the printout that a table belongs to, or None where it is not part of one."""
     for number in range(table.start - 1, max(0, table.start - 1 - _ABOVE), -1):
         line = lines[number - 1][:1000]
         for index, pattern in enumerate(_STARTS):
@@ -73,7 +73,7 @@ def find_poses(lines: Sequence[str], table: range, length: LengthUnit | None, fi
         elif found := _MATRIX.search(line):
             poses |= _from_matrices(lines[index : index + 4], units, findings)
         elif found := _NO_POSE.fullmatch(line):
-            findings.note(f"the printout names a {found[1]} and does not show its pose: it was left out")
+            findings.note(f"the printout names a {found[1]} without its pose: it was left out")
     for name in poses:
         findings.note(
             f"the pose of the {name} is as printed, rounded: give it in the robot file if you know it better"
@@ -108,17 +108,17 @@ def find_configurations(
 def _coordinate(text: str, row: Row) -> float:
     angle = text.endswith("°")
     if angle is not row.type.turns or row.type is JointType.FIXED:
-        raise ValueError(f"{shown(text)} is no coordinate of a {row.type} joint")
+        raise ValueError(f"{shown(text)} is not a coordinate of a {row.type} joint")
     value = math.radians(float(text[:-1])) if angle else float(text)
     if not math.isfinite(value):
-        raise ValueError(f"{shown(text)} is no finite number")
+        raise ValueError(f"{shown(text)} is not a finite number")
     if row.limits.position and not row.limits.position[0] <= value <= row.limits.position[1]:
         raise ValueError(f"{shown(text)} is outside the limits of {row.name}")
     return value
 
 
 def _pose(found: re.Match[str], units: Units) -> Pose:
-    """A pose from its printed line; ``rpy/xyz`` is R = Rx(yaw) Ry(pitch) Rz(roll), printed roll first."""
+    """Return the pose on a printed line; ``rpy/xyz`` is R = Rx(yaw) Ry(pitch) Rz(roll), printed roll first."""
     xyz = [units.metres(float(found[group])) for group in (2, 3, 4)]
     roll, pitch, yaw = (math.radians(float(found[group])) for group in (6, 7, 8))
     if found[5].casefold() == "zyx":
@@ -141,7 +141,7 @@ def _about(axis: str, angle: float) -> list[list[float]]:
 
 
 def _from_matrices(lines: Sequence[str], units: Units, findings: Findings) -> dict[str, Pose]:
-    """Base and tool of an older MATLAB toolbox, which prints two 4 x 4 matrices beside each other."""
+    """Return base and tool of an older MATLAB toolbox, which prints two 4 x 4 matrices side by side."""
     rows = [[float(number) for number in re.findall(_NUMBER, line.rpartition("grav")[2])][-8:] for line in lines]
     if len(rows) != 4 or any(len(row) != 8 for row in rows):
         findings.note("base and tool of the printout could not be read: they were left out")

@@ -1,9 +1,4 @@
-"""Denavit-Hartenberg tables to RobotSpecs.
-
-Whether a table is one: its rows are as long as its heading, and its numbers are written in one way.
-
-Values of symbols that the text around a table gives, such as ``L1 = 0.4 m, a2 = 0.4318``.
-"""
+"""Denavit-Hartenberg tables to RobotSpecs, with the constants that the text around a table gives."""
 
 from __future__ import annotations
 
@@ -32,7 +27,7 @@ from dh2sim.formats.table.headers import (
 )
 from dh2sim.formats.table.notation import plain
 from dh2sim.formats.table.printout import find_configurations, find_poses, find_printout
-from dh2sim.formats.table.rows import Body, Resolved, is_hayati, read_body, to_row
+from dh2sim.formats.table.rows import Body, ResolvedUnits, is_hayati, read_body, to_row
 from dh2sim.messages import shown
 from dh2sim.robot.expressions import FUNCTIONS, ExpressionError, evaluate
 from dh2sim.robot.schema import name_problem
@@ -45,7 +40,7 @@ _GROUPED: Final = re.compile(r"(?<![\d,])[1-9]\d{0,2},\d{3}(?![\d,])")
 
 
 def check_shape(table: Table, findings: Findings) -> None:
-    """Note in ``findings`` rows of another length than the heading, and tables without rows or with too many."""
+    """Complain of rows of another length than the heading, and of a table without rows or with too many."""
     first = table.header[0]
     for line, column, message in table.grid.problems:
         findings.wrong_at(line, column, "", message)
@@ -62,10 +57,10 @@ def check_shape(table: Table, findings: Findings) -> None:
 
 
 def has_decimal_comma(table: Table, columns: Columns, findings: Findings) -> bool:
-    """Return whether the table's numbers are written with a decimal comma.
+    """Whether the table's numbers are written with a decimal comma.
 
     They are where some have a comma between digits and none has a point. A table in which every such comma has
-    three digits behind it and no 0 before it cannot be told from one with grouped thousands.
+    three digits behind it and no 0 before it may also be one with grouped thousands.
     """
     commas = [cell for cell in _numbers(table, columns) if _COMMA.search(cell.text)]
     if not commas or any(_POINT.search(cell.text) for cell in _numbers(table, columns)):
@@ -86,7 +81,8 @@ def _numbers(table: Table, columns: Columns) -> Iterator[Cell]:
                 yield cell
 
 
-_MOST_LINES_OF_TEXT: Final = 5000
+_MAX_TEXT_LINES: Final = 5000
+"""Lines that are searched for constants."""
 _NUMBER: Final = r"(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:[eE][-+]?\d+)?"
 _VALUE: Final = rf"[-+]?(?:{_NUMBER}\s*\*?\s*)?(?:{_NUMBER}|pi)(?:\s*/\s*\d+)?"
 _ASSIGNMENT: Final = re.compile(
@@ -106,7 +102,7 @@ def find_constants(lines: Sequence[str], table: Container[int]) -> dict[str, Con
         table: Numbers of lines, from 1, that are the table's own.
     """
     found: dict[str, Constant] = {}
-    for number, line in enumerate(lines[:_MOST_LINES_OF_TEXT], start=1):
+    for number, line in enumerate(lines[:_MAX_TEXT_LINES], start=1):
         if number in table or "=" not in line:
             continue
         for match in _ASSIGNMENT.finditer(plain(line)):
@@ -139,7 +135,7 @@ def _constant(match: re.Match[str], line: int) -> Constant | None:
 
 
 _NO_TABLE: Final = (
-    "there is no table of Denavit-Hartenberg parameters here: none has headings such as theta, d, a and alpha. "
+    "no table of Denavit-Hartenberg parameters found: none has headings such as theta, d, a and alpha. "
     "Allowed: a Markdown table, CSV, TSV, or a printout of the Robotics Toolbox for Python or MATLAB"
 )
 
@@ -152,7 +148,7 @@ class TableImport:
     units: Units
     """Of the numbers that carry no unit of their own."""
     notes: tuple[str, ...]
-    """What was chosen, taken for granted or left out, a sentence each, for the user to read."""
+    """What was chosen, assumed or left out, a sentence each, for the user to read."""
 
 
 def read_table(
@@ -173,15 +169,15 @@ def read_table(
     Args:
         data: The file's content, UTF-8.
         file: Its name, for messages; its ending is only a hint.
-        name: What the robot is to be called.
-        convention: The convention, where the text does not say it.
-        angle: The unit of angles that have none of their own; goes before what headings say.
-        length: The unit of lengths that have none of their own; goes before what headings say.
+        name: Of the robot.
+        convention: The convention, where the text does not give it.
+        angle: The unit of angles that have none of their own; goes before headings.
+        length: The unit of lengths that have none of their own; goes before headings.
 
     Raises:
-        ImportedFileError: There is no table, or it is wrong, or something is not said that has to be known; the
-            error holds everything that is wrong.
-        Dh2simError: ``name`` is no name for a robot.
+        ImportedFileError: There is no table, or it is wrong, or it leaves open what has to be known; the error holds
+            everything that is wrong.
+        Dh2simError: ``name`` is not allowed as the name of a robot.
     """
     if problem := name_problem(name, "the name of a robot"):
         raise Dh2simError(problem)
@@ -205,7 +201,7 @@ class _Reader:
         """Find out what the columns hold.
 
         Raises:
-            ImportedFileError: That cannot be told, or the rows are not all as long as the heading.
+            ImportedFileError: The columns are ambiguous, or the rows are not all as long as the heading.
         """
         self._lines = lines
         self._table = table
@@ -236,21 +232,21 @@ class _Reader:
         self._note_unread()
         return TableImport(spec=spec, units=used, notes=tuple(findings.notes))
 
-    def _units(self, body: Body, angle: AngleUnit | None, length: LengthUnit | None) -> tuple[Units, Resolved]:
+    def _units(self, body: Body, angle: AngleUnit | None, length: LengthUnit | None) -> tuple[Units, ResolvedUnits]:
         """Return the units of numbers that have none of their own."""
-        said_angle, said_length = units.said_in(conventions.caption(self._lines, self._table.lines))
+        stated_angle, stated_length = units.stated_units(conventions.caption(self._lines, self._table.lines))
         if self._printout and self._printout.in_radians:
-            said_angle = AngleUnit.RAD
-        kinds = ((units.ANGLES, angle, said_angle), (units.LENGTHS, length, said_length))
+            stated_angle = AngleUnit.RAD
+        kinds = ((units.ANGLES, angle, stated_angle), (units.LENGTHS, length, stated_length))
         found = {
-            kind.what: units.decide(kind, body.numbers(kind), option, said, self._findings)
-            for kind, option, said in kinds
+            kind.what: units.decide_unit(kind, body.numbers(kind), option, stated, self._findings)
+            for kind, option, stated in kinds
         }
         used = Units(
             angle=AngleUnit(found[units.ANGLES.what] or AngleUnit.RAD),
             length=LengthUnit(found[units.LENGTHS.what] or LengthUnit.M),
         )
-        return used, Resolved(option={kind.what: option for kind, option, _ in kinds}, default=found)
+        return used, ResolvedUnits(option={kind.what: option for kind, option, _ in kinds}, default=found)
 
     def _conventions(self, body: Body, option: Convention | None) -> tuple[Convention, list[Convention]]:
         """Return the table's convention and each row's; a row with beta is a Hayati row."""
@@ -259,12 +255,12 @@ class _Reader:
             return Convention.HAYATI, [Convention.HAYATI] * len(hayati)
         printed = self._printout.convention if self._printout else None
         lines = self._table.lines
-        chosen = conventions.decide(option, printed, self._columns, self._lines, lines, self._findings)
+        chosen = conventions.decide_convention(option, printed, self._columns, self._lines, lines, self._findings)
         chosen = chosen or Convention.STANDARD
         return chosen, [Convention.HAYATI if own else chosen for own in hayati]
 
     def _check_printout(self, rows: Sequence[Row]) -> None:
-        """The joints of a printout are those that its first line announces."""
+        """Check that the joints of a printout are those that its first line announces."""
         if self._printout is None:
             return
         types = "".join("P" if row.type is JointType.PRISMATIC else "R" for row in rows if row.type.moves)
@@ -309,4 +305,4 @@ class _Reader:
             and self._printout is None
             and any(t.strip() and not is_comment(t) for t in texts)
         ):
-            self._findings.note(f"what stands behind the table, from line {behind.start}, was not read as rows")
+            self._findings.note(f"the text after the table, from line {behind.start}, was not read as rows")

@@ -1,9 +1,4 @@
-"""The rows of a table, each with its type, name, numbers and limits; units and convention are still open.
-
-The cells of a table to the rows of a robot.
-
-What rows are called, how they are numbered, and of which type they are said to be.
-"""
+"""The rows of a table: types, names, numbers and limits of each, and the rows of a robot made of them."""
 
 from __future__ import annotations
 
@@ -15,7 +10,7 @@ from typing import Final
 from dh2sim.formats.table.cells import CellError, Constant, Unit, read_cell
 from dh2sim.formats.table.grid import Cell, Cells, Findings
 from dh2sim.formats.table.headers import Columns, Quantity, Table
-from dh2sim.formats.table.motion import COORDINATES, LimitReader, TableRow, settle
+from dh2sim.formats.table.motion import COORDINATES, LimitReader, TableRow, decide_motion
 from dh2sim.formats.table.notation import plain
 from dh2sim.formats.table.units import ANGLES, LENGTHS, Kind, Number, to_si
 from dh2sim.messages import shown
@@ -37,8 +32,8 @@ _FLIPS: Final = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Resolved:
-    """Units that numbers are read in, of each kind: the user's, and those of numbers that have none."""
+class ResolvedUnits:
+    """The units of angles and lengths: the user's choice, and the default of numbers that have none."""
 
     option: Mapping[str, Unit | None]
     default: Mapping[str, Unit | None]
@@ -81,7 +76,7 @@ def _read_row(
 
 
 def read_flips(rows: Sequence[TableRow], cells: Sequence[Cells], columns: Columns, findings: Findings) -> None:
-    """Turn the sign of rows that a column ``flip`` or ``sign`` says are counted the other way."""
+    """Turn the sign of the rows that a column ``flip`` or ``sign`` marks as counted the other way."""
     for row, row_cells in zip(rows, cells, strict=True):
         for quantity, signs in _FLIPS.items():
             cell = columns.cell(row_cells, quantity)
@@ -96,7 +91,7 @@ def read_flips(rows: Sequence[TableRow], cells: Sequence[Cells], columns: Column
 
 
 def numbers_in(row: TableRow, columns: Columns) -> dict[Quantity, Number]:
-    """Return the numbers of a settled row; ``offset`` is an angle or a length as the joint moves."""
+    """Return the numbers of a row of known type; ``offset`` is an angle or a length as the joint moves."""
     kinds: dict[Quantity, Kind] = dict(_KINDS)
     kinds[Quantity.OFFSET] = LENGTHS if row.type is JointType.PRISMATIC else ANGLES
     return {
@@ -110,7 +105,7 @@ def to_row(
     row: TableRow,
     numbers: Mapping[Quantity, Number],
     limits: tuple[Number, Number] | None,
-    units: Resolved,
+    units: ResolvedUnits,
     *,
     name: str,
     convention: Convention,
@@ -119,13 +114,13 @@ def to_row(
     """Return a row of the robot.
 
     Args:
-        row: The row, settled.
+        row: The row, its type known.
         numbers: Its numbers.
         limits: Its lower and upper limit.
         units: The units of numbers.
         name: The joint's name.
         convention: The row's convention.
-        findings: Takes what does not go together.
+        findings: Takes contradictions.
     """
     kind = row.type or JointType.REVOLUTE
     values = {quantity: units.si(numbers.get(quantity)) for quantity in (*_KINDS, Quantity.OFFSET)}
@@ -153,13 +148,13 @@ def to_row(
 
 
 def is_hayati(numbers: Mapping[Quantity, Number], columns: Columns) -> bool:
-    """Return whether a row is a Hayati row: its table has no d, or its beta is not 0."""
+    """Whether a row is a Hayati row: its table has no d, or its beta is not 0."""
     beta = numbers.get(Quantity.BETA)
     return beta is not None and (Quantity.D not in columns.at or beta.reading.value != 0.0)
 
 
 def _limits(
-    kind: JointType, limits: tuple[Number, Number] | None, units: Resolved, number: int, findings: Findings
+    kind: JointType, limits: tuple[Number, Number] | None, units: ResolvedUnits, number: int, findings: Findings
 ) -> Limits:
     if limits is None:
         return Limits()
@@ -205,7 +200,7 @@ def read_types(rows: Sequence[Cells], columns: Columns, findings: Findings) -> l
 
 
 def check_numbers(rows: Sequence[Cells], columns: Columns, findings: Findings) -> None:
-    """Rows that are numbered stand in their order, and none is missing between them."""
+    """Check that numbered rows are in order, and that none is missing."""
     last: int | None = None
     for number, row in enumerate(rows, start=1):
         cell = columns.cell(row, Quantity.JOINT)
@@ -229,12 +224,12 @@ def joint_names(rows: Sequence[Cells], columns: Columns, findings: Findings) -> 
         return [default_name(index) for index in range(len(rows))]
     for cell, name, used in zip(given, names, chosen, strict=True):
         if cell is not None and name is None and cell.text and not _ORDINAL.fullmatch(plain(cell.text)):
-            findings.note(f"{shown(cell.text)} is no name for a joint in a robot file: it is called {used}")
+            findings.note(f"{shown(cell.text)} is not allowed as the name of a joint: it is called {used}")
     return chosen
 
 
 def _label(row: Cells, columns: Columns) -> Cell | None:
-    """The cell of a column for joints, where it holds a name rather than a number or a type."""
+    """Return the cell of a column for joints, where it holds a name rather than a number or a type."""
     cell = columns.cell(row, Quantity.JOINT)
     if cell is None or plain(cell.text).casefold() in (*TYPES, "", "-") or re.fullmatch(r"\W*\d.*", cell.text):
         return None
@@ -242,7 +237,7 @@ def _label(row: Cells, columns: Columns) -> Cell | None:
 
 
 def _name(cell: Cell | None) -> str | None:
-    """The name that a cell holds, or None where a robot file does not allow it."""
+    """Return the name that a cell holds, or None where a robot file does not allow it."""
     text = plain(cell.text).strip(" *") if cell else ""
     return text if text and name_problem(text) is None and not is_reserved(text) else None
 
@@ -293,7 +288,7 @@ def read_body(
     for row, kind in zip(rows, read_types(cells, columns, findings), strict=True):
         row.type = kind
     check_numbers(cells, columns, findings)
-    settle(rows, constants, comma, findings)
+    decide_motion(rows, constants, comma, findings)
     read_flips(rows, cells, columns, findings)
     limits = LimitReader(columns, constants, comma=comma, findings=findings)
     return Body(

@@ -1,4 +1,4 @@
-"""Which unit the numbers of a table are in; it is never guessed where it matters."""
+"""Which unit the numbers of a table are in; never guessed where it matters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LARGE: Final = 10.0
 _TURN: Final = 2.0 * math.pi
 _DECIMALS: Final = re.compile(r"\d*[.,](\d{3,})")
 _UNIT_WORDS: Final = "|".join(sorted((*ANGLE_WORDS, *LENGTH_WORDS), key=len, reverse=True))
-_SAID: Final = re.compile(
+_STATED: Final = re.compile(
     rf"\b(?:angles?|lengths?|distances?|dimensions?)\b[^.|;]{{0,30}}?(?:\bin|:)\s*\(?({_UNIT_WORDS})(?![a-z])",
     re.IGNORECASE,
 )
@@ -27,20 +27,20 @@ _SAID: Final = re.compile(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kind:
-    """What is to be known of angles or of lengths."""
+    """Angles or lengths."""
 
     units: type[AngleUnit] | type[LengthUnit]
     what: str
     arguments: str
-    """The arguments of an import that say the unit."""
+    """The arguments of an import that give the unit."""
     of_heading: Callable[[Heading], Unit | None]
     fits: Callable[[Unit, float], bool]
-    """Whether a number without a unit may well be in the unit that other cells are marked with."""
+    """Whether a number without a unit is plausible in the unit that other cells are marked with."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Number:
-    """A number of the table, and what stands over it."""
+    """A number of the table, and its heading."""
 
     kind: Kind
     reading: Reading
@@ -49,8 +49,8 @@ class Number:
     """Such as ``row 3, alpha``."""
 
     @property
-    def over(self) -> Unit | None:
-        """The unit that the heading says for numbers of this kind."""
+    def heading_unit(self) -> Unit | None:
+        """The unit that the heading gives for numbers of this kind."""
         return self.kind.of_heading(self.heading)
 
 
@@ -70,41 +70,41 @@ LENGTHS: Final = Kind(
 )
 
 
-def said_in(lines: Sequence[str]) -> tuple[AngleUnit | None, LengthUnit | None]:
+def stated_units(lines: Sequence[str]) -> tuple[AngleUnit | None, LengthUnit | None]:
     """Return the units that words such as ``angles in degrees, lengths in mm`` name; None where they name several."""
-    words = [found[1].casefold() for line in lines for found in _SAID.finditer(line[:1000])]
+    words = [found[1].casefold() for line in lines for found in _STATED.finditer(line[:1000])]
     angles = {ANGLE_WORDS[word] for word in words if word in ANGLE_WORDS}
     lengths = {LENGTH_WORDS[word] for word in words if word in LENGTH_WORDS}
     return (angles.pop() if len(angles) == 1 else None), (lengths.pop() if len(lengths) == 1 else None)
 
 
-def decide(
-    kind: Kind, numbers: Sequence[Number], option: Unit | None, said: Unit | None, findings: Findings
+def decide_unit(
+    kind: Kind, numbers: Sequence[Number], option: Unit | None, stated: Unit | None, findings: Findings
 ) -> Unit | None:
-    """Return the unit of a table's numbers that have none of their own or over them.
+    """Return the unit of a table's numbers without a unit of their own or in the heading.
 
     Args:
         kind: Angles or lengths.
-        numbers: All numbers of the kind; contradictions between them are told in ``findings``.
-        option: What the user says; goes before headings.
-        said: What the text around the table says.
+        numbers: All numbers of the kind; contradictions between them go to ``findings``.
+        option: The user's choice; goes before headings.
+        stated: From the text around the table.
         findings: Takes problems and notes.
 
     Returns:
-        The unit; None where none is needed, or where it cannot be told (and ``findings`` says why).
+        The unit; None where none is needed, or where it is ambiguous (``findings`` has the problem then).
     """
     for number in numbers:
         _check(number, option, findings)
-    over = {unit for number in numbers if (unit := number.over) is not None}
+    over = {unit for number in numbers if (unit := number.heading_unit) is not None}
     marked = {unit for number in numbers if isinstance(unit := number.reading.unit, kind.units)}
-    unmarked = [number for number in numbers if number.reading.bare and number.over is None]
-    if option or said or not unmarked:
-        return option or said or min(over | marked, default=None)
+    unmarked = [number for number in numbers if number.reading.bare and number.heading_unit is None]
+    if option or stated or not unmarked:
+        return option or stated or min(over | marked, default=None)
     if len(over) == 1:
         (unit,) = over
         findings.note(f"{kind.what} without a unit was read in {unit}, the unit of other columns")
         return unit
-    return _by_themselves(kind, unmarked, marked, findings)
+    return _plausible_unit(kind, unmarked, marked, findings)
 
 
 def to_si(number: Number, *, option: Unit | None, default: Unit | None) -> float:
@@ -113,16 +113,16 @@ def to_si(number: Number, *, option: Unit | None, default: Unit | None) -> float
     Args:
         number: The number; its own unit goes first.
         option: The user's unit, which goes before the heading's.
-        default: Where nothing of these says a unit; None for rad and m.
+        default: Where none of these gives a unit; None for rad and m.
     """
-    unit = number.reading.unit or option or number.over or default
+    unit = number.reading.unit or option or number.heading_unit or default
     if isinstance(unit, AngleUnit):
         return Units(angle=unit).radians(number.reading.value)
     return number.reading.value if unit is None else Units(length=unit).metres(number.reading.value)
 
 
-def _by_themselves(kind: Kind, unmarked: Sequence[Number], marked: set[Unit], findings: Findings) -> Unit | None:
-    """Return the unit that numbers without one show by themselves."""
+def _plausible_unit(kind: Kind, unmarked: Sequence[Number], marked: set[Unit], findings: Findings) -> Unit | None:
+    """Return the unit that numbers without one are plausible in."""
     if marked:
         unit = min(marked)
         if len(marked) == 1 and all(kind.fits(unit, number.reading.value) for number in unmarked):
@@ -150,9 +150,9 @@ def _is_printed_pi(reading: Reading) -> bool:
 
 
 def _check(number: Number, option: Unit | None, findings: Findings) -> None:
-    """A cell's own unit is of the right kind and the one of its heading; an option that differs is noted."""
+    """Check that a cell's own unit is of the right kind and that of its heading; an option that differs is noted."""
     unit, cell = number.reading.unit, number.reading.cell
-    over, heading = number.over, shown(number.heading.cell.text)
+    over, heading = number.heading_unit, shown(number.heading.cell.text)
     if unit is not None and not isinstance(unit, number.kind.units):
         findings.wrong(cell, number.path, f"{shown(cell.text)} is in {unit}, and {number.kind.what} belongs here")
     elif unit is not None and over not in (None, unit) and number.reading.value != 0.0:

@@ -42,7 +42,7 @@ _UNIT: Final = 1e-3
 
 def read_joints(selection: Selection, report: XmlReport, notes: Notes) -> ChainJoints:
     """Read the joints between base and tip; every problem goes to the report."""
-    T = identity()  # of the link at hand in the link of the last moving joint
+    T = identity()  # of the current link in the link of the last moving joint
     joints, limits, dynamics = [], [], []
     for joint in selection.joints:
         _check_elements(joint, report)
@@ -63,25 +63,25 @@ def read_joints(selection: Selection, report: XmlReport, notes: Notes) -> ChainJ
 
 
 def _check_elements(joint: UrdfJoint, report: XmlReport) -> None:
-    """Complain of an element that is a slip of the pen: without it the joint would silently be another one."""
+    """Complain of a misspelt element, without which the joint would silently be another one."""
     for element in joint.element.children:
-        if (meant := _slip(element.tag, _ELEMENTS)) is not None:
+        if (meant := _misspelt(element.tag, _ELEMENTS)) is not None:
             report.add(element, joint.path, f"unknown element <{element.tag[:60]}>. Did you mean <{meant}>?")
 
 
 def _check_attributes(element: Element, known: Sequence[str], path: str, report: XmlReport) -> None:
-    """Complain of an attribute that is a slip of the pen; others are somebody else's."""
+    """Complain of a misspelt attribute; others are meant for other programs."""
     for name in element.attributes:
-        if (meant := _slip(name, known)) is not None:
+        if (meant := _misspelt(name, known)) is not None:
             report.add(element, path, f"unknown attribute {shown(name)}. Did you mean '{meant}'?")
 
 
-def _slip(name: str, known: Sequence[str]) -> str | None:
+def _misspelt(name: str, known: Sequence[str]) -> str | None:
     return None if name in known else closest(name, known)
 
 
 def _type(joint: UrdfJoint, report: XmlReport) -> JointType:
-    """Return how the joint moves; a joint that no row of a table can stand for is a problem."""
+    """Return how the joint moves; a joint that cannot be a row of a table is a problem."""
     mimic = joint.element.first("mimic")
     if mimic is not None:
         other = shown(mimic.attributes.get("joint", ""))
@@ -134,7 +134,7 @@ def _position(
 
 
 def _positive(limit: Element, attribute: str, name: str, path: str, report: XmlReport, notes: Notes) -> float | None:
-    """Return a velocity or effort limit; None where the file gives none that limits anything."""
+    """Return a velocity or effort limit; None where the file gives none, or one that does not limit anything."""
     value = read_bound(limit, attribute, path, report)
     if value is None or value == math.inf:
         return None

@@ -34,7 +34,7 @@ class Part:
 
     @property
     def path(self) -> str:
-        """How the path of a problem begins."""
+        """The start of the path of a problem."""
         return place("link", self.name)
 
 
@@ -54,9 +54,9 @@ class Body:
 
 
 def read_bodies(tree: UrdfTree, selection: Selection, report: XmlReport, notes: Notes) -> tuple[Body, ...]:
-    """Return the base and the link of every moving joint, in order, with what hangs on them.
+    """Return the base and the link of every moving joint, in order, with what is fixed to them.
 
-    A fixed joint off the arm whose pose cannot be read is noted, and what hangs on it is left out.
+    A fixed joint off the arm whose pose cannot be read is noted, and what it carries is left out.
     """
     arm = frozenset(joint.name for joint in selection.joints)
     starts = [selection.base, *(joint.child for joint in selection.joints if joint.moves)]
@@ -87,7 +87,7 @@ def _body(tree: UrdfTree, start: str, arm: frozenset[str], report: XmlReport, no
 
 
 def note_unreadable(report: XmlReport, sentence: str, name: str, notes: Notes) -> None:
-    """Note what is wrong where it does not matter to the arm; the sentence has a ``{}`` for all such names."""
+    """Note a problem that does not matter to the arm; the sentence has a ``{}`` for all such names."""
     problem = min(report.problems)
     notes.group(sentence, name, f"line {problem.line}: {problem.message}")
 
@@ -98,7 +98,7 @@ def weight_of(tree: UrdfTree, links: Sequence[str]) -> str:
 
 
 def _mass(link: Element) -> float:
-    """The mass that a link off the arm has, as far as it can be read."""
+    """Return the mass of a link off the arm, as far as it can be read."""
     inertial = link.first("inertial")
     mass = None if inertial is None else inertial.first("mass")
     value = 0.0 if mass is None else read_number(mass, "value", "", XmlReport(""))
@@ -106,14 +106,14 @@ def _mass(link: Element) -> float:
 
 
 _POINT_MASS_SHARE: Final = 0.1
-"""Of a body's mass: what lighter parts whose inertia is not known add by themselves is small."""
+"""Of a body's mass: parts of unknown inertia that are lighter than that may count as points."""
 
 
 def read_inertial(body: Body, report: XmlReport, notes: Notes) -> Inertial:
     """Combine the masses of all parts of a body.
 
     Broken numbers in a part on the way from base to tip are problems; elsewhere they are noted and the part has no
-    mass. An inertia that no body can have is noted and counts as unknown. Parts of unknown inertia count as point
+    mass. An impossible inertia is noted and counts as unknown. Parts of unknown inertia count as point
     masses where they are light; else the inertia of the whole is unknown.
 
     Args:
@@ -131,9 +131,7 @@ def read_inertial(body: Body, report: XmlReport, notes: Notes) -> Inertial:
         return possible_inertial(whole, body.name, notes)
     if math.fsum(unknown) > _POINT_MASS_SHARE * whole.mass:
         if len(known) > 1:
-            notes.group(
-                "The inertia of a heavy part is not known, and so not that of the whole, for links {}.", body.name
-            )
+            notes.group("The inertia of a heavy part is unknown, and so that of the whole, for links {}.", body.name)
         return Inertial(mass=whole.mass, com=whole.com)
     notes.group("Light parts of unknown inertia were counted as point masses, in links {}.", body.name)
     return possible_inertial(whole, body.name, notes)
@@ -163,7 +161,7 @@ def _read_part(part: Part, report: XmlReport, notes: Notes) -> tuple[MassPropert
         return None
     com = read_only(move_point(T, read_only([0, 0, 0])))
     if tensor is not None and not is_possible(tensor):
-        notes.group("An inertia that no body has is left out, of links {}.", part.name)
+        notes.group("Impossible inertias are left out, of links {}.", part.name)
         tensor = None
     elif tensor is None:
         notes.group("The file gives a mass without an inertia for links {}.", part.name)
@@ -186,7 +184,7 @@ def _tensor(inertial: Element, path: str, report: XmlReport) -> Array | None:
 
 
 def read_materials(robot: Element) -> Mapping[str, Color]:
-    """Return the colours that have a name and can be read; the robot's own win over those that links define."""
+    """Return the colours with a name; the robot's own win over those that links define."""
     materials: dict[str, Color] = {}
     visuals = [visual for link in robot.all("link") for visual in link.all("visual")]
     for owner in (robot, *visuals):
@@ -207,7 +205,7 @@ def read_look(
         body: A link of the arm.
         materials: Colours by name.
         find_mesh: Returns the file of a mesh uri, or None.
-        report: Only for the file's name: nothing about looks is an error.
+        report: Only for the file's name: problems of the appearance are not errors.
         notes: Takes what was left out, links of one reason together.
 
     Returns:
@@ -257,7 +255,7 @@ def _mesh(
 
 
 def _folder(uri: str) -> str:
-    """Words for where a mesh should be: its package, or the folder that the file names."""
+    """Return words for where a mesh should be: its package, or the folder in its name."""
     scheme, between, rest = uri.partition("://")
     if between:
         return shown(f"{scheme}://{rest.partition('/')[0]}")
@@ -266,7 +264,7 @@ def _folder(uri: str) -> str:
 
 
 def _material(visual: Element, path: str, materials: Mapping[str, Color], report: XmlReport) -> Color | None:
-    """Return the colour of a visual: its own, or the one that its name stands for."""
+    """Return the colour of a visual: its own, or that of the material with its name."""
     material = visual.first("material")
     if material is None:
         return None

@@ -28,8 +28,8 @@ _CARRIED: Final = {
 """Elements that are read, or noted elsewhere. ``mujoco`` only says how MuJoCo should read the file."""
 
 
-def note_leftovers(tree: UrdfTree, selection: Selection, bodies: Sequence[Body], notes: Notes) -> None:
-    """Note what is merged, what is not on the arm, and what no robot file says."""
+def _note_unused(tree: UrdfTree, selection: Selection, bodies: Sequence[Body], notes: Notes) -> None:
+    """Note what is merged, what is not on the arm, and what a robot file has no place for."""
     for body in bodies:
         merged = listed(shown(part.name) for part in body.parts[1:])
         if len(body.parts) > 1:
@@ -75,14 +75,14 @@ def read_urdf(
     """Return the serial arm that a URDF describes.
 
     Fixed joints are merged: poses are multiplied, and masses are combined into the link that carries them. Link
-    frames are those of the URDF. What is not on the arm must have its place in the tree, but its numbers do not
-    matter. Nothing is opened; ``find_mesh`` may look for files.
+    frames are those of the URDF. What is not on the arm must be part of the tree, but its numbers do not matter.
+    No file is opened; ``find_mesh`` may look for files.
 
     Args:
         data: The file's content.
         file: Its name, for messages.
-        base: Name of the link that the arm begins at; by default the root.
-        tip: Name of the link that it ends at. By default ``tool0`` where there is one; else where the only way that
+        base: Name of the link at which the arm begins; by default the root.
+        tip: Name of the link at which it ends. By default ``tool0`` where there is one; else where the only way that
             moves ends, or at a hand: a fork behind three joints or more, into branches of fewer joints.
         find_mesh: Returns the file of a mesh uri such as ``package://pkg/link.stl``, or None; never raises.
 
@@ -94,10 +94,10 @@ def read_urdf(
     selection = select_chain(tree, base, tip, report, notes)
     joints = read_joints(selection, report, notes)
     bodies = read_bodies(tree, selection, report, notes)
-    links = _links(tree, bodies, find_mesh, report, notes)
+    links = _serial_links(tree, bodies, find_mesh, report, notes)
     report.check()
     gravity = _gravity(tree, selection, notes)
-    note_leftovers(tree, selection, bodies, notes)
+    _note_unused(tree, selection, bodies, notes)
     name = tree.robot.attributes.get("name", "") or Path(file).name.partition(".")[0]
     return SerialRobot(
         name=name,
@@ -112,7 +112,7 @@ def read_urdf(
     )
 
 
-def _links(
+def _serial_links(
     tree: UrdfTree, bodies: tuple[Body, ...], find_mesh: FindMesh, report: XmlReport, notes: Notes
 ) -> tuple[SerialLink, ...]:
     """Return the base and the moving links; a robot file has no mass of the base, so that nothing is noted of it."""
@@ -126,7 +126,7 @@ def _links(
 
 
 def _gravity(tree: UrdfTree, selection: Selection, notes: Notes) -> Array:
-    """Return gravity in the base, which may hang on the root at an angle: in a URDF z of the root points up."""
+    """Return gravity in the base, which may be turned in the root: in a URDF z of the root points up."""
     T_root_base = identity()
     unread = XmlReport("")
     joint = tree.above.get(selection.base)

@@ -66,7 +66,7 @@ def read_numbers(
 def read_pose(owner: Element, path: str, report: XmlReport) -> Array:
     """Return the pose that an element's ``<origin>`` gives, shape (4, 4); the identity where there is none.
 
-    Raises nothing: an attribute that is not known is a problem, because the pose would silently be another one.
+    An unknown attribute is a problem, because the pose would silently be another one.
     """
     origin = read_only_child(owner, "origin", path, report)
     if origin is None:
@@ -102,7 +102,7 @@ def read_axis(joint: Element, path: str, report: XmlReport) -> tuple[Array, floa
 
 
 def read_only_child(owner: Element, tag: str, path: str, report: XmlReport) -> Element | None:
-    """Return the one child of a tag, or None; a second is a problem, for readers differ on which one counts."""
+    """Return the one child of a tag, or None; a second is a problem, as readers differ on which one counts."""
     found = owner.all(tag)
     if len(found) > 1:
         report.add(found[1], f"{path}.{tag}", f"a second <{tag}>; the first is on line {found[0].line}")
@@ -118,13 +118,13 @@ def check_attributes(element: Element, allowed: tuple[str, ...], path: str, repo
 
 
 def _number(text: str) -> float:
-    """The number that a word stands for, or NaN."""
+    """Return the number that a word is, or NaN."""
     value = float(text) if _NUMBER.fullmatch(text) else math.nan
     return value if abs(value) <= GREATEST else math.nan
 
 
 def _wrong(expected: str, text: str) -> str:
-    """Say what was found in place of numbers."""
+    """Return the message on what was found instead of numbers."""
     if any(abs(_plain(word)) > GREATEST for word in text.split()):
         return f"expected {expected} no greater than {GREATEST:g}, found {shown(text)}"
     comma = "; decimals are set off with a point" if re.search(r"[0-9],[0-9]", text) else ""
@@ -140,7 +140,7 @@ DYNAMICS: Final = ("damping", "friction")
 JOINT_TYPES: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 _EXPANDED: Final = ("link", "joint", "material")
-"""Elements of a robot whose attributes xacro has filled in; others may keep ``$(...)`` for somebody else."""
+"""Elements of a robot whose attributes xacro has filled in; others may keep ``$(...)`` for other programs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -163,7 +163,7 @@ class UrdfJoint:
 
     @property
     def path(self) -> str:
-        """How the path of a problem begins."""
+        """The start of the path of a problem."""
         return place("joint", self.name)
 
 
@@ -230,7 +230,7 @@ def _check_root(robot: Element, report: XmlReport) -> None:
 
 
 def _check_expanded(robot: Element, report: XmlReport) -> None:
-    """Complain of the first thing that xacro has yet to replace."""
+    """Complain of the first thing that xacro has not replaced."""
     prefixes = [
         name.partition(":")[2] for name, uri in robot.attributes.items() if name[:6] == "xmlns:" and "xacro" in uri
     ]
@@ -269,7 +269,7 @@ def _joints(robot: Element, links: Mapping[str, Element], report: XmlReport) -> 
     for element in robot.all("joint"):
         name = _name(element, report)
         path = place("joint", name) if name else "joint"
-        kind = _type(element, path, report)
+        kind = _joint_type(element, path, report)
         parent, child = (_end(element, tag, path, links, report) for tag in ("parent", "child"))
         if name in joints:
             line = joints[name].element.line
@@ -286,7 +286,7 @@ def _name(element: Element, report: XmlReport) -> str:
     return name
 
 
-def _type(element: Element, path: str, report: XmlReport) -> str:
+def _joint_type(element: Element, path: str, report: XmlReport) -> str:
     kind = element.attributes.get("type")
     if kind in JOINT_TYPES:
         return kind
@@ -299,7 +299,7 @@ def _type(element: Element, path: str, report: XmlReport) -> str:
 
 
 def _end(joint: Element, tag: str, path: str, links: Mapping[str, Element], report: XmlReport) -> str:
-    """Return the name of the parent or the child link, or nothing where it is wrong."""
+    """Return the name of the parent or the child link; empty where it is wrong."""
     element = read_only_child(joint, tag, path, report)
     name = None if element is None else element.attributes.get("link")
     if element is None or name is None:
@@ -331,7 +331,7 @@ def _root(links: Mapping[str, Element], above: Mapping[str, UrdfJoint], report: 
     if len(roots) > 1:
         names = listed(map(shown, roots))
         report.add(
-            links[roots[1]], place("link", roots[1]), f"several links hang on no joint: {names}; a URDF has one root"
+            links[roots[1]], place("link", roots[1]), f"several links have no parent: {names}; a URDF has one root"
         )
     for loop in _loops(links, above):
         names = listed(shown(joint.name) for joint in loop)

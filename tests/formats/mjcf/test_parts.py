@@ -159,9 +159,9 @@ def test_kinematics_need_no_mesh_files(tmp_path: Path) -> None:
     assert found == [(ActuatorType.POSITION, 2.0, None), (ActuatorType.NONE, None, None)]
     for note in (
         "Meshes were not found, of links 'one' (link.stl), 'two' (other.obj).",
-        "The mass is not known, as it would come from shapes that are missing, of links 'one'.",
-        "A damping ratio is left out, as masses are not known, of actuators 'actuator 1'.",
-        "A damping ratio stands for no damping, as masses are not known, for joints 'a'.",
+        "The mass is unknown, as it would come from missing shapes, of links 'one'.",
+        "A damping ratio is left out, as masses are unknown, of actuators 'actuator 1'.",
+        "A damping ratio counts as no damping, as masses are unknown, for joints 'a'.",
     ):
         assert note in robot.notes
 

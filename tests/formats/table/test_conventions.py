@@ -97,7 +97,7 @@ def test_what_contradicts_itself_is_refused_with_both_sides() -> None:
 def test_indices_that_do_not_go_together_are_refused() -> None:
     text = INDEXED.replace("a_i |", "a_{i-1} |", 1)
     assert complaints(text) == [
-        "t.md:1:15: the headings' indices do not go together: a and alpha have index i - 1 in a modified "
+        "t.md:1:15: the headings' indices contradict each other: a and alpha have index i - 1 in a modified "
         "table and i in "
         "a standard one, d and theta always i"
     ]

@@ -131,7 +131,7 @@ def test_a_configuration_outside_the_limits_is_left_out_and_told() -> None:
 
 
 def test_a_base_that_the_toolbox_does_not_print_is_told() -> None:
-    assert "the printout names a base and does not show its pose: it was left out" in imported(_printed("p8")).notes
+    assert "the printout names a base without its pose: it was left out" in imported(_printed("p8")).notes
 
 
 def test_flipped_joints_of_a_printout_stay_flipped() -> None:

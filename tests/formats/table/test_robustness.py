@@ -155,7 +155,7 @@ def test_tables_of_a_wrong_shape_are_refused() -> None:
 def test_what_stands_behind_a_table_between_separators_is_told() -> None:
     found = imported("theta,d,a,alpha\nq1,0,1,0\n\nq2,0,1,0\nThe end.\n", "t.csv", **STANDARD)
     assert len(found.spec.rows) == 2
-    assert found.notes[-1] == "what stands behind the table, from line 5, was not read as rows"
+    assert found.notes[-1] == "the text after the table, from line 5, was not read as rows"
 
 
 def test_a_name_that_no_robot_may_have_is_refused() -> None:

@@ -116,7 +116,7 @@ def test_an_example_pose_in_the_text_does_not_fix_a_joint() -> None:
 
 def test_d_that_may_be_a_length_or_a_coordinate_is_refused() -> None:
     assert complaints("# d1 = 0.4\n" + _rows("0,d1,0,0"), "t.csv", **STANDARD) == [
-        f"t.csv:3:3: row 1, d: 'd1' may be the joint's coordinate or the number that line 1 gives; {MARK}, or "
+        f"t.csv:3:3: row 1, d: 'd1' may be the joint's coordinate or the number given on line 1; {MARK}, or "
         "write the "
         "number"
     ]
@@ -187,7 +187,8 @@ def test_wrong_limits_are_refused_and_needless_ones_left_out() -> None:
         "around the table, such as 'x = 0.4 m'",
     ]
     assert complaints("theta,d,a,alpha (deg),limits\nq1,0,0,0,often\n", "t.csv", **STANDARD) == [
-        "t.csv:2:10: row 1, limits: 'often' is no pair of limits; write it as '[-170, 170]', '-170 to 170' or '±170'"
+        "t.csv:2:10: row 1, limits: 'often' is not a pair of limits; write it as '[-170, 170]', '-170 to 170' or "
+        "'±170'"
     ]
     found = imported(head + "C,0,0,0,0,-10°,10°\nF,0,0,0,0,-10°,10°\n", "t.csv", **STANDARD)
     assert [row.limits.position for row in found.spec.rows] == [None, None]
@@ -200,7 +201,7 @@ def test_names_are_used_where_a_robot_file_allows_them() -> None:
     text = "name,theta,d,a,alpha\nshoulder_pan,q1,0,0,0\nupper arm,q2,0,0,0\n3,q3,0,0,0\n,q4,0,0,0\n"
     found = imported(text, "t.csv", **STANDARD)
     assert [row.name for row in found.spec.rows] == ["shoulder_pan", "joint_2", "joint_3", "joint_4"]
-    assert found.notes == ("'upper arm' is no name for a joint in a robot file: it is called joint_2",)
+    assert found.notes == ("'upper arm' is not allowed as the name of a joint: it is called joint_2",)
 
 
 def test_names_that_two_joints_have_are_left_out() -> None:

@@ -174,7 +174,7 @@ def test_an_inertia_that_no_body_has_is_left_out_and_the_mass_kept(inertia: str)
     found = weighed(f'<origin xyz="1 0 0"/><mass value="2"/>{inertia}')
     assert (found.links[0].mass, found.links[0].inertia) == (2.0, None)
     np.testing.assert_array_equal(np.asarray(found.links[0].com), [1, 0, 0])
-    assert mass_notes(found) == ["An inertia that no body has is left out, of links 'link_0'."]
+    assert mass_notes(found) == ["Impossible inertias are left out, of links 'link_0'."]
 
 
 def test_the_inertia_of_a_flat_body_is_kept() -> None:
@@ -195,7 +195,7 @@ def test_light_parts_of_unknown_inertia_are_points_and_heavy_ones_make_the_whole
     np.testing.assert_array_equal(np.asarray(heavy.links[0].com), [0.25, 0, 0])
     assert mass_notes(heavy) == [
         "The file gives a mass without an inertia for links 'link_1'.",
-        "The inertia of a heavy part is not known, and so not that of the whole, for links 'link_0'.",
+        "The inertia of a heavy part is unknown, and so that of the whole, for links 'link_0'.",
     ]
 
 
@@ -203,7 +203,7 @@ def test_an_inertia_that_is_lost_in_rounding_when_parts_are_combined_is_left_out
     point = '<mass value="1e20"/><inertia ixx="1" iyy="1" izz="1"/>'
     found = weighed(f'<origin xyz="1 0.3 -0.7"/>{point}', f'<origin xyz="0 1.1 0.9"/>{point}')
     assert (found.links[0].mass, found.links[0].inertia) == (2e20, None)
-    assert mass_notes(found) == ["An inertia that no body has is left out, of links 'link_0'."]
+    assert mass_notes(found) == ["Impossible inertias are left out, of links 'link_0'."]
 
 
 def test_a_mass_that_cannot_be_read_is_an_error_on_the_arm() -> None:

@@ -161,7 +161,7 @@ def test_loops_and_several_roots_are_refused() -> None:
         "arm.urdf:7:1: joint[ff]: the joint joins a link to itself: 'ff'; a URDF is a tree",
     ]
     assert refusal(robot(links("a", "b"), links("c"), joint("ab", "a", "b"))) == [
-        "arm.urdf:3:1: link[c]: several links hang on no joint: 'a', 'c'; a URDF has one root"
+        "arm.urdf:3:1: link[c]: several links have no parent: 'a', 'c'; a URDF has one root"
     ]
     assert refusal(robot(links("a", "b"), joint("ab", "a", "b"), joint("ba", "b", "a"))) == [
         "arm.urdf:3:1: joint[ab]: these joints form a loop: 'ab', 'ba'; a URDF is a tree"
