@@ -1,66 +1,91 @@
-"""Where points of the scene are in the picture."""
+"""Where points of space are in a picture: central projection, as cameras see, and parallel projection."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from dh2sim.draw.offscreen import import_mujoco
 from dh2sim.typing import Array, read_only
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Projection:
-    """A pinhole camera: what MuJoCo draws with, for points."""
+class PinholeCamera:
+    """Central projection, without distortion."""
 
     position: Array
-    """Of the camera, m, shape (3,)."""
-    rotation: Array
-    """Rows: to the right, up, forward; shape (3, 3)."""
-    scale: float
-    """Pixels that a length of 1 m at a distance of 1 m takes."""
-    centre: tuple[float, float]
-    """Pixel that the camera looks at, from top left."""
-    near: float
-    """Nearest distance that is drawn, m."""
+    """m, shape (3,)."""
+    right: Array
+    """What is to the right in the picture, a unit vector, shape (3,)."""
+    up: Array
+    """What is upwards in the picture, a unit vector, shape (3,)."""
+    focal: float
+    """Pixels that a length of 1 m takes at a distance of 1 m."""
+    size: tuple[int, int]
+    """Width and height of the picture, pixels."""
 
-    def pixels(self, points: Array) -> Array:
-        """Return pixels, x to the right and y down, shape (count, 2); NaN for what is not before the camera.
+    def pixels(self, points: ArrayLike) -> Array:
+        """Return where points are seen, pixels from the top left corner, x to the right and y down.
 
         Args:
-            points: m, shape (count, 3).
+            points: m, shape (..., 3).
+
+        Returns:
+            Shape (..., 2); NaN for points that are not in front of the camera.
         """
-        local = (points - self.position) @ self.rotation.T
-        depth = np.where(local[:, 2] > self.near, local[:, 2], np.nan)
-        x = self.centre[0] + self.scale * local[:, 0] / depth
-        y = self.centre[1] - self.scale * local[:, 1] / depth
-        return np.stack([x, y], axis=1)
+        offsets = np.asarray(points) - self.position
+        depth = self.depth(points)
+        scale = self.focal / np.where(depth > 0.0, depth, np.nan)
+        width, height = self.size
+        return np.stack(
+            [width / 2 + scale * (offsets @ self.right), height / 2 - scale * (offsets @ self.up)], axis=-1
+        )
 
-    def depth(self, points: Array) -> Array:
-        """Return how far before the camera points are, m, shape (count,)."""
-        return np.asarray((points - self.position) @ self.rotation[2])
+    def depth(self, points: ArrayLike) -> Array:
+        """Return how far points are in front of the camera, m, shape (...,)."""
+        return np.asarray((np.asarray(points) - self.position) @ np.cross(self.up, self.right))
 
 
-def scene_projection(scene: Any, width: int, height: int) -> Projection:
-    """Return the projection of a scene's camera, as ``mjr_render`` uses it.
+def scene_camera(scene: Any, width: int, height: int) -> PinholeCamera:
+    """Return the camera that MuJoCo renders a scene with; its frustum must be symmetric, as it is by default.
 
     Args:
         scene: ``mujoco.MjvScene``, updated before.
         width: of the picture, pixels.
         height: of the picture, pixels.
     """
-    camera = import_mujoco().mjv_averageCamera(scene.camera[0], scene.camera[1])
-    forward, up = np.array(camera.forward, dtype=float), np.array(camera.up, dtype=float)
-    tall = camera.frustum_top - camera.frustum_bottom
-    scale = camera.frustum_near * height / tall
-    middle = 0.5 * (camera.frustum_top + camera.frustum_bottom) / camera.frustum_near
-    aside = camera.frustum_center / camera.frustum_near
-    return Projection(
-        position=read_only(camera.pos),
-        rotation=read_only(np.stack([np.cross(forward, up), up, forward])),
-        scale=float(scale),
-        centre=(width / 2 - scale * aside, height / 2 + scale * middle),
-        near=float(camera.frustum_near),
+    left, right = scene.camera[0], scene.camera[1]  # the eyes of a stereoscopic picture
+    forward, up = np.array(left.forward, dtype=float), np.array(left.up, dtype=float)
+    return PinholeCamera(
+        position=read_only(0.5 * (np.array(left.pos, dtype=float) + np.array(right.pos, dtype=float))),
+        right=read_only(np.cross(forward, up)),
+        up=read_only(up),
+        focal=float(left.frustum_near * height / (left.frustum_top - left.frustum_bottom)),
+        size=(width, height),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ParallelView:
+    """Parallel projection with base_link's z upright."""
+
+    right: Array
+    """What is to the right in the picture, a unit vector, shape (3,)."""
+    up: Array
+    """What is upwards in the picture, a unit vector, shape (3,)."""
+
+    def project(self, points: ArrayLike) -> Array:
+        """Project points, shape (..., 3), to the right and up, shape (..., 2), in their own unit."""
+        return np.stack([np.asarray(points) @ self.right, np.asarray(points) @ self.up], axis=-1)
+
+
+def look_from(azimuth: float, elevation: float) -> ParallelView:
+    """Return the parallel projection that looks from a direction, degrees."""
+    az, el = math.radians(azimuth), math.radians(elevation)
+    return ParallelView(
+        right=read_only([-math.sin(az), math.cos(az), 0.0]),
+        up=read_only([-math.sin(el) * math.cos(az), -math.sin(el) * math.sin(az), math.cos(el)]),
     )
