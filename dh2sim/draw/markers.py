@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.draw.labels import vertical_shift
-from dh2sim.draw.projection import PinholeCamera
+from dh2sim.draw.projection import Pinhole
 from dh2sim.typing import Array
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def frame_sites(model: Any) -> list[tuple[int, str]]:
 
 
 def draw_frames(
-    pixels: NDArray[np.uint8], data: Any, sites: Sequence[tuple[int, str]], camera: PinholeCamera, extent: float
+    pixels: NDArray[np.uint8], data: Any, sites: Sequence[tuple[int, str]], pinhole: Pinhole, extent: float
 ) -> NDArray[np.uint8]:
     """Draw three arrows for every frame over a picture, and its name; frames at one point share the label.
 
@@ -51,7 +51,7 @@ def draw_frames(
         pixels: the picture, shape (height, width, 3).
         data: ``mujoco.MjData`` with the poses of the sites.
         sites: numbers and names.
-        camera: of the picture.
+        pinhole: the camera of the picture.
         extent: of the scene, m.
 
     Returns:
@@ -67,8 +67,8 @@ def draw_frames(
     for number, name in sites:
         origin, R = np.array(data.site_xpos[number]), np.array(data.site_xmat[number]).reshape(3, 3)
         tips = origin + AXIS_LENGTH * extent * R.T
-        ends = camera.pixels(np.concatenate([origin[None], tips]))
-        depths = camera.depth(tips)
+        ends = pinhole.pixels(np.concatenate([origin[None], tips]), picture.size)
+        depths = pinhole.project(tips)[:, 2]
         arrows += [(float(depths[k]), ends[0], ends[k + 1], AXIS_COLORS[k]) for k in range(3)]
         for place, names in places:
             if np.abs(place - ends[0]).max() < 0.75:

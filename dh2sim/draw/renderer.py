@@ -19,7 +19,7 @@ from dh2sim.draw.camera import CameraChoice, extreme_points, follows_base, make_
 from dh2sim.draw.markers import TRACE_RADIUS, add_trace, draw_frames, frame_sites, simplified
 from dh2sim.draw.motion import Motion
 from dh2sim.draw.offscreen import open_renderer
-from dh2sim.draw.projection import scene_camera
+from dh2sim.draw.projection import scene_pinhole
 from dh2sim.errors import PictureError
 from dh2sim.typing import Array
 
@@ -205,8 +205,8 @@ class MotionRenderer:
             add_trace(scene, np.concatenate([self.trace[:past], here]), TRACE_RADIUS * self.size)
         pixels: NDArray[np.uint8] = self.renderer.render()
         if options.frames:
-            camera = scene_camera(scene, options.width, options.height)
-            pixels = draw_frames(pixels, self.data, frame_sites(model), camera, self.size)
+            pinhole = scene_pinhole(scene, options.height)
+            pixels = draw_frames(pixels, self.data, frame_sites(model), pinhole, self.size)
         return pixels
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dh2sim.draw.camera import CameraChoice
 from dh2sim.draw.motion import Motion
-from dh2sim.draw.projection import scene_camera
+from dh2sim.draw.projection import scene_pinhole
 from dh2sim.draw.renderer import PictureOptions, open_motion
 from dh2sim.errors import PictureError
 from dh2sim.typing import read_only
@@ -104,11 +104,11 @@ def test_frames_are_drawn_over_the_robot() -> None:
     assert 0.003 < differences.mean() < 0.1
     with open_motion(motion, SMALL) as renderer:
         renderer.picture(0)
-        projection = scene_camera(renderer.renderer.scene, 320, 180)
+        pinhole = scene_pinhole(renderer.renderer.scene, 180)
         for name in ("dh_1", "dh_2", "dh_3"):
             site = renderer.data.site(name)
             half = site.xpos + 0.085 * renderer.size * site.xmat.reshape(3, 3).T
-            for axis, (x, y) in enumerate(projection.pixels(half)):
+            for axis, (x, y) in enumerate(pinhole.pixels(half, (320, 180))):
                 around = framed[round(y) - 2 : round(y) + 3, round(x) - 2 : round(x) + 3].reshape(-1, 3).astype(int)
                 others = np.delete(around, axis, axis=1).max(axis=1)
                 assert (around[:, axis] - others).max() > 40, f"{name} has an axis {'xyz'[axis]} of its colour"
@@ -134,8 +134,8 @@ def test_points_are_projected_to_where_they_are_drawn(camera: CameraChoice) -> N
     motion = Motion(model=model, qpos=read_only(np.zeros((1, 0))), time=read_only([0.0]))
     with open_motion(motion, PictureOptions(width=640, height=400, camera=camera)) as renderer:
         everything = robot_seen(renderer, 0)
-        projection = scene_camera(renderer.renderer.scene, 640, 400)
-    x, y = projection.pixels(np.array([[0.5, 0.3, 0.4]]))[0]
+        pinhole = scene_pinhole(renderer.renderer.scene, 400)
+    x, y = pinhole.pixels([[0.5, 0.3, 0.4]], (640, 400))[0]
     rows, columns = np.nonzero(everything)
     near = np.hypot(columns + 0.5 - x, rows + 0.5 - y) < 30
     assert near.sum() > 100
