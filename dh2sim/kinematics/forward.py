@@ -7,7 +7,6 @@ The geometric Jacobian of a chain, for any number of configurations at once.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -25,6 +24,7 @@ from dh2sim.kinematics.batch_frame import (
 )
 from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vector, joint_vectors
 from dh2sim.kinematics.transforms import compose, identity, joint_part
+from dh2sim.messages import did_you_mean, shown
 from dh2sim.typing import Array
 
 
@@ -178,6 +178,21 @@ def frame_names(chain: KinematicChain) -> tuple[str, ...]:
     return ("base_link", *links, *(f"dh_{i}" for i in range(n + 1)), "tool0")
 
 
+def require_frame(chain: KinematicChain, frame: str) -> None:
+    """Check that the robot has a frame of this name.
+
+    Raises:
+        UnknownFrameError: It has not; the text lists the names.
+    """
+    names = frame_names(chain)
+    if frame not in names:
+        n = len(chain.joints)
+        raise UnknownFrameError(
+            f"unknown frame {shown(frame)}.{did_you_mean(frame, names)} Frames: base_link, link_1 to link_{n}, "
+            f"dh_0 to dh_{n}, tool0"
+        )
+
+
 def frame_pose(chain: ChainLike, frame: str, q: ArrayLike) -> Array:
     """Return the pose of a named frame in base_link.
 
@@ -194,14 +209,7 @@ def frame_pose(chain: ChainLike, frame: str, q: ArrayLike) -> Array:
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
     robot = chain_of(chain)
-    names = frame_names(robot)
-    if frame not in names:
-        close = difflib.get_close_matches(frame, names, n=1)
-        hint = f" Did you mean '{close[0]}'?" if close else ""
-        n = len(robot.joints)
-        raise UnknownFrameError(
-            f"there is no frame '{frame}'.{hint} Frames: base_link, link_1 to link_{n}, dh_0 to dh_{n}, tool0"
-        )
+    require_frame(robot, frame)
     tool = forward_kinematics(robot, q)
     if frame == "tool0":
         return tool
@@ -215,35 +223,52 @@ def frame_pose(chain: ChainLike, frame: str, q: ArrayLike) -> Array:
 _NOTHING: Column = (0.0, 0.0, 0.0)
 
 
-def geometric_jacobian(chain: ChainLike, q: ArrayLike) -> Array:
-    """Return the Jacobian of tool0 in base_link: [velocity; angular velocity] = J · dq/dt.
+def geometric_jacobian(chain: ChainLike, q: ArrayLike, *, frame: str = "tool0") -> Array:
+    """Return the Jacobian of a frame in base_link: [velocity; angular velocity] = J · dq/dt.
 
-    For a joint that turns about the unit axis z through p the column is [z x (p_tool0 - p); z], for one that
-    slides along z it is [z; 0]. Source: M. W. Spong, S. Hutchinson, M. Vidyasagar, Robot Modeling and
-    Control, 2006, section 4.6.
+    For a joint that turns about the unit axis z through p the column is [z x (p_frame - p); z], for one that
+    slides along z it is [z; 0], and for one behind the frame it is zero. Source: M. W. Spong, S. Hutchinson,
+    M. Vidyasagar, Robot Modeling and Control, 2006, section 4.6.
 
     Args:
         chain: The robot, in any form.
         q: Joint vectors, rad and m, shape (..., n).
+        frame: One of ``frame_names``.
 
     Returns:
-        Shape (..., 6, n): rows 0-2 velocity of tool0's origin, m/s; rows 3-5 angular velocity, rad/s; both
+        Shape (..., 6, n): rows 0-2 velocity of the frame's origin, m/s; rows 3-5 angular velocity, rad/s; both
         along the axes of base_link, for each rad/s or m/s of a joint coordinate.
 
     Raises:
+        UnknownFrameError: There is no such frame.
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
     robot = chain_of(chain)
-    T_joint_tool0 = compose(robot.joints[-1].T_joint_dh, robot.T_dhn_tool0)
+    carriers, T_joint_frame = _place(robot, frame)
 
     def fill(out: Array, columns: Array) -> None:
-        frames = list(joint_frames(robot, columns))
-        tool = frames[-1].then(T_joint_tool0)
-        moving = [pair for pair in zip(robot.joints, frames, strict=True) if pair[0].type.moves]
-        for i, (joint, frame) in enumerate(moving):
-            _write(out[:, :, i], frame, tool, turns=joint.type.turns, sign=joint.sign * frame.signs[2])
+        out[...] = 0.0
+        frames = list(joint_frames(robot, columns))[:carriers]
+        if not frames:
+            return
+        target = frames[-1].then(T_joint_frame)
+        pairs = zip(robot.joints, frames, strict=False)
+        for i, (joint, axis) in enumerate(pair for pair in pairs if pair[0].type.moves):
+            _write(out[:, :, i], axis, target, turns=joint.type.turns, sign=joint.sign * axis.signs[2])
 
     return in_blocks(robot, q, (6, robot.n), fill)
+
+
+def _place(chain: KinematicChain, frame: str) -> tuple[int, Array]:
+    """Return how many joints carry a named frame, and its pose in the last of them."""
+    require_frame(chain, frame)
+    n = len(chain.joints)
+    if frame == "tool0":
+        return n, compose(chain.joints[-1].T_joint_dh, chain.T_dhn_tool0)
+    kind, _, index = frame.partition("_")
+    if kind == "dh" and index != "0":
+        return int(index), chain.joints[int(index) - 1].T_joint_dh
+    return (int(index) if kind == "link" else 0), identity()
 
 
 def _write(out: Array, frame: BlockFrame, tool: BlockFrame, *, turns: bool, sign: float) -> None:

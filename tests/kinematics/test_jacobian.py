@@ -7,7 +7,7 @@ from hypothesis import given
 from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.batch_frame import BLOCK
 from dh2sim.kinematics.chain import build_chain
-from dh2sim.kinematics.forward import geometric_jacobian
+from dh2sim.kinematics.forward import frame_names, frame_pose, geometric_jacobian
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
@@ -39,6 +39,20 @@ def test_jacobian_blocks_join_without_a_seam(spec: RobotSpec) -> None:
     q = np.random.default_rng(2).uniform(-3, 3, (BLOCK + 10, len(spec.moving_rows)))
     found = geometric_jacobian(build_chain(spec), q)
     np.testing.assert_allclose(found[-40:], differences_of_the_table(spec, q[-40:]), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("spec", [ODD_ARM, STANFORD])
+def test_jacobian_of_any_frame_equals_its_central_differences(spec: RobotSpec) -> None:
+    chain, step = build_chain(spec), 1e-5
+    n = chain.n
+    q = np.random.default_rng(1).uniform(-1, 1, n)
+    for frame in frame_names(chain):
+        found = geometric_jacobian(chain, q, frame=frame)
+        ahead, behind = (frame_pose(chain, frame, q + sign * step * np.eye(n)) for sign in (1, -1))
+        rate = (ahead - behind) / (2 * step)
+        spin = rate[:, :3, :3] @ frame_pose(chain, frame, q)[:3, :3].T
+        expected = [*rate[:, :3, 3].T, spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9, err_msg=frame)
 
 
 @pytest.mark.parametrize("batch", [(), (0,), (1,), (2, 3)])
