@@ -102,7 +102,7 @@ class Loss:
                 words = f"{self.what} ({names})"
             case Lost.EXCLUSIONS:
                 pairs = "1 pair" if len(self.where) == 1 else f"{len(self.where)} pairs"
-                words = f"{pairs} of links that do not collide ('dh2sim info' lists them, as in an SRDF)"
+                words = f"{pairs} of links that do not collide ('dh2sim info --srdf' lists them)"
             case Lost.APPEARANCE:
                 words = (
                     f"mesh of {names}: converted from {self.detail} to binary STL, which has no colours or textures"

@@ -23,23 +23,11 @@ MODULES = {
     "plot": {"matplotlib", "xarray"},
     "video": {"PIL", "imageio_ffmpeg", "xarray"},
     "data": {"xarray", "pyarrow", "h5netcdf", "h5py"},
-    "engines": {"yourdfpy"},
+    "engines": {"yourdfpy", "pinocchio"},
 }
 """What is imported of each extra's libraries."""
-BROUGHT = {
-    "pinocchio",
-    "pandas",
-    "scipy",
-    "qpsolvers",
-    "daqp",
-    "websockets",
-    "requests",
-    "imageio",
-    "lxml",
-    "shapely",
-    "embreex",
-}
-"""Some of what they bring along, and an engine that comes with none of them."""
+BROUGHT = {"pandas", "scipy", "qpsolvers", "daqp", "websockets", "requests", "imageio", "lxml", "shapely", "embreex"}
+"""Some of what they bring along."""
 OPTIONAL = {*BROUGHT, *(module for modules in MODULES.values() for module in modules)}
 AXES = """\
 name: two_joints

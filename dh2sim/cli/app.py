@@ -1,60 +1,120 @@
-"""The commands of the ``dh2sim`` program."""
+"""The commands of the ``dh2sim`` program; only the one that is called is imported."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from importlib import import_module
+from typing import Annotated, Any, Final, NamedTuple
 
 import typer
+from typer.core import TyperGroup
 
 from dh2sim.cli.common import guarded
-from dh2sim.cli.export import export
-from dh2sim.cli.fk import fk
-from dh2sim.cli.importing import convert, frames, import_robot
-from dh2sim.cli.info import info
-from dh2sim.cli.pictures import plot, render
-from dh2sim.cli.robots import list_robots, schema
-from dh2sim.cli.rollout import rollout
-from dh2sim.cli.runs import runs
-from dh2sim.cli.validate import validate
-from dh2sim.cli.view import view
+
+
+class Command(NamedTuple):
+    """Where a command is defined, and its line in the help of the program."""
+
+    module: str
+    """Of ``dh2sim.cli``."""
+    function: str
+    help: str
+    settings: dict[str, Any] = {}  # noqa: RUF012
+
+
+NEGATIVE_NUMBERS: Final = {"ignore_unknown_options": True}
+"""A negative number is an argument, not an option."""
+
+COMMANDS: Final = {
+    "new": Command("new", "new", "Write a robot file to start from."),
+    "export": Command("export", "export", "Write URDF and MJCF, verified against the table."),
+    "validate": Command("validate", "validate", "Check every engine against the table."),
+    "fk": Command("fk", "fk", "Print the pose of a frame.", NEGATIVE_NUMBERS),
+    "jacobian": Command("fk", "jacobian", "Print the Jacobian, and how close it is to singular.", NEGATIVE_NUMBERS),
+    "info": Command("info", "info", "Print the table, frames, mass and reach."),
+    "view": Command("view", "view", "Show a robot in the browser, and edit its table."),
+    "import": Command("importing", "import_robot", "Make a robot file from a URDF, an MJCF or a table."),
+    "convert": Command("importing", "convert", "Write a table in the other convention."),
+    "frames": Command("importing", "frames", "Assign DH frames to joint axes, step by step."),
+    "rollout": Command("rollout", "rollout", "Simulate many rollouts into a dataset."),
+    "render": Command("pictures", "render", "Render a rollout as a video, or a robot as an image."),
+    "plot": Command("pictures", "plot", "Plot joints, tool, energy or tracking."),
+    "runs": Command("runs", "runs", "Describe a run, or convert it to Parquet or HDF5."),
+    "list": Command("robots", "list_robots", "List the robots that come with dh2sim."),
+    "schema": Command("robots", "schema", "Print the JSON Schema of robot files."),
+}
 
 HELP = """\
 From a Denavit-Hartenberg table to a simulated robot that provably matches it.
 
 \b
 Examples:
-  dh2sim list                        the robots that come with it
+  dh2sim new my_arm                  a robot file to start from
+  dh2sim list                        the robots that come with dh2sim
   dh2sim info stanford               its table, frames, mass and reach
   dh2sim export stanford             write URDF and MJCF to generated/stanford/
   dh2sim validate stanford           check every engine against the table
-  dh2sim fk stanford 0.3 -0.7 0.5 1.1 0.6 -0.4
+  dh2sim fk stanford 17 -40 0.5 63 34 -23
+  dh2sim jacobian stanford home
   dh2sim view stanford --export stanford.html
   dh2sim import arm.urdf -o arm.yaml
   dh2sim convert stanford --to modified
   dh2sim frames axes.yaml            from joint axes to a table
   dh2sim rollout stanford --out run.zarr
-  dh2sim runs run.zarr               what a run holds
+  dh2sim runs run.zarr               what a run contains
   dh2sim plot run.zarr               how its joints move
-  dh2sim render run.zarr             a film of it
+  dh2sim render run.zarr             a video of it
 
 ROBOT is the path of a robot file, or the name of a robot that comes with dh2sim.
 
-Exit status: 0 done, 1 a check fell short, 2 bad input or usage, 130 interrupted.
+Exit status: 0 done, 1 a check failed, 2 bad input or usage, 130 interrupted.
 """
 
-# Plain help texts: importing rich for them would double the time that --help takes.
-app = typer.Typer(
-    help=HELP,
-    add_completion=False,
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-)
+
+class LazyGroup(TyperGroup):
+    """Builds a command when it is called: importing and building them all takes longer than most of them run."""
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
+        """Return the names, in the order of the help."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
+        """Return a command, None if there is none of this name."""
+        if cmd_name not in COMMANDS:
+            return None
+        command = COMMANDS[cmd_name]
+        single = _plain_app(add_completion=False)
+        function = getattr(import_module(f"dh2sim.cli.{command.module}"), command.function)
+        single.command(cmd_name, context_settings={**_SETTINGS, **command.settings})(guarded(function))
+        return typer.main.get_command(single)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the command that the first argument names."""
+        name = args[0]
+        if name not in COMMANDS and not name.startswith("-"):
+            from dh2sim.messages import did_you_mean, shown
+
+            ctx.fail(f"unknown command {shown(name)}.{did_you_mean(name, COMMANDS)}".rstrip("."))
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002
+        """List the commands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, command.help) for name, command in COMMANDS.items()])
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+_SETTINGS: Final = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+
+
+def _plain_app(**options: Any) -> typer.Typer:
+    """Return an app with plain help texts: importing rich for them would double the time that --help takes."""
+    return typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False, context_settings=_SETTINGS, **options)
+
+
+app = _plain_app(cls=LazyGroup, help=HELP, no_args_is_help=True)
+
+
+def _show_version(requested: bool) -> None:
+    if requested:
         from importlib.metadata import version
 
         typer.echo(f"dh2sim {version('dh2sim')}")
@@ -68,20 +128,3 @@ def _options(
     ] = False,
 ) -> None:
     """Hold the options of the program itself."""
-
-
-app.command(short_help="Write URDF and MJCF, verified against the table.")(guarded(export))
-app.command(short_help="Check every engine against the table.")(guarded(validate))
-# a negative number is no option
-app.command(context_settings={"ignore_unknown_options": True}, short_help="Print the pose of a frame.")(guarded(fk))
-app.command(short_help="Print the table, frames, mass and reach.")(guarded(info))
-app.command(short_help="See a robot in the browser, and edit its table.")(guarded(view))
-app.command("import", short_help="Make a robot file of a URDF, an MJCF or a table.")(guarded(import_robot))
-app.command(short_help="Write a table in the other convention.")(guarded(convert))
-app.command(short_help="Assign DH frames to joint axes, step by step.")(guarded(frames))
-app.command(short_help="Simulate many rollouts into a dataset.")(guarded(rollout))
-app.command(short_help="Render a rollout as a film, or a robot.")(guarded(render))
-app.command(short_help="Plot joints, tool, energy or tracking.")(guarded(plot))
-app.command(short_help="Tell what a run holds, or convert it to Parquet or HDF5.")(guarded(runs))
-app.command("list", short_help="List the robots that come with dh2sim.")(guarded(list_robots))
-app.command(short_help="Print the JSON Schema of robot files.")(guarded(schema))

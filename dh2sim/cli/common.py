@@ -1,49 +1,80 @@
-"""How a command ends: what is told where, and with which exit status.
-
-Options that take one of a few words.
-
-What prints in colour and in tables.
-
-A bar that shows how far long work has come.
-
-Sizes as people read them.
-
-How commands that make robot files hand them over.
-"""
+"""What every command shares: how it ends, its arguments ROBOT, and options that take one of a few words."""
 
 from __future__ import annotations
 
 import functools
 import math
 import os
+import re
 import sys
-import textwrap
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Annotated, ParamSpec, TypeVar
 
 import typer
 
-from dh2sim.errors import Dh2simError, MismatchError, OutputError, RobotFileError, SettingsError
+from dh2sim.errors import Dh2simError, MismatchError, RobotFileError, SettingsError
 
 if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.table import Table
-
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.robot.spec import RobotSpec
 
+DONE, FELL_SHORT, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+P = ParamSpec("P")
+T = TypeVar("T")
+R = TypeVar("R")
 Word = TypeVar("Word", bound=StrEnum)
 
 
+# ---------------------------------------------------------------------------- arguments and options
+
+
+def complete_robot(incomplete: str) -> list[str]:
+    """Return what a shell offers for ROBOT: robots that come with dh2sim, robot files and folders."""
+    from dh2sim.robot.read import builtin_robots
+
+    names = [name for name in builtin_robots() if name.startswith(incomplete)]
+    folder, start = os.path.split(incomplete)
+    try:
+        entries = sorted(os.scandir(folder or "."), key=lambda entry: entry.name)
+    except OSError:
+        return names
+    for entry in entries:
+        if entry.name.startswith(start) and (start or not entry.name.startswith(".")):
+            path = os.path.join(folder, entry.name)
+            if entry.is_dir():
+                names.append(f"{path}/")
+            elif entry.name.endswith((".yaml", ".yml")):
+                names.append(path)
+    return names
+
+
+RobotArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT",
+        help="A robot file, or the name of a robot that comes with dh2sim.",
+        autocompletion=complete_robot,
+    ),
+]
+RobotsArgument = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="ROBOT",
+        help="Robot files, or names of robots that come with dh2sim.",
+        autocompletion=complete_robot,
+    ),
+]
+
+
 def choice(text: str | None, words: type[Word], option: str, *, without: tuple[Word, ...] = ()) -> Word | None:
-    """Return the word of an enumeration that an option was given, None where it was not given.
+    """Return the member of an enumeration that the value of an option names; None if it was not given.
 
     Raises:
-        BadParameter: it is none of them.
+        BadParameter: The value names no member.
     """
     if text is None:
         return None
@@ -54,129 +85,24 @@ def choice(text: str | None, words: type[Word], option: str, *, without: tuple[W
 
         names = [word.value for word in allowed]
         hint = did_you_mean(text, names)
-        raise typer.BadParameter(f"{shown(text)} is none of {', '.join(names)}.{hint}".rstrip("."), param_hint=option)
+        raise typer.BadParameter(
+            f"{shown(text)} is not one of {', '.join(names)}.{hint}".rstrip("."), param_hint=option
+        )
     return found
 
 
 def tolerance_of(value: float) -> float:
-    """Return a tolerance.
+    """Return the value of ``--tolerance``.
 
     Raises:
-        BadParameter: it is not above 0 and below 1.
+        BadParameter: It is not above 0 and below 1.
     """
     if not (math.isfinite(value) and 0.0 < value < 1.0):
-        raise typer.BadParameter(f"{value} is not between 0 and 1", param_hint="--tolerance")
+        raise typer.BadParameter(f"must be above 0 and below 1, got {value}", param_hint="--tolerance")
     return value
 
 
-WIDEST = 1000
-"""Columns; more than any table has."""
-
-
-def make_console(width: int | None = None) -> Console:
-    """Return a console on standard output, by default as wide as the terminal."""
-    from rich.console import Console
-
-    class PlainSpoken(Console):
-        """Leaves it to the command what comes of a reader that has had enough; rich would end the program."""
-
-        def on_broken_pipe(self) -> None:
-            raise BrokenPipeError
-
-    return PlainSpoken(highlight=False, width=width)
-
-
-def print_whole(table: Table) -> None:
-    """Print a table at the width it needs, however narrow the terminal: no column is cut short or left out."""
-    make_console(WIDEST).print(table)
-
-
-@contextmanager
-def progress_bar(doing: str, what: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
-    """Show a bar on standard error if that is a terminal; it vanishes in the end.
-
-    Args:
-        doing: what is done, as in 'comparing'.
-        what: what is counted, as in 'poses'.
-        total: how many there are.
-        quiet: show nothing.
-
-    Yields:
-        A function to call with how many are done since the last call.
-    """
-    if quiet or not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    with Progress(
-        TextColumn(doing),
-        BarColumn(),
-        TextColumn("{task.completed:,.0f} of {task.total:,.0f} " + what),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    ) as bar:
-        task = bar.add_task("", total=total)
-        yield lambda done: bar.advance(task, done)
-
-
-def size_text(count: int) -> str:
-    """Return a number of bytes as in '12.3 MB'."""
-    size, unit = float(count), "B"
-    for larger in ("kB", "MB", "GB", "TB"):
-        if size < 999.95:
-            break
-        size, unit = size / 1000.0, larger
-    return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
-
-
-def require_free(out: Path | None, *, force: bool) -> None:
-    """Refuse to write over a file, unless asked to.
-
-    Raises:
-        OutputError: There is a file, or no folder to put one in.
-    """
-    if out is None:
-        return
-    if out.is_dir():
-        raise OutputError(f"cannot write '{out}': that is a folder")
-    if not out.parent.is_dir():
-        raise OutputError(f"cannot write '{out}': there is no folder '{out.parent}'")
-    if out.exists() and not force:
-        raise OutputError(f"'{out}' exists already; choose another name, or write over it with --force")
-
-
-def hand_over(text: str, out: Path | None, *, summary: str, notes: Iterable[str] = (), quiet: bool = False) -> None:
-    """Print a robot file, or write it whole; what there is to say of it goes where it does not mix with the file.
-
-    Raises:
-        OutputError: It cannot be written; what stood there before stands untouched.
-    """
-    if out is None:
-        sys.stdout.write(text)
-        sys.stdout.flush()
-    else:
-        from dh2sim.files import atomic_file
-
-        with atomic_file(out) as draft:
-            draft.write_text(text, encoding="utf-8")
-    if quiet:
-        return
-    for note in notes:
-        text = textwrap.fill(f"dh2sim: note: {note}", 80, subsequent_indent="  ", break_on_hyphens=False)
-        print(text, file=sys.stderr)
-    where = "" if out is None else f"{out}: "
-    print(f"{where}{summary}", file=sys.stderr if out is None else sys.stdout)
-
-
-P = ParamSpec("P")
-T = TypeVar("T")
-R = TypeVar("R")
-
-_DRAWING = "gl_context.py"  # of MuJoCo
-DONE, FELL_SHORT, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+# ---------------------------------------------------------------------------- the end of a command
 
 
 def guarded(command: Callable[P, int | None]) -> Callable[P, None]:
@@ -190,34 +116,37 @@ def guarded(command: Callable[P, int | None]) -> Callable[P, None]:
         except Dh2simError as error:
             status = complain(error)
         except BrokenPipeError:
-            # whoever read our output has had enough; a second complaint at exit is not wanted either
+            # the reader of our output has closed it; a second complaint at exit is not needed either
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             status = DONE
         except OSError as error:
             where = f"{error.filename}: " if error.filename else ""
             status = complain(f"{where}{error.strerror or error}")
         except MemoryError:
-            status = complain("there is not enough memory for that")
+            status = complain("not enough memory")
         except (RuntimeError, ImportError, AttributeError) as error:
             if not _blames_drawing(error):
                 raise
             chosen = os.environ.get("MUJOCO_GL")
             status = complain(f"MuJoCo cannot be imported with MUJOCO_GL={chosen}: {error}. Unset that variable")
         except KeyboardInterrupt:
-            status = INTERRUPTED  # of which ``main`` tells
+            status = INTERRUPTED  # ``main`` reports it
         raise SystemExit(status)
 
     return run
 
 
 def _blames_drawing(error: BaseException) -> bool:
-    """Whether MuJoCo failed to import what the environment variable MUJOCO_GL tells it to draw with."""
+    """Whether MuJoCo failed to import the OpenGL library that the environment variable MUJOCO_GL names."""
     frames = traceback.extract_tb(error.__traceback__)
-    return "MUJOCO_GL" in os.environ and any(Path(frame.filename).name == _DRAWING for frame in frames)
+    return "MUJOCO_GL" in os.environ and any(Path(frame.filename).name == "gl_context.py" for frame in frames)
 
 
 def complain(error: object) -> int:
-    """Print an error and return its exit status; problems of robot files and settings have a line each."""
+    """Print an error and return its exit status; problems of robot files and settings have a line each.
+
+    Settings name arguments of the library, which are written as options: ``--floating-base``.
+    """
     match error:
         case RobotFileError():
             text = str(error)
@@ -230,22 +159,74 @@ def complain(error: object) -> int:
     return FELL_SHORT if isinstance(error, MismatchError) else BAD_INPUT
 
 
+# ---------------------------------------------------------------------------- robots
+
+
 def load_all(robots: Sequence[str]) -> list[RobotSpec]:
-    """Read robot files, and tell the errors of all of them at once.
+    """Read robot files, and report the errors of all of them at once.
 
     Raises:
-        Dh2simError: files are wrong, not found or cannot be read; the last error, after the others were printed.
+        Dh2simError: Files are wrong, not found, cannot be read or have another format; the last error, after the
+            others were printed.
     """
     from dh2sim.robot.read import load_robot
 
-    return _all(load_robot, robots)
+    def load(robot: str) -> RobotSpec:
+        refuse_other_formats(robot)
+        return load_robot(robot)
+
+    return _all(load, robots)
+
+
+_XML_ROOT = re.compile(rb"(?:<\?.*?\?>|<!--.*?-->|<![^>]*>|\s)*<\s*([A-Za-z_][\w:.-]*)", re.DOTALL)
+_TABLES = {".csv": "a CSV table", ".tsv": "a TSV table", ".md": "a Markdown table"}
+
+
+def refuse_other_formats(robot: str) -> None:
+    """Refuse a file that is to be imported first: a URDF, an MJCF, or a table.
+
+    Raises:
+        Dh2simError: The file's ending or content is that of another format than a robot file's.
+    """
+    path = Path(robot)
+    if not robot or not path.is_file():
+        return
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(8192).removeprefix(b"\xef\xbb\xbf").lstrip()
+    except OSError:
+        return  # whoever reads it reports that
+    kind = _other_format(head, path.suffix.lower())
+    if kind is not None:
+        import shlex
+
+        name = shlex.quote(f"{path.stem}.yaml")
+        raise Dh2simError(
+            f"{robot}: this is {kind}, not a robot file: run 'dh2sim import {shlex.quote(robot)} -o {name}' first"
+        )
+
+
+def _other_format(head: bytes, suffix: str) -> str | None:
+    """Return what a file is, from how it begins and from its ending; None for what may be a robot file."""
+    if head.startswith(b"<"):
+        found = _XML_ROOT.match(head)
+        root = b"" if found is None else found[1]
+        kinds = {b"robot": "a URDF", b"mujoco": "an MJCF", b"mujocoinclude": "an MJCF"}
+        return kinds.get(root, "a URDF" if suffix == ".urdf" else "XML")
+    if suffix in _TABLES:
+        return _TABLES[suffix]
+    if suffix not in (".yaml", ".yml"):
+        first = head.split(b"\n", 1)[0]
+        if max(first.count(b","), first.count(b"\t")) >= 2 and b":" not in first:
+            return "a table"
+    return "a Markdown table" if head.startswith(b"|") else None
 
 
 def build_all(robots: Sequence[str]) -> list[RobotModel]:
-    """Read robot files and build their models, and tell the errors of all of them at once.
+    """Read robot files and build their models, and report the errors of all of them at once.
 
     Raises:
-        Dh2simError: a file is wrong, two robots have the same name, or a mesh cannot be used.
+        Dh2simError: A file is wrong, two robots have the same name, or a mesh cannot be used.
     """
     from dh2sim.model.build import build_model
 
@@ -254,8 +235,8 @@ def build_all(robots: Sequence[str]) -> list[RobotModel]:
     for robot, spec in zip(robots, specs, strict=True):
         if spec.name in first:
             raise Dh2simError(
-                f"{first[spec.name]} and {robot}: both robots are named '{spec.name}', but every robot has a folder "
-                "of its name to itself"
+                f"{first[spec.name]} and {robot}: both robots are named '{spec.name}', but each needs a folder of "
+                "its own name"
             )
         first[spec.name] = robot
     return _all(build_model, specs)

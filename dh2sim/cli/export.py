@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, build_all, complain
+from dh2sim.cli.common import DONE, FELL_SHORT, RobotsArgument, build_all, complain
 from dh2sim.errors import Dh2simError, OutputError
 
 if TYPE_CHECKING:
@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 
 
 def export(
-    robots: Annotated[
-        list[str],
-        typer.Argument(metavar="ROBOT", help="Robot files, or names of robots that come with dh2sim."),
-    ],
+    robots: RobotsArgument,
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Where to write; every robot gets a folder of its own.")
     ] = Path("generated"),

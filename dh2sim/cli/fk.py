@@ -1,112 +1,248 @@
-"""``dh2sim fk``."""
+"""``dh2sim fk`` and ``dh2sim jacobian``: what the kinematics of a robot is at one configuration."""
 
 from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import load_all
+from dh2sim.cli.common import RobotArgument, load_all
+from dh2sim.cli.joint_vector import (
+    DegreesOption,
+    JointVector,
+    QArgument,
+    RadiansOption,
+    format_numbers,
+    read_joint_vector,
+)
 from dh2sim.errors import ConfigurationError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
+    from dh2sim.kinematics.chain import KinematicChain
     from dh2sim.robot.spec import RobotSpec
+    from dh2sim.typing import Array
+
+FRAMES = "tool0, base_link, dh_0 … dh_n or link_1 … link_n."
+VELOCITIES = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
 def fk(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="Robot file, or name of a robot that comes with dh2sim.")
-    ],
-    q: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="Q", help="Joint coordinates in m and rad; expressions such as -pi/2 are allowed."),
+    robot: RobotArgument,
+    q: QArgument = None,
+    frame: Annotated[str | None, typer.Option(help=f"{FRAMES} [default: tool0]", show_default=False)] = None,
+    source: Annotated[
+        str | None,
+        typer.Option("--from", metavar="FRAME", help="Frame that the pose is given in. [default: base_link]"),
     ] = None,
-    frame: Annotated[str, typer.Option(help="tool0, base_link, dh_0 … dh_n or link_1 … link_n.")] = "tool0",
-    degrees: Annotated[
-        bool, typer.Option("--degrees", help="Angles in degrees, in what is read and printed.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone: the pose in m.")] = False,
+    target: Annotated[str | None, typer.Option("--to", metavar="FRAME", help="The same as --frame.")] = None,
+    every: Annotated[bool, typer.Option("--all", help="Print A_i of every row and T_0_i of every DH frame.")] = False,
+    degrees: DegreesOption = False,
+    radians: RadiansOption = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone; Q and the pose in rad and m.")] = False,
 ) -> None:
-    """Print the pose of a frame in base_link: as matrix, as position with rpy, and as quaternion.
+    """Print the pose of a frame: as matrix, as position with roll, pitch, yaw, and as quaternion.
 
-    Without Q the robot is at its configuration 'home', or at zero if it has none; the name of another configuration
-    may stand for Q.
+    Without Q the robot is at its configuration 'home', or at zero moved inside the limits if its file has none.
 
     \b
     Examples:
-      dh2sim fk stanford 0.3 -0.7 0.5 1.1 0.6 -0.4
-      dh2sim fk stanford --degrees 45 60 0.2 45 0 -60
+      dh2sim fk stanford 17 -40 0.5 63 34 -23
+      dh2sim fk stanford --radians 0.3, -0.7, 0.5, 1.1, 0.6, -0.4
       dh2sim fk stanford home --frame dh_3 --json
+      dh2sim fk stanford home --from dh_2 --to dh_4
+      dh2sim fk stanford home --all
     """
     import numpy as np
 
     from dh2sim.kinematics.chain import build_chain
     from dh2sim.kinematics.forward import frame_pose
+    from dh2sim.kinematics.transforms import invert
+
+    if frame is not None and target is not None:
+        raise typer.BadParameter("mean the same; give one of them", param_hint="--frame, --to")
+    if every and (frame or target or source):
+        raise typer.BadParameter("prints every row; leave the other option out", param_hint="--all")
+    [spec] = load_all([robot])
+    options = "--frame, --from, --to, --all, --degrees, --radians, --json, --help"
+    vector = read_joint_vector(spec, q, degrees=degrees, radians=radians, command="fk", options=options)
+    chain = build_chain(spec)
+    if every:
+        _print_rows(spec, chain, vector, as_json=as_json)
+        return
+    name = target or frame or "tool0"
+    with np.errstate(all="ignore"):
+        pose = frame_pose(chain, name, vector.q)
+        if source is not None:
+            pose = invert(frame_pose(chain, source, vector.q)) @ pose
+    _require_finite(spec, pose, f"the pose of {name}")
+    if as_json:
+        origin = {} if source is None else {"from": source}
+        _print_json({"robot": spec.name, **origin, "frame": name, "q": list(vector.q), "pose": pose.tolist()})
+        return
+    print(f"{spec.name}: pose of {name} in {source or 'base_link'}")
+    _print_q(vector)
+    _print_pose(pose, vector)
+
+
+def _print_pose(pose: Array, vector: JointVector) -> None:
     from dh2sim.kinematics.transforms import quaternion_from_rotation, rpy_from_rotation
 
-    [spec] = load_all([robot])
+    unit = vector.units.angle.value
+    angles = [angle / vector.units.radians(1.0) for angle in rpy_from_rotation(pose[:3, :3])]
+    _print_matrix(pose)
+    print(f"position    {format_numbers(pose[:3, 3])} m")
+    print(f"rpy         {format_numbers(angles)} {unit}")
+    print(f"quaternion  {format_numbers(quaternion_from_rotation(pose[:3, :3]))}  (w, x, y, z)")
+
+
+def _print_rows(spec: RobotSpec, chain: KinematicChain, vector: JointVector, *, as_json: bool) -> None:
+    """Print the transform A_i of every row, and its DH frame in frame 0."""
+    import numpy as np
+
+    from dh2sim.kinematics.forward import frame_poses
+    from dh2sim.kinematics.table_oracle import row_matrix
+    from dh2sim.kinematics.transforms import invert
+
+    coordinates = iter(vector.q)
     with np.errstate(all="ignore"):
-        pose = frame_pose(build_chain(spec), frame, _joint_vector(spec, q or [], degrees=degrees))
-    if not bool(abs(pose).max() < math.inf):
-        raise ConfigurationError(f"{spec.name}: the pose of {frame} is too far away for a number to tell")
+        rows = [row_matrix(row, np.array(next(coordinates) if row.type.moves else 0.0)) for row in spec.rows]
+        frames = invert(chain.T_base_link_dh0) @ frame_poses(chain, vector.q)[1:]
+    _require_finite(spec, frames, "a frame")
     if as_json:
-        print(json.dumps({"robot": spec.name, "frame": frame, "pose": pose.tolist()}))
+        poses = {"A": [A.tolist() for A in rows], "T_0": frames.tolist()}
+        ends = {"T_base_link_0": chain.T_base_link_dh0.tolist(), "T_n_tool0": chain.T_dhn_tool0.tolist()}
+        _print_json({"robot": spec.name, "q": list(vector.q), **poses, **ends})
         return
-    unit = 180 / math.pi if degrees else 1.0
-    print(f"{spec.name}: pose of {frame} in base_link")
-    for row in pose:
-        print("  " + " ".join(f"{_rounded(value):14.9f}" for value in row))
-    print("position    " + _numbers(pose[:3, 3]) + " m")
-    angles = [float(angle) * unit for angle in rpy_from_rotation(pose[:3, :3])]
-    print("rpy         " + _numbers(angles) + (" deg" if degrees else " rad"))
-    print("quaternion  " + _numbers(quaternion_from_rotation(pose[:3, :3])) + "  (w, x, y, z)")
+    print(f"{spec.name}: transform of every row, and every DH frame in frame 0")
+    _print_q(vector)
+    identity = np.eye(4)
+    if not np.array_equal(chain.T_base_link_dh0, identity):
+        print("T_base_link_0")
+        _print_matrix(chain.T_base_link_dh0)
+    for i, (row, A, T) in enumerate(zip(spec.rows, rows, frames, strict=True), start=1):
+        print(f"A_{i}  ({row.name})")
+        _print_matrix(A)
+        print(f"T_0_{i}")
+        _print_matrix(T)
+    if not np.array_equal(chain.T_dhn_tool0, identity):
+        print(f"T_{len(rows)}_tool0")
+        _print_matrix(chain.T_dhn_tool0)
 
 
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(f"{_rounded(value):.9f}" for value in values)
+def jacobian(
+    robot: RobotArgument,
+    q: QArgument = None,
+    frame: Annotated[str, typer.Option(help=FRAMES)] = "tool0",
+    degrees: DegreesOption = False,
+    radians: RadiansOption = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in rad and m.")] = False,
+) -> None:
+    """Print the Jacobian of a frame in base_link, and how close it is to singular.
+
+    Its rows are the velocity of the frame's origin and the angular velocity of the frame, its columns the joints.
+    At a singular configuration the joint motions that leave the frame still are printed, and the velocities that
+    it has lost. A robot with more than six joints has self-motions everywhere.
+
+    \b
+    Examples:
+      dh2sim jacobian stanford home
+      dh2sim jacobian stanford 17 -40 0.5 63 0 -23      # singular
+      dh2sim jacobian ssrms home --frame dh_4 --json
+    """
+    import numpy as np
+
+    from dh2sim.kinematics.chain import build_chain
+    from dh2sim.kinematics.forward import geometric_jacobian
+    from dh2sim.kinematics.singularity import lost_directions, manipulability, rank, singular_values, still_motions
+
+    [spec] = load_all([robot])
+    options = "--frame, --degrees, --radians, --json, --help"
+    vector = read_joint_vector(spec, q, degrees=degrees, radians=radians, command="jacobian", options=options)
+    with np.errstate(all="ignore"):
+        J = geometric_jacobian(build_chain(spec), vector.q, frame=frame)
+    _require_finite(spec, J, f"the Jacobian of {frame}")
+    values = singular_values(J)
+    still, lost = still_motions(J), lost_directions(J)
+    if as_json:
+        _print_json(
+            {
+                "robot": spec.name,
+                "frame": frame,
+                "q": list(vector.q),
+                "joints": [row.name for row in vector.rows],
+                "jacobian": J.tolist(),
+                "singular_values": values.tolist(),
+                "manipulability": float(manipulability(J)),
+                "rank": rank(J),
+                "still_motions": still.tolist(),
+                "lost_directions": lost.tolist(),
+            }
+        )
+        return
+    names = [row.name for row in vector.rows]
+    print(f"{spec.name}: Jacobian of {frame} in base_link")
+    _print_q(vector)
+    _print_jacobian(J, vector)
+    print(f"singular values  {' '.join(f'{value:.6g}' for value in values) or 'none'}")
+    print(f"manipulability   {float(manipulability(J)):.6g}  (product of the singular values)")
+    most = min(J.shape)
+    singular = rank(J) < most
+    print(f"rank             {rank(J)} of {most}{': singular' if singular else ''}")
+    if len(still):
+        title = f"joint motions that leave {frame} still" if singular else "self-motions"
+        print(f"{title}, {_rates(vector)}:")
+        for motion in still:
+            print(f"  {_combination(motion, names)}")
+    if singular:
+        print(f"velocities that {frame} cannot have, m/s and rad/s:")
+        for direction in lost:
+            print(f"  {_combination(direction, VELOCITIES)}")
 
 
-def _rounded(value: float) -> float:
-    """To what is printed, so that there is no -0.000000000."""
-    return round(float(value), 9) + 0.0
+def _print_jacobian(J: Array, vector: JointVector) -> None:
+    """Print a Jacobian with its rows, columns and units named."""
+    names = [row.name for row in vector.rows]
+    per = [f"per {'rad' if row.type.turns else 'm'}/s" for row in vector.rows]
+    lines = [("", *names), ("", *per)]
+    for i, (name, row) in enumerate(zip(VELOCITIES, J, strict=True)):
+        label = f"{name}, {'m' if i < 3 else 'rad'}/s"
+        lines.append((label, *(f"{round(float(value), 6) + 0.0:.6f}" for value in row)))
+    widths = [max(len(line[k]) for line in lines) for k in range(len(names) + 1)]
+    for label, *cells in lines:
+        text = "  ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths[1:], strict=True))
+        print(f"  {label:{widths[0]}}  {text}".rstrip())
 
 
-def _joint_vector(spec: RobotSpec, texts: list[str], *, degrees: bool) -> list[float]:
-    from dh2sim.messages import shown
-    from dh2sim.robot.expressions import ExpressionError, evaluate
-
-    if not texts:
-        return [float(x) for x in spec.configurations.get("home", [0.0] * len(spec.moving_rows))]
-    if len(texts) == 1 and texts[0] in spec.configurations:
-        return [float(x) for x in spec.configurations[texts[0]]]
-    for text in texts:
-        if text.startswith("--"):
-            raise ConfigurationError(f"fk has no option {shown(text)}. Options: --frame, --degrees, --json, --help")
-    moving = spec.moving_rows
-    if len(texts) != len(moving):
-        raise ConfigurationError(_wrong_count(spec, texts, degrees=degrees))
-    values = []
-    for row, text in zip(moving, texts, strict=True):
-        try:
-            value = evaluate(text, {})
-        except ExpressionError as error:
-            raise ConfigurationError(f"{row.name}: {error}") from None
-        values.append(math.radians(value) if degrees and row.type.turns else value)
-    return values
+def _rates(vector: JointVector) -> str:
+    units = dict.fromkeys("rad/s" if row.type.turns else "m/s" for row in vector.rows)
+    return " and ".join(units)
 
 
-def _wrong_count(spec: RobotSpec, texts: list[str], *, degrees: bool) -> str:
-    from dh2sim.messages import did_you_mean, listed, shown
+def _combination(values: Any, names: Any) -> str:
+    """Return ``1 joint_4 - 0.5 joint_6`` for a vector."""
+    text = ""
+    for value, name in zip(values.tolist(), names, strict=True):
+        if value:
+            sign = ("-" if value < 0 else "") if not text else (" - " if value < 0 else " + ")
+            text += f"{sign}{abs(value):.4g} {name}"
+    return text
 
-    moving = spec.moving_rows
-    names = ", ".join(f"{row.name} ({'m' if not row.type.turns else 'deg' if degrees else 'rad'})" for row in moving)
-    count = "1 joint coordinate" if len(moving) == 1 else f"{len(moving) or 'no'} joint coordinates"
-    told = f"{spec.name} has {count}, got {len(texts)}" + (f": {names}" if names else "")
-    if len(texts) > 1 or not texts[0].isidentifier():
-        return told
-    hint = did_you_mean(texts[0], spec.configurations)
-    return f"{spec.name} has no configuration {shown(texts[0])}.{hint} Configurations: {listed(spec.configurations)}"
+
+def _print_q(vector: JointVector) -> None:
+    print(f"q           {vector}".rstrip())
+
+
+def _print_matrix(T: Array) -> None:
+    for row in T:
+        print(f"  {format_numbers(row, 14)}")
+
+
+def _print_json(content: dict[str, Any]) -> None:
+    print(json.dumps(content))
+
+
+def _require_finite(spec: RobotSpec, values: Array, what: str) -> None:
+    if not bool(abs(values).max(initial=0.0) < math.inf):
+        raise ConfigurationError(f"{spec.name}: {what} is too large for a floating-point number")

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import choice, hand_over, require_free, tolerance_of
+from dh2sim.cli.common import RobotArgument, choice, load_all, tolerance_of
+from dh2sim.cli.output import hand_over, require_free
 from dh2sim.errors import ImportedFileError, MissingExtraError
 
 if TYPE_CHECKING:
@@ -160,14 +161,14 @@ def frames(
     wanted = choice(convention, Convention, "--convention", without=(Convention.HAYATI,))
     allowed = tolerance_of(tolerance)
     if picture is not None:
-        _require_frame_figure(picture)
+        _require_picture_ending(picture)
     require_free(out, force=force)
     spec = read_axes(read_file(Path(axes)), file=axes, directory=Path(axes).parent)
     drawing = picture
     if drawing is None and explain:
         drawing = (out.parent if out is not None else Path()) / f"{spec.name}-frames.svg"
         try:
-            _require_frame_figure(drawing)
+            _require_picture_ending(drawing)
         except MissingExtraError as error:
             drawing = None
             print(f"dh2sim: no picture is drawn: {error}", file=sys.stderr)
@@ -183,16 +184,14 @@ def frames(
             print(f"{drawing}: axes and frames", file=sys.stderr if out is None else sys.stdout)
 
 
-def _require_frame_figure(path: Path) -> None:
-    from dh2sim.draw.frame_figure.figure import require_frame_figure
+def _require_picture_ending(path: Path) -> None:
+    from dh2sim.draw.frame_figure.figure import require_picture_ending
 
-    require_frame_figure(path)
+    require_picture_ending(path)
 
 
 def convert(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="Robot file, or name of a robot that comes with dh2sim.")
-    ],
+    robot: RobotArgument,
     to: Annotated[str, typer.Option(metavar="standard|modified", help="The convention wanted.")],
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="Write it there. [default: print it]")
@@ -211,12 +210,11 @@ def convert(
       dh2sim convert my_arm.yaml --to standard -o my_arm_standard.yaml
     """
     from dh2sim.importing.convert import convert_robot
-    from dh2sim.robot.read import load_robot
     from dh2sim.robot.spec import Convention
 
     wanted = choice(to, Convention, "--to", without=(Convention.HAYATI,))
     require_free(out, force=force)
-    spec = load_robot(robot)
+    [spec] = load_all([robot])
     folder = Path.cwd() if out is None else out.resolve().parent
     converted = convert_robot(spec, wanted or Convention.STANDARD, folder=folder)
     hand_over(converted.text, out, summary=converted.summary, notes=converted.notes, quiet=quiet)

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Annotated, Any
+import textwrap
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from dh2sim.cli.common import build_all, make_console, print_whole
+from dh2sim.cli.common import RobotArgument, build_all
+from dh2sim.cli.output import table_lines
 
 if TYPE_CHECKING:
     from dh2sim.model.robot_model import JointModel, RobotModel
-    from dh2sim.robot.spec import Row
+    from dh2sim.robot.spec import Row, Units
 
-_TITLES = {"standard": "standard", "modified": "modified", "hayati": "Hayati"}
+T = TypeVar("T")
 
 
 def info(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="Robot file, or name of a robot that comes with dh2sim.")
-    ],
+    robot: RobotArgument,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in m, rad, kg.")] = False,
+    srdf: Annotated[
+        bool, typer.Option("--srdf", help="Print the pairs of links that do not collide, as in an SRDF, too.")
+    ] = False,
 ) -> None:
     """Print a robot's table as in a textbook, its frames at home, mass and reach, and what is estimated.
 
@@ -29,16 +34,17 @@ def info(
     Examples:
       dh2sim info stanford
       dh2sim info my_arm.yaml --json
+      dh2sim info my_arm.yaml --srdf
     """
     [model] = build_all([robot])
     if as_json:
         print(json.dumps(as_dict(model), indent=2))
     else:
-        _print(model)
+        _print(model, srdf=srdf)
 
 
 def as_dict(model: RobotModel) -> dict[str, Any]:
-    """Return all that ``info`` tells, in SI units."""
+    """Return what ``info`` prints, and the pairs of links that do not collide, in SI units."""
     from dh2sim.kinematics.forward import forward_kinematics, frame_poses
 
     spec, chain = model.spec, model.chain
@@ -89,90 +95,83 @@ def _row_dict(row: Row, joint: JointModel) -> dict[str, Any]:
     }
 
 
-def _print(model: RobotModel) -> None:
-    from rich.text import Text
-
-    console = make_console()
+def _print(model: RobotModel, *, srdf: bool) -> None:
     spec = model.spec
-    description = " ".join(spec.description.split())
-    console.print(Text.assemble((spec.name, "bold"), f"  {description}" if description else ""))
-    if spec.source:
-        console.print(Text(f"Source: {' '.join(spec.source.split())}", "dim"))
-    for table in (_dh_table(model), _frame_table(model)):
-        print_whole(table)
-    console.print(f"reach at most {model.reach:.4g} m, moving mass {model.mass:.4g} kg")
-    for line in _remarks(model):
-        console.print(Text(line))
+    description, source = (" ".join(text.split()) for text in (spec.description, spec.source))
+    _print_wrapped(f"{spec.name}  {description}".rstrip())
+    if source:
+        _print_wrapped(f"Source: {source}")
+    for lines in (_dh_table(model), _frame_table(model)):
+        print()
+        print("\n".join(lines))
+    print()
+    unit, reach = spec.units.length, f"{model.reach:.4g} m"
+    if unit != "m":
+        reach = f"{model.reach / spec.units.metres(1.0):.4g} {unit} ({reach})"
+    for line in (f"reach at most {reach}, moving mass {model.mass:.4g} kg", *_remarks(model)):
+        _print_wrapped(line)
+    if srdf:
+        print("Pairs of links that do not collide, as in an SRDF:")
+        for pair in model.excluded:
+            print(f'  <disable_collisions link1="{pair.link1}" link2="{pair.link2}" reason="{pair.reason.value}"/>')
 
 
-def _dh_table(model: RobotModel) -> Any:
-    from rich import box
-    from rich.table import Table
+def _print_wrapped(text: str) -> None:
+    print(textwrap.fill(text, 80, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False))
+
+
+def _dh_table(model: RobotModel) -> list[str]:
+    """Return the table as in a textbook, its lengths in m and beside it in the robot file's unit."""
+    from dh2sim.robot.textbook_table import Cell, plain_symbol, textbook_table
 
     spec = model.spec
-    conventions = {row.convention for row in spec.rows}
-    mixed = len(conventions) > 1
-    modified = not mixed and spec.rows[0].convention.value == "modified"
-    a, alpha = ("a i-1", "alpha i-1") if modified else ("a i", "alpha i")
-    twice = any(row.convention.value == "hayati" for row in spec.rows)
-    title = "mixed conventions" if mixed else f"{_TITLES[spec.rows[0].convention.value]} convention"
-    table = Table(box=box.SIMPLE_HEAD, title=f"DH table, {title}", title_justify="left", pad_edge=False)
-    for column in ("i", "joint", "type", *(("convention",) if mixed else ())):
-        table.add_column(column, no_wrap=True)
-    beta = ("beta i\ndeg",) if twice else ()
-    for column in (f"{a}\nm", f"{alpha}\ndeg", *beta, "d i\nm", "theta i\ndeg", "limits"):
-        table.add_column(column, justify="right", no_wrap=True)
-    for i, (row, joint) in enumerate(zip(spec.rows, model.joints, strict=True), start=1):
-        table.add_row(
-            str(i),
-            row.name,
-            row.type.value,
-            *((row.convention.value,) if mixed else ()),
-            _short(row.a),
-            _short(math.degrees(row.alpha)),
-            *((_beta(row),) if twice else ()),
-            _offset(i, row),
-            _variable(f"θ{i}", math.degrees(row.theta), row) if row.type.turns else _short(math.degrees(row.theta)),
-            _limits(row, joint),
-        )
-    return table
+    table = textbook_table(spec)
+    extra = ("convention",) if table.mixed else ()
+    unit, metres = spec.units.length.value, spec.units.metres(1.0)
+
+    def doubled(items: Iterable[T], converted: Callable[[T], T]) -> list[T]:
+        """Follow every length by the same in the file's unit, unless that is m."""
+        pairs = zip(items, table.columns, strict=True)
+        return [
+            each for item, (*_, u) in pairs for each in ((item, converted(item)) if u == "m" != unit else (item,))
+        ]
+
+    def in_file_unit(cell: Cell) -> Cell:
+        return cell if cell.value is None else replace(cell, value=cell.value / metres)
+
+    columns = doubled(table.columns, lambda column: (*column[:2], unit))
+    lines = [
+        ["", "", "", *("" for _ in extra), *(f"{name} {index}" for name, index, _ in columns), ""],
+        ["i", "joint", "type", *extra, *(column_unit for *_, column_unit in columns), "limits"],
+    ]
+    for i, (row, joint, cells) in enumerate(zip(spec.rows, model.joints, table.cells, strict=True), start=1):
+        parameters = [cell.text(plain_symbol) for cell in doubled(cells, in_file_unit)]
+        kind = (row.convention.value,) if table.mixed else ()
+        lines.append([str(i), row.name, row.type.value, *kind, *parameters, _limits(joint, spec.units)])
+    return [table.title, *table_lines(lines, left=3 + len(extra), head=2)]
 
 
-def _beta(row: Row) -> str:
-    return _short(math.degrees(row.beta)) if row.convention.value == "hayati" else ""
+def _limits(joint: JointModel, units: Units) -> str:
+    """Return the position limits, a length in the file's unit and in m; in parentheses where they are assumed."""
+    from dh2sim.robot.textbook_table import short
 
-
-def _offset(i: int, row: Row) -> str:
-    if row.type.value == "prismatic":
-        return _variable(f"d{i}", row.d, row)
-    # nearly parallel axes have no joint offset
-    return "" if row.convention.value == "hayati" and row.d == 0.0 else _short(row.d)
-
-
-def _variable(name: str, offset: float, row: Row) -> str:
-    """The joint variable, starred, with its offset and direction: θ2* + 90, 90 - θ2*."""
-    if row.flip:
-        return f"{_short(offset)} - {name}*" if offset else f"-{name}*"
-    if not offset:
-        return f"{name}*"
-    return f"{name}* {'+' if offset > 0 else '-'} {_short(abs(offset))}"
-
-
-def _limits(row: Row, joint: JointModel) -> str:
-    if not row.type.moves:
+    kind = joint.joint.type
+    if not kind.moves:
         return ""
     if joint.position_range is None:
         return "none"
-    unit, scale = ("°", 180 / math.pi) if row.type.turns else (" m", 1.0)
     lower, upper = joint.position_range
-    text = f"{_short(lower * scale)} … {_short(upper * scale)}{unit}"
+    if kind.turns:
+        text = f"{short(math.degrees(lower))} … {short(math.degrees(upper))}°"
+    else:
+        text = f"{short(lower)} … {short(upper)} m"
+        if units.length != "m":
+            scale = units.metres(1.0)
+            text = f"{short(lower / scale)} … {short(upper / scale)} {units.length} = {text}"
     return f"({text})" if "position" in joint.assumed else text
 
 
-def _frame_table(model: RobotModel) -> Any:
-    from rich import box
-    from rich.table import Table
-
+def _frame_table(model: RobotModel) -> list[str]:
     from dh2sim.kinematics.forward import forward_kinematics, frame_poses
     from dh2sim.kinematics.transforms import rpy_from_rotation
 
@@ -180,30 +179,24 @@ def _frame_table(model: RobotModel) -> Any:
         home = "home"
     else:
         home = "zero moved inside the limits" if any(model.home) else "zero"
-    table = Table(box=box.SIMPLE_HEAD, title=f"Frames in base_link at {home}", title_justify="left", pad_edge=False)
-    table.add_column("frame")
-    for column in ("x\nm", "y\nm", "z\nm", "roll\ndeg", "pitch\ndeg", "yaw\ndeg"):
-        table.add_column(column, justify="right", no_wrap=True)
+    unit, scale = model.spec.units.length.value, model.spec.units.metres(1.0)
+    scales = {"m": 1.0} if unit == "m" else {"m": 1.0, unit: scale}
+    lines = [
+        ["", *("x", "y", "z") * len(scales), "roll", "pitch", "yaw"],
+        ["frame", *(unit for unit in scales for _ in range(3)), "deg", "deg", "deg"],
+    ]
     poses = [(f"dh_{i}", T) for i, T in enumerate(frame_poses(model.chain, model.home))]
     for name, T in [*poses, ("tool0", forward_kinematics(model.chain, model.home))]:
-        angles = [math.degrees(angle) for angle in rpy_from_rotation(T[:3, :3])]
-        table.add_row(name, *(f"{x + 0.0:.4f}" for x in T[:3, 3]), *(f"{round(x, 3) + 0.0:.3f}" for x in angles))
-    return table
+        # four places of a metre, and as fine in smaller units
+        places = {unit: max(0, 4 + round(math.log10(scale))) for unit, scale in scales.items()}
+        lengths = (f"{round(x / scales[u], places[u]) + 0.0:.{places[u]}f}" for u in scales for x in T[:3, 3])
+        angles = (math.degrees(angle) for angle in rpy_from_rotation(T[:3, :3]))
+        lines.append([name, *lengths, *(f"{round(x, 3) + 0.0:.3f}" for x in angles)])
+    return [f"Frames in base_link at {home}", *table_lines(lines, left=1, head=2)]
 
 
 def _remarks(model: RobotModel) -> list[str]:
     lines = [entry.sentence for entry in (*model.estimates, *model.assumptions)]
     if any("position" in joint.assumed for joint in model.moving_joints):
         lines.append("Limits in parentheses are assumed.")
-    if model.excluded:
-        lines.append("Pairs of links that do not collide, as in an SRDF:")
-        lines += [
-            f'  <disable_collisions link1="{pair.link1}" link2="{pair.link2}" reason="{pair.reason.value}"/>'
-            for pair in model.excluded
-        ]
     return lines
-
-
-def _short(value: float) -> str:
-    """To what a person reads: no trailing zeros, no -0, no rounding noise of degrees."""
-    return f"{round(value, 10) + 0.0:.6g}"

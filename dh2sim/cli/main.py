@@ -31,7 +31,7 @@ def main() -> None:
         _prepare_imports()
         from dh2sim.cli.app import app
 
-        app()
+        app(prog_name="dh2sim")
     except BaseException:
         # modules that are interrupted while they are imported make all sorts of errors of it
         if not interruptions:
@@ -39,7 +39,7 @@ def main() -> None:
         sys.stderr.write("dh2sim: interrupted\n")
         raise SystemExit(130) from None
     finally:
-        gc.freeze()  # the process ends: nobody needs what a last look for garbage would free
+        gc.freeze()  # no search for garbage at exit; see _prepare_imports
         # Python takes a while to end; a Ctrl-C meanwhile ends it at once, without a traceback
         _handle(signal.SIGINT, signal.SIG_DFL)
 
@@ -82,12 +82,13 @@ def _signal_main_thread(kind: signal.Signals) -> None:
 
 
 def _prepare_imports() -> None:
-    """Make imports quick: much of the time of a short command goes there.
+    """Save CPU time of short commands, most of which goes into imports.
 
-    Whatever they make is kept, so that looking for garbage in it finds none; long commands look again. And pydantic
-    need not look through everything that is installed for plugins, of which none is wanted here.
+    Measured on ``fk``: freezing what is left at the end (in ``main``) saves 30 %, for Python searches it for garbage
+    at exit; letting the collector wait for 100 000 new objects in place of 700 saves 8 %, and not searching all
+    installed packages for pydantic's plugins 2 %.
     """
-    gc.disable()
+    gc.set_threshold(100_000)
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 

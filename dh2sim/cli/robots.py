@@ -1,27 +1,48 @@
-"""``dh2sim list``.
-
-``dh2sim schema``.
-"""
+"""``dh2sim list`` and ``dh2sim schema``."""
 
 from __future__ import annotations
 
+import json
+from typing import Annotated
 
-def list_robots() -> None:
+import typer
+
+
+def list_robots(
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON alone: a list with an object for each robot.")
+    ] = False,
+) -> None:
     """List the robots that come with dh2sim: name, moving joints, and what they are.
+
+    R stands for a revolute joint, P for a prismatic one.
 
     \b
     Examples:
       dh2sim list
+      dh2sim list --json
       dh2sim info scara
     """
     from dh2sim.robot.read import builtin_robots, load_robot
 
-    names = builtin_robots()
-    width = max((len(name) for name in names), default=0)
-    for name in names:
-        spec = load_robot(name)
-        kinds = "".join("R" if row.type.turns else "P" for row in spec.moving_rows)
-        print(f"{name:{width}}  {kinds:8}  {' '.join(spec.description.split())}")
+    robots = [load_robot(name) for name in builtin_robots()]
+    kinds = ["".join("R" if row.type.turns else "P" for row in spec.moving_rows) for spec in robots]
+    if as_json:
+        entries = [
+            {
+                "name": spec.name,
+                "joints": joints,
+                "conventions": list(dict.fromkeys(row.convention.value for row in spec.rows)),
+                "description": " ".join(spec.description.split()),
+                "source": " ".join(spec.source.split()),
+            }
+            for spec, joints in zip(robots, kinds, strict=True)
+        ]
+        print(json.dumps(entries, indent=2))
+        return
+    width = max((len(spec.name) for spec in robots), default=0)
+    for spec, joints in zip(robots, kinds, strict=True):
+        print(f"{spec.name:{width}}  {joints:8}  {' '.join(spec.description.split())}")
 
 
 def schema() -> None:
@@ -33,8 +54,6 @@ def schema() -> None:
       # then, on the first line of a robot file:
       # yaml-language-server: $schema=robot.schema.json
     """
-    import json
-
     from dh2sim.robot.schema import json_schema
 
     print(json.dumps(json_schema(), indent=2))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import shlex
 import signal
 import sys
@@ -14,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import INTERRUPTED, build_all, progress_bar, size_text
+from dh2sim.cli.common import INTERRUPTED, RobotArgument, build_all
+from dh2sim.cli.output import progress_bar, size_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,9 +26,7 @@ if TYPE_CHECKING:
 
 
 def rollout(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="A robot file, or the name of a robot that comes with dh2sim.")
-    ],
+    robot: RobotArgument,
     out: Annotated[Path, typer.Option(metavar="RUN.zarr", help="Where to write the run.")],
     rollouts: Annotated[int, typer.Option(help="How many rollouts.")] = 256,
     duration: Annotated[
@@ -97,7 +95,6 @@ def rollout(
     from dh2sim.simulate.prepare import prepare
     from dh2sim.simulate.run import fill, open_run
 
-    gc.enable()
     options = RolloutOptions(
         rollouts=rollouts,
         steps=steps,

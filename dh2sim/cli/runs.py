@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import sys
 import textwrap
@@ -13,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import complain, make_console, progress_bar, size_text
+from dh2sim.cli.common import complain
+from dh2sim.cli.output import make_console, progress_bar, size_text
 from dh2sim.errors import Dh2simError
 from dh2sim.messages import did_you_mean
 
@@ -107,7 +107,6 @@ def _convert(paths: list[Path], to: str, out: Path | None, *, overwrite: bool, q
     from dh2sim.simulate.convert.parquet import to_parquet
     from dh2sim.simulate.description import summarize
 
-    gc.enable()
     convert = {"parquet": to_parquet, "hdf5": to_hdf5}[to]
     for summary in [summarize(path) for path in paths]:
         path = Path(summary.path)

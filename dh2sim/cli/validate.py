@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import sys
 import textwrap
@@ -14,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import FELL_SHORT, build_all, complain, make_console, print_whole, progress_bar
+from dh2sim.cli.common import FELL_SHORT, RobotsArgument, build_all, complain, tolerance_of
+from dh2sim.cli.output import make_console, print_whole, progress_bar
 from dh2sim.errors import Dh2simError, OutputError
 from dh2sim.extras import require_extra
 
@@ -26,10 +26,7 @@ if TYPE_CHECKING:
 
 
 def validate(
-    robots: Annotated[
-        list[str],
-        typer.Argument(metavar="ROBOT", help="Robot files, or names of robots that come with dh2sim."),
-    ],
+    robots: RobotsArgument,
     samples: Annotated[int, typer.Option(min=1, max=10**8, help="Random configurations, inside the limits.")] = 1000,
     seed: Annotated[int, typer.Option(min=0, help="Of the random configurations.")] = 0,
     tolerance: Annotated[
@@ -66,8 +63,7 @@ def validate(
       dh2sim validate my_arm.yaml --samples 100000 --json report.json
       dh2sim validate robots/*.yaml --dir generated --junit report.xml
     """
-    if not 0.0 < tolerance < 1.0:
-        raise typer.BadParameter(f"{tolerance} is not between 0 and 1", param_hint="--tolerance")
+    tolerance_of(tolerance)
     if dynamics:
         require_extra("data", "xarray", what="--dynamics")
     models = build_all(robots)
@@ -76,7 +72,6 @@ def validate(
     from dh2sim.validate.report import ValidationReport, to_junit
     from dh2sim.validate.run import engine_samples, validate_robot
 
-    gc.enable()
     poses = sum(engine_samples(samples, len(model.joints)) for model in models)
     with _warnings_told(), progress_bar("comparing", "poses", poses) as advance:
         reports = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 from pathlib import Path
@@ -10,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import require_free
+from dh2sim.cli.common import RobotArgument, load_all
+from dh2sim.cli.output import require_free
 
 if TYPE_CHECKING:
     from dh2sim.view.server import Viewer
@@ -22,7 +22,7 @@ NEVER = "never"
 
 
 def view(
-    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file, or the name of a built-in robot.")],
+    robot: RobotArgument,
     run: Annotated[
         Path | None,
         typer.Argument(metavar="RUN.zarr", help="A run of that robot to play.", show_default=False),
@@ -52,7 +52,6 @@ def view(
       dh2sim view stanford run.zarr
       dh2sim view stanford --export stanford.html
     """
-    gc.enable()
     if share != NEVER:
         raise typer.BadParameter(
             f"must be 'never', got {share!r}; pages are never shared over the internet", param_hint="--share"
@@ -64,10 +63,10 @@ def view(
             "needs a run and --export; a page lets you choose the rollout", param_hint="--rollout"
         )
     require_free(export, force=force)
-    from dh2sim.robot.read import load_robot
     from dh2sim.view.initial_state import folder_of, open_state
 
-    state = open_state(load_robot(robot), folder_of(robot))
+    [spec] = load_all([robot])
+    state = open_state(spec, folder_of(robot))
     if export is None:
         _serve(state, run, host=host, port=port, browser=browser)
     else:

@@ -100,7 +100,7 @@ def table_text(spec: RobotSpec) -> str:
     ]
     for i, (row, cells) in enumerate(zip(table.rows, table.cells, strict=True), start=1):
         kind = (row.convention.value,) if table.mixed else ()
-        parameters = (cell.text(_plain_symbol) for cell in cells)
+        parameters = (cell.text(plain_symbol) for cell in cells)
         lines.append([str(i), row.name, row.type.value, *kind, *parameters, limits_text(row)])
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     left = 3 + len(extra)
@@ -163,7 +163,8 @@ def _cell(row: Row, index: int, name: str) -> Cell:
     )
 
 
-def _plain_symbol(name: str, index: str) -> str:
+def plain_symbol(name: str, index: str) -> str:
+    """Return a parameter and its index as plain text, as in ``θ2``."""
     return f"{_HTML.get(name, name)}{index}"
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dh2sim import build_chain, forward_kinematics, load_robot
+from dh2sim import build_chain, forward_kinematics, frame_poses, load_robot
 from dh2sim.kinematics.forward import frame_names, frame_pose
 from tests.export.robots import ODD, write
 from tests.program import Outcome, dh2sim
@@ -16,6 +16,8 @@ from tests.program import Outcome, dh2sim
 STANFORD = load_robot("stanford")
 CHAIN = build_chain(STANFORD)
 Q = [0.3, -0.7, 0.5, 1.1, 0.6, -0.4]
+"""rad and m, inside the limits."""
+IN_RADIANS = ["--radians", *map(str, Q)]
 
 
 def _pose(*arguments: str | Path) -> Any:
@@ -25,11 +27,12 @@ def _pose(*arguments: str | Path) -> Any:
 
 
 def test_json_alone_is_printed_and_has_the_shape_of_the_contract() -> None:
-    run = dh2sim("fk", "stanford", *map(str, Q), "--json")
+    run = dh2sim("fk", "stanford", *IN_RADIANS, "--json")
     assert (run.status, run.err) == (0, "")
     assert json.loads(run.out) == {
         "robot": "stanford",
         "frame": "tool0",
+        "q": Q,
         "pose": forward_kinematics(CHAIN, Q).tolist(),
     }
 
@@ -37,22 +40,34 @@ def test_json_alone_is_printed_and_has_the_shape_of_the_contract() -> None:
 @pytest.mark.parametrize(
     "arguments",
     [
-        "stanford 0.3 -0.7 0.5 1.1 0.6 -0.4 --json",
-        "stanford --json 0.3 -0.7 0.5 1.1 0.6 -0.4",
-        "--json stanford 0.3 -0.7 0.5 1.1 0.6 -0.4",
-        "stanford --json -- 0.3 -0.7 0.5 1.1 0.6 -0.4",
-        "--json -- stanford 0.3 -0.7 0.5 1.1 0.6 -0.4",
-        "stanford 0.3 -0.7 --json 0.5 1.1 0.6 -0.4",
-        "stanford 3e-1 -7e-1 5.0E-1 1.1 .6 -.4 --json",
-        "stanford 3/10 -7/10 1/2 11/10 6/10 -(4/10) --json",
-        "--frame tool0 stanford 0.3 -0.7 0.5 1.1 0.6 -0.4 --json",
-        "stanford 0.3 -0.7 0.5 1.1 0.6 -0.4 --frame=tool0 --json",
+        "stanford 0.3 -0.7 0.5 1.1 0.6 -0.4 --json --radians",
+        "stanford --json --radians 0.3 -0.7 0.5 1.1 0.6 -0.4",
+        "--json --radians stanford 0.3 -0.7 0.5 1.1 0.6 -0.4",
+        "stanford --json --radians -- 0.3 -0.7 0.5 1.1 0.6 -0.4",
+        "--json --radians -- stanford 0.3 -0.7 0.5 1.1 0.6 -0.4",
+        "stanford 0.3 -0.7 --json --radians 0.5 1.1 0.6 -0.4",
+        "stanford 3e-1 -7e-1 5.0E-1 1.1 .6 -.4 --json --radians",
+        "stanford 3/10 -7/10 1/2 11/10 6/10 -(4/10) --json --radians",
+        "--frame tool0 stanford 0.3 -0.7 0.5 1.1 0.6 -0.4 --json --radians",
+        "stanford 0.3 -0.7 0.5 1.1 0.6 -0.4 --to=tool0 --json --radians",
+        "stanford 0.3,-0.7,0.5,1.1,0.6,-0.4 --json --radians",
+        "stanford 0.3, -0.7, 0.5, 1.1, 0.6, -0.4 --json --radians",
+        "stanford [0.3, -0.7, 0.5, 1.1, 0.6, -0.4] --json --radians",
+        "stanford [ 0.3 -0.7 0.5 1.1 0.6 -0.4 ] --json --radians",
+        "stanford --json --radians atan2(sin(0.3),cos(0.3)),-0.7 (0.5) 1.1,0.6 -0.4,",
     ],
 )
 def test_numbers_and_options_stand_in_any_order_with_and_without_a_double_dash(arguments: str) -> None:
     run = dh2sim("fk", *arguments.split())
     assert (run.status, run.err) == (0, "")
     np.testing.assert_allclose(json.loads(run.out)["pose"], forward_kinematics(CHAIN, Q), rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text", ["0.3 -0.7 0.5 1.1 0.6 -0.4", "[0.3 -0.7  0.5 1.1 0.6 -0.4]", " 0.3, -0.7, .5, 1.1, .6, -.4"]
+)
+def test_a_vector_in_quotation_marks_is_taken_apart(text: str) -> None:
+    np.testing.assert_allclose(_pose("stanford", "--radians", text), forward_kinematics(CHAIN, Q), rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -63,21 +78,53 @@ def test_numbers_and_options_stand_in_any_order_with_and_without_a_double_dash(a
 def test_negative_numbers_are_no_options(text: str, value: float, dash: list[str]) -> None:
     q = [text, text, "0.2", text, "0", text]
     expected = forward_kinematics(CHAIN, [value, value, 0.2, value, 0.0, value])
-    run = dh2sim("fk", "stanford", "--json", *dash, *q)
-    assert (run.status, run.err) == (0, "")
+    run = dh2sim("fk", "stanford", "--json", "--radians", *dash, *q)
+    assert run.status == 0
     np.testing.assert_allclose(json.loads(run.out)["pose"], expected, rtol=0, atol=1e-15)
 
 
-def test_degrees_hold_for_angles_and_not_for_lengths() -> None:
-    degrees = _pose("stanford", "--degrees", "45", "-60", "0.2", "45", "0", "-60")
+def test_coordinates_are_read_in_the_units_of_the_robot_file_unless_an_option_says_otherwise(tmp_path: Path) -> None:
+    q = ["45", "-60", "0.2", "45", "0", "-60"]  # of a file in deg and m
     radians = [math.radians(45), math.radians(-60), 0.2, math.radians(45), 0.0, math.radians(-60)]
-    np.testing.assert_array_equal(degrees, forward_kinematics(CHAIN, radians))
+    np.testing.assert_array_equal(_pose("stanford", *q), forward_kinematics(CHAIN, radians))
+    np.testing.assert_array_equal(_pose("stanford", "--degrees", *q), forward_kinematics(CHAIN, radians))
+    small = "name: small\nconvention: standard\nunits: {length: mm}\njoints: [{type: revolute}, {type: prismatic}]\n"
+    robot = write(tmp_path, small)
+    for options, expected in (
+        ([], [0.5, 0.25]),
+        (["--radians"], [0.5, 250]),
+        (["--degrees"], [math.radians(0.5), 250]),
+    ):
+        run = dh2sim("fk", robot, *options, "0.5", "250", "--json")
+        assert json.loads(run.out)["q"] == expected
+    assert "\nq           0.5 rad, 250 mm\n" in dh2sim("fk", robot, "0.5", "250").out
+    assert "\nq           0.5 deg, 0.25 m\n" in dh2sim("fk", robot, "--degrees", "0.5", "0.25").out
+    run = dh2sim("fk", robot, "--degrees", "--radians", "0.5", "250")
+    assert (run.status, run.err.splitlines()[-1]) == (
+        2,
+        "Error: Invalid value for --degrees, --radians: cannot be combined",
+    )
+
+
+def test_coordinates_outside_the_limits_are_warned_of() -> None:
+    run = dh2sim("fk", "stanford", "170", "-171", "2", "0", "0", "0", "--json")
+    assert run.status == 0
+    assert run.err == (
+        "dh2sim: warning: joint_2: -171 deg is outside the limits -170 to 170\n"
+        "dh2sim: warning: joint_3: 2 m is outside the limits 0 to 1.27\n"
+    )
+    json.loads(run.out)
+    assert dh2sim("fk", "stanford", "--radians", "2.96705973", "0", "0", "0", "0", "0").err == ""
+    assert "joint_1: 3 rad is outside the limits -2.967059728 to 2.967059728" in (
+        dh2sim("fk", "stanford", "--radians", "3", "0", "0", "0", "0", "0").err
+    )
 
 
 @pytest.mark.parametrize("frame", frame_names(CHAIN))
 def test_every_frame_can_be_asked_for(frame: str) -> None:
     expected = frame_pose(CHAIN, frame, Q)
-    np.testing.assert_array_equal(_pose("stanford", *map(str, Q), "--frame", frame), expected)
+    np.testing.assert_array_equal(_pose("stanford", *IN_RADIANS, "--frame", frame), expected)
+    np.testing.assert_array_equal(_pose("stanford", *IN_RADIANS, "--to", frame), expected)
 
 
 def test_a_configuration_stands_for_its_numbers_and_home_is_where_the_robot_is(tmp_path: Path) -> None:
@@ -85,8 +132,59 @@ def test_a_configuration_stands_for_its_numbers_and_home_is_where_the_robot_is(t
     home = forward_kinematics(CHAIN, STANFORD.configurations["home"])
     np.testing.assert_array_equal(_pose("stanford", "printed"), printed)
     np.testing.assert_array_equal(_pose("stanford"), home)
-    odd = write(tmp_path, ODD)  # which has no home
-    np.testing.assert_array_equal(_pose(odd), forward_kinematics(build_chain(load_robot(odd)), np.zeros(4)))
+
+
+def test_every_robot_has_the_configurations_home_and_zero(tmp_path: Path) -> None:
+    odd = write(tmp_path, ODD)  # names none
+    chain = build_chain(load_robot(odd))
+    for arguments in ([odd], [odd, "home"], [odd, "zero"]):
+        np.testing.assert_array_equal(_pose(*arguments), forward_kinematics(chain, np.zeros(4)))
+    high = write(
+        tmp_path,
+        "name: high\nconvention: standard\njoints:\n  - {type: prismatic, limits: {position: [0.1, 1]}}\n"
+        "  - {type: prismatic, limits: {position: [-2, -1]}}\n",
+    )
+    assert json.loads(dh2sim("fk", high, "home", "--json").out)["q"] == [0.1, -1.0]
+    run = dh2sim("fk", high, "zero", "--json")
+    assert json.loads(run.out)["q"] == [0.0, 0.0]
+    assert len(run.err.splitlines()) == 2
+
+
+def test_the_pose_of_any_frame_in_any_other_is_printed() -> None:
+    found = _pose("stanford", *IN_RADIANS, "--from", "dh_2", "--to", "dh_4")
+    T_base_from, T_base_to = frame_pose(CHAIN, "dh_2", Q), frame_pose(CHAIN, "dh_4", Q)
+    np.testing.assert_allclose(T_base_from @ found, T_base_to, rtol=0, atol=1e-15)
+    run = dh2sim("fk", "stanford", "--from", "tool0", "--to", "base_link")
+    assert run.out.startswith("stanford: pose of base_link in tool0\n")
+    assert json.loads(dh2sim("fk", "stanford", "--from", "dh_1", "--json").out)["from"] == "dh_1"
+
+
+def test_all_prints_every_rows_transform_and_every_frame(tmp_path: Path) -> None:
+    odd = write(tmp_path, ODD)
+    found = json.loads(dh2sim("fk", odd, "0.3", "-0.4", "0.5", "0.6", "--all", "--json").out)
+    assert found["q"] == [0.3, -0.4, 0.5, 0.6]
+    T_base_0, product = np.array(found["T_base_link_0"]), np.eye(4)
+    frames = frame_poses(build_chain(load_robot(odd)), found["q"])
+    for A, T, T_base in zip(found["A"], found["T_0"], frames[1:], strict=True):
+        product = product @ A
+        np.testing.assert_allclose(T, product, rtol=0, atol=1e-15)
+        np.testing.assert_allclose(T_base_0 @ T, T_base, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        T_base_0 @ product @ found["T_n_tool0"], _pose(odd, "0.3", "-0.4", "0.5", "0.6"), rtol=0, atol=1e-15
+    )
+    text = dh2sim("fk", odd, "--all").out
+    titles = [line for line in text.splitlines() if not line.startswith("  ")]
+    assert titles[2:5] == ["T_base_link_0", "A_1  (one)", "T_0_1"]
+    assert titles[-1] == "T_5_tool0"
+    plain = [line for line in dh2sim("fk", "rpr", "--all").out.splitlines() if not line.startswith("  ")]
+    assert plain[2:] == [
+        f"{kind}{i}{name}" for i in (1, 2, 3) for kind, name in (("A_", f"  (joint_{i})"), ("T_0_", ""))
+    ]
+    run = dh2sim("fk", "rpr", "--all", "--frame", "dh_1")
+    assert (run.status, run.err.splitlines()[-1]) == (
+        2,
+        "Error: Invalid value for --all: prints every row; leave the other option out",
+    )
 
 
 def test_a_person_reads_matrix_position_angles_and_quaternion() -> None:
@@ -94,12 +192,13 @@ def test_a_person_reads_matrix_position_angles_and_quaternion() -> None:
         status=0,
         out="""\
 stanford: pose of tool0 in base_link
+q           zero: 0 deg, 0 deg, 0 m, 0 deg, 0 deg, 0 deg
      1.000000000    0.000000000    0.000000000    0.000000000
      0.000000000    1.000000000    0.000000000    0.150000000
      0.000000000    0.000000000    1.000000000    0.700000000
      0.000000000    0.000000000    0.000000000    1.000000000
 position    0.000000000 0.150000000 0.700000000 m
-rpy         0.000000000 0.000000000 0.000000000 rad
+rpy         0.000000000 0.000000000 0.000000000 deg
 quaternion  1.000000000 0.000000000 0.000000000 0.000000000  (w, x, y, z)
 """,
         err="",
@@ -109,7 +208,8 @@ quaternion  1.000000000 0.000000000 0.000000000 0.000000000  (w, x, y, z)
     assert "-0.000000000" not in run.out
 
 
-JOINTS = "joint_1 (rad), joint_2 (rad), joint_3 (m), joint_4 (rad), joint_5 (rad), joint_6 (rad)"
+JOINTS = "joint_1 (deg), joint_2 (deg), joint_3 (m), joint_4 (deg), joint_5 (deg), joint_6 (deg)"
+OPTIONS = "Options: --frame, --from, --to, --all, --degrees, --radians, --json, --help"
 
 
 @pytest.mark.parametrize(
@@ -117,30 +217,30 @@ JOINTS = "joint_1 (rad), joint_2 (rad), joint_3 (m), joint_4 (rad), joint_5 (rad
     [
         ("1 2", f"stanford has 6 joint coordinates, got 2: {JOINTS}"),
         ("1", f"stanford has 6 joint coordinates, got 1: {JOINTS}"),
-        ("--degrees 1", f"stanford has 6 joint coordinates, got 1: {JOINTS.replace('rad', 'deg')}"),
+        ("--radians 1", f"stanford has 6 joint coordinates, got 1: {JOINTS.replace('deg', 'rad')}"),
+        ("[1,2,3]", f"stanford has 6 joint coordinates, got 3: {JOINTS}"),
         ("1 2 3 4 5 6 7", f"stanford has 6 joint coordinates, got 7: {JOINTS}"),
         ("1 2 3 4 5 x", "joint_6: unknown name 'x'. Known names: pi"),
         ("1 2 3 4 5 -j", "joint_6: in '-j': unknown name 'j'. Known names: pi"),
         ("1 2 3 4 5 1/0", "joint_6: in '1/0': division by zero"),
         (
             "hom",
-            "stanford has no configuration 'hom'. Did you mean 'home'? Configurations: zero, printed, home",
+            "stanford has no configuration 'hom'. Did you mean 'home'? Configurations: home, zero, printed",
         ),
-        ("sleep", "stanford has no configuration 'sleep'. Configurations: zero, printed, home"),
+        ("sleep", "stanford has no configuration 'sleep'. Configurations: home, zero, printed"),
         (
             "--frame toll0",
-            "there is no frame 'toll0'. Did you mean 'tool0'? Frames: base_link, link_1 to link_6, dh_0 to dh_6, "
-            "tool0",
+            "unknown frame 'toll0'. Did you mean 'tool0'? Frames: base_link, link_1 to link_6, dh_0 to dh_6, tool0",
         ),
-        ("--jsn", "fk has no option '--jsn'. Options: --frame, --degrees, --json, --help"),
-        ("1 2 3 4 5 6 --deg=1", "fk has no option '--deg=1'. Options: --frame, --degrees, --json, --help"),
+        ("--jsn", f"fk has no option '--jsn'. {OPTIONS}"),
+        ("1 2 3 4 5 6 --deg=1", f"fk has no option '--deg=1'. {OPTIONS}"),
     ],
 )
 def test_what_is_wrong_is_told_in_words(arguments: str, message: str) -> None:
     assert dh2sim("fk", "stanford", *arguments.split()) == Outcome(status=2, out="", err=f"dh2sim: {message}\n")
 
 
-def test_a_coordinate_that_is_no_finite_number_is_refused() -> None:
+def test_a_coordinate_that_is_not_a_finite_number_is_refused() -> None:
     for text in ("nan", "inf", "1e400", "1e308*10"):
         run = dh2sim("fk", "stanford", "0", "0", text, "0", "0", "0")
         assert (run.status, run.out) == (2, "")
@@ -153,7 +253,7 @@ def test_a_pose_beyond_all_numbers_is_refused_and_never_printed_as_infinity(tmp_
         "name: far\nconvention: standard\njoints:\n  - {type: prismatic}\n  - {type: prismatic}\n",
     )
     assert dh2sim("fk", robot, "--json", "1.7e308", "1.7e308") == Outcome(
-        status=2, out="", err="dh2sim: far: the pose of tool0 is too far away for a number to tell\n"
+        status=2, out="", err="dh2sim: far: the pose of tool0 is too large for a floating-point number\n"
     )
 
 

@@ -46,7 +46,7 @@ def test_a_file_that_exists_is_not_written_over_unless_forced(urdf: Path, tmp_pa
     out.write_text("mine\n")
     run = dh2sim("import", urdf, "-o", out)
     assert (run.status, run.out) == (2, "")
-    assert run.err == f"dh2sim: '{out}' exists already; choose another name, or write over it with --force\n"
+    assert run.err == f"dh2sim: '{out}' exists already; choose another name, or overwrite it with --force\n"
     assert out.read_text() == "mine\n"
     assert dh2sim("import", urdf, "-o", out, "--force").status == 0
     assert out.read_text() != "mine\n"
@@ -78,12 +78,12 @@ def test_a_table_without_a_convention_is_an_error_that_says_what_to_add(tmp_path
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        (["--convention", "hayati"], "'hayati' is none of standard, modified"),
-        (["--convention", "modifed"], "'modifed' is none of standard, modified. Did you mean 'modified'?"),
-        (["--angle", "grad"], "'grad' is none of rad, deg"),
-        (["--length", "km"], "'km' is none of m, mm, cm, in"),
-        (["--tolerance", "0"], "0.0 is not between 0 and 1"),
-        (["--tolerance", "nan"], "nan is not between 0 and 1"),
+        (["--convention", "hayati"], "'hayati' is not one of standard, modified"),
+        (["--convention", "modifed"], "'modifed' is not one of standard, modified. Did you mean 'modified'?"),
+        (["--angle", "grad"], "'grad' is not one of rad, deg"),
+        (["--length", "km"], "'km' is not one of m, mm, cm, in"),
+        (["--tolerance", "0"], "must be above 0 and below 1, got 0.0"),
+        (["--tolerance", "nan"], "must be above 0 and below 1, got nan"),
     ],
 )
 def test_a_wrong_option_is_told_with_what_is_allowed(urdf: Path, options: list[str], expected: str) -> None:

@@ -34,7 +34,7 @@ joints:
 """
 
 
-def test_json_tells_all_in_si_units(tmp_path: Path) -> None:
+def test_json_holds_everything_in_si_units(tmp_path: Path) -> None:
     robot = write(tmp_path, RICH)
     run = dh2sim("info", robot, "--json")
     assert (run.status, run.err) == (0, "")
@@ -71,7 +71,7 @@ def test_the_table_reads_as_in_a_textbook(tmp_path: Path) -> None:
     travel = build_model(load_robot(robot)).joints[1].position_range
     assert travel is not None
     assert lines[0] == "flipped  [bold]Not markup[/bold]"
-    assert lines[1].strip() == "DH table, standard convention"
+    assert lines[1:3] == ["", "DH table, standard convention"]
     assert [line.split() for line in lines[3:5]] == [
         ["a", "i", "alpha", "i", "d", "i", "theta", "i"],
         ["i", "joint", "type", "m", "deg", "m", "deg", "limits"],
@@ -102,7 +102,7 @@ def test_a_modified_table_names_its_indices_and_a_mixed_one_each_rows_convention
 def test_a_hayati_table_has_a_second_twist_and_no_offset_but_of_slides(tmp_path: Path) -> None:
     robot = write(tmp_path, HAYATI)
     lines = dh2sim("info", robot).out.splitlines()
-    assert lines[1].strip() == "DH table, Hayati convention"
+    assert lines[2] == "DH table, Hayati convention"
     assert [line.split() for line in lines[3:5]] == [
         ["a", "i", "alpha", "i", "beta", "i", "d", "i", "theta", "i"],
         ["i", "joint", "type", "m", "deg", "deg", "m", "deg", "limits"],
@@ -120,7 +120,7 @@ def test_a_hayati_table_has_a_second_twist_and_no_offset_but_of_slides(tmp_path:
 def test_rows_of_other_conventions_have_no_second_twist(tmp_path: Path) -> None:
     text = HAYATI.replace("type: fixed", "type: fixed, convention: standard").replace("beta: 0.25", "d: 0.3")
     lines = dh2sim("info", write(tmp_path, text)).out.splitlines()
-    assert lines[1].strip() == "DH table, mixed conventions"
+    assert lines[2] == "DH table, mixed conventions"
     assert [" ".join(line.split()) for line in lines[6:9]] == [
         "1 shoulder revolute hayati 0.4318 0.1 -0.05 θ1* (-180 … 180°)",
         "2 slide prismatic hayati 0.1 0 0 d2* + 0.2 0 -1 … 1 m",
@@ -151,21 +151,51 @@ def test_the_configuration_of_the_frames_is_named(tmp_path: Path, text: str, tit
     assert title in [line.strip() for line in lines]
 
 
-def test_what_was_estimated_and_assumed_is_told(tmp_path: Path) -> None:
+def test_what_was_estimated_and_assumed_is_printed(tmp_path: Path) -> None:
     lines = dh2sim("info", write(tmp_path, RICH)).out.splitlines()
-    assert lines[-6:] == [
+    assert lines[-3:] == [
         "Estimated from the shapes, not measured: inertia of link_1.",
         "Estimated from the shapes, not measured: mass, com, inertia of link_2.",
         "Assumed, not given: effort limits of elbow.",
-        "Pairs of links that do not collide, as in an SRDF:",
-        '  <disable_collisions link1="base_link" link2="link_1" reason="Adjacent"/>',
-        '  <disable_collisions link1="link_1" link2="link_2" reason="Adjacent"/>',
     ]
-    assert lines[-7].startswith("reach at most 0.7 m, moving mass ")
+    assert lines[-4].startswith("reach at most 0.7 m, moving mass ")
+
+
+def test_pairs_of_links_that_do_not_collide_are_printed_when_asked_for(tmp_path: Path) -> None:
+    robot = write(tmp_path, RICH)
+    without = dh2sim("info", robot).out
+    assert dh2sim("info", robot, "--srdf").out == without + (
+        "Pairs of links that do not collide, as in an SRDF:\n"
+        '  <disable_collisions link1="base_link" link2="link_1" reason="Adjacent"/>\n'
+        '  <disable_collisions link1="link_1" link2="link_2" reason="Adjacent"/>\n'
+    )
+
+
+MILLIMETRES = """\
+name: millimetres
+convention: modified
+units: {angle: deg, length: mm}
+joints:
+  - {type: revolute, a: 431.8, d: 150, limits: {position: [-90, 90]}}
+  - {type: prismatic, alpha: 90, d: 20, limits: {position: [0, 210]}}
+"""
+
+
+def test_lengths_are_printed_in_the_unit_of_the_file_too(tmp_path: Path) -> None:
+    out = dh2sim("info", write(tmp_path, MILLIMETRES)).out
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    assert lines[3:5] == ["a i-1 a i-1 alpha i-1 d i d i theta i", "i joint type m mm deg m mm deg limits"]
+    assert lines[6:8] == [
+        "1 joint_1 revolute 0.4318 431.8 0 0.15 150 θ1* -90 … 90°",
+        "2 joint_2 prismatic 0 0 90 d2* + 0.02 d2* + 20 0 0 … 210 mm = 0 … 0.21 m",
+    ]
+    assert lines[10:12] == ["x y z x y z roll pitch yaw", "frame m m m mm mm mm deg deg deg"]
+    assert lines[14] == "dh_1 0.4318 0.0000 0.1500 431.8 0.0 150.0 0.000 0.000 0.000"
+    assert lines[18].startswith("reach at most 687.1 mm (0.6871 m), moving mass ")
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_eighty_columns_hold_all_that_is_told_of_a_robot(
+def test_eighty_columns_hold_all_that_is_printed_of_a_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -19,9 +19,11 @@ from tests.program import Outcome, dh2sim, dh2sim_process, environment
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = (
+    "new",
     "export",
     "validate",
     "fk",
+    "jacobian",
     "info",
     "view",
     "import",
@@ -53,7 +55,7 @@ def test_the_help_of_the_program_lists_every_command_whole() -> None:
     listed = run.out.split("Commands:\n")[1].splitlines()
     assert [line.split()[0] for line in listed] == list(COMMANDS)
     assert all(line.endswith(".") and not line.endswith("...") for line in listed)
-    assert "Exit status: 0 done, 1 a check fell short, 2 bad input or usage, 130" in run.out
+    assert "Exit status: 0 done, 1 a check failed, 2 bad input or usage, 130" in run.out
 
 
 @pytest.mark.slow
@@ -69,12 +71,13 @@ def test_every_example_of_the_programs_help_works(tmp_path: Path, monkeypatch: p
         run = dh2sim(*command, *quicker.get(command[0], []))
         assert run.status == 0, line
         assert run.err == "" or command[0] in talkative, line
-    assert len(lines) == 13
+    assert len(lines) == 15
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "arm.urdf",
         "arm.yaml",
         "axes.yaml",
         "generated",
+        "my_arm.yaml",
         "run-0-joints.png",
         "run-0.mp4",
         "run.zarr",
@@ -137,6 +140,80 @@ def test_list_names_every_robot_with_its_joints() -> None:
     lines = run.out.splitlines()
     assert tuple(line.split()[0] for line in lines) == builtin_robots()
     assert "stanford                  RRPRRR    Stanford arm, six joints, the third one slides" in lines
+
+
+def test_list_prints_json_alone() -> None:
+    run = dh2sim("list", "--json")
+    assert (run.status, run.err) == (0, "")
+    robots = json.loads(run.out)
+    assert tuple(robot["name"] for robot in robots) == builtin_robots()
+    [stanford] = [robot for robot in robots if robot["name"] == "stanford"]
+    assert stanford.pop("source").startswith("Table and d1, d2, d6: course slides")
+    assert stanford == {
+        "name": "stanford",
+        "joints": "RRPRRR",
+        "conventions": ["standard"],
+        "description": "Stanford arm, six joints, the third one slides",
+    }
+
+
+def test_an_unknown_command_is_reported_with_the_one_that_may_be_meant() -> None:
+    run = dh2sim("exprot", "stanford")
+    assert (run.status, run.out) == (2, "")
+    assert run.err.endswith("\nError: unknown command 'exprot'. Did you mean 'export'?\n")
+    assert dh2sim("xyzzy").err.endswith("\nError: unknown command 'xyzzy'\n")
+
+
+def test_only_the_module_of_the_called_command_is_imported() -> None:
+    code = (
+        "import sys\nfrom dh2sim.cli.app import app\ntry:\n    app(['list'])\nexcept SystemExit:\n    pass\n"
+        "print(*sorted(name for name in sys.modules if name.startswith('dh2sim.cli.')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "dh2sim.cli.app dh2sim.cli.common dh2sim.cli.robots"
+
+
+def _completions(words: str, folder: Path) -> list[str]:
+    """What bash is offered for the last word."""
+    run = dh2sim_process(
+        cwd=folder,
+        variables={
+            "_DH2SIM_COMPLETE": "complete_bash",
+            "COMP_WORDS": words,
+            "COMP_CWORD": str(len(words.split(" ")) - 1),
+        },
+    )
+    assert run.err == ""
+    return run.out.split()
+
+
+def test_shells_complete_commands_options_robots_and_robot_files(tmp_path: Path) -> None:
+    (tmp_path / "stall.yaml").touch()
+    (tmp_path / "stall.stl").touch()
+    (tmp_path / "stock").mkdir()
+    (tmp_path / "stock" / "arm.yml").touch()
+    assert _completions("dh2sim ex", tmp_path) == ["export"]
+    assert _completions("dh2sim fk --ra", tmp_path) == ["--radians"]
+    stanfords = ["stanford", "stanford_shoulder_origin"]
+    assert _completions("dh2sim fk sta", tmp_path) == [*stanfords, "stall.yaml"]
+    assert _completions("dh2sim export rpr st", tmp_path) == [*stanfords, "stall.yaml", "stock/"]
+    assert _completions("dh2sim info stock/", tmp_path) == ["stock/arm.yml"]
+    assert _completions("dh2sim info missing/", tmp_path) == []
+    assert _completions("dh2sim new arm --from sca", tmp_path) == ["scara"]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_is_shown_for_a_shell(shell: str) -> None:
+    run = dh2sim_process("--show-completion", shell, variables={"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"})
+    assert (run.status, run.err) == (0, "")
+    assert "_DH2SIM_COMPLETE=complete_" in run.out
+
+
+def test_completion_is_installed(tmp_path: Path) -> None:
+    variables = {"HOME": str(tmp_path), "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+    run = dh2sim_process("--install-completion", "bash", variables=variables)
+    assert (run.status, run.err) == (0, "")
+    assert "dh2sim.sh" in (tmp_path / ".bashrc").read_text(encoding="utf-8")
 
 
 def test_schema_prints_a_json_schema_that_any_editor_can_read() -> None:
@@ -213,7 +290,7 @@ import dh2sim.cli.app
 async def never_awaited():
     pass
 
-def run():
+def run(prog_name):
     kept = never_awaited()  # as libraries have them when they are interrupted
     os.kill(os.getpid(), int(sys.argv[1]))
     time.sleep(20)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 from pathlib import Path
 
@@ -42,7 +43,7 @@ def test_a_path_that_exists_wins_over_a_built_in_name(
 
 def test_two_robots_of_one_name_are_refused(tmp_path: Path) -> None:
     left, right = write(tmp_path, small("arm"), "left"), write(tmp_path, small("arm"), "right")
-    message = f"{left} and {right}: both robots are named 'arm', but every robot has a folder of its name to itself"
+    message = f"{left} and {right}: both robots are named 'arm', but each needs a folder of its own name"
     for command in ("export", "validate"):
         run = dh2sim(command, left, "stanford", right)
         assert run == Outcome(status=2, out="", err=f"dh2sim: {message}\n")
@@ -109,6 +110,35 @@ def test_a_file_that_is_no_robot_file_is_no_traceback(tmp_path: Path, data: byte
     run = dh2sim("info", file)
     assert (run.status, run.out) == (2, "")
     assert run.err.startswith(f"{file}:{what}")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "kind"),
+    [
+        ("arm.urdf", '<?xml version="1.0"?>\n<!-- an arm -->\n<robot name="arm"/>', "a URDF"),
+        ("arm.txt", '\ufeff<robot name="arm"/>', "a URDF"),
+        ("arm.urdf", "<damaged", "a URDF"),
+        ("arm.xml", "<mujoco model='arm'/>", "an MJCF"),
+        ("arm.yaml", "<mujocoinclude/>", "an MJCF"),
+        ("arm.xml", "<sdf/>", "XML"),
+        ("my table.csv", "a,alpha,d,theta", "a CSV table"),
+        ("arm.tsv", "", "a TSV table"),
+        ("arm.md", "# Arm\n", "a Markdown table"),
+        ("arm.yaml", "\n| a | alpha |\n", "a Markdown table"),
+        ("arm.txt", "a\talpha\td\ttheta\n", "a table"),
+    ],
+)
+def test_a_file_of_another_format_is_to_be_imported_first(tmp_path: Path, name: str, text: str, kind: str) -> None:
+    file = tmp_path / name
+    file.write_text(text, encoding="utf-8")
+    made = shlex.quote(f"{file.stem}.yaml")
+    message = (
+        f"{file}: this is {kind}, not a robot file: run 'dh2sim import {shlex.quote(str(file))} -o {made}' first"
+    )
+    for command in (*COMMANDS, "jacobian", "view"):
+        assert dh2sim(command, file) == Outcome(status=2, out="", err=f"dh2sim: {message}\n")
+    assert dh2sim("convert", file, "--to", "modified").err == f"dh2sim: {message}\n"
+    assert dh2sim("rollout", file, "--out", tmp_path / "run.zarr").err == f"dh2sim: {message}\n"
 
 
 def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from dh2sim.cli.common import size_text
+from dh2sim.cli.output import size_text
 from dh2sim.simulate import open_dataset, rollout
 from tests.export.robots import RICH, small, snake, write
 from tests.program import Outcome, contents, dh2sim, dh2sim_process, environment

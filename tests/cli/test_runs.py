@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dh2sim.cli.common import size_text
+from dh2sim.cli.output import size_text
 from dh2sim.simulate.dataset_layout import STATUS, Layout
 from dh2sim.simulate.description import resumed
 from tests.program import Outcome, contents, dh2sim

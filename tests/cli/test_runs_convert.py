@@ -15,7 +15,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from dh2sim.cli.common import size_text
+from dh2sim.cli.output import size_text
 from tests.program import Outcome, dh2sim, environment
 from tests.simulate.convert.samples import Arrays, make_arrays, make_layout, write_run
 

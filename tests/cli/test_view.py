@@ -280,7 +280,7 @@ def test_an_exported_page_replaces_another_only_with_force(tmp_path: Path) -> No
     assert dh2sim("view", "scara", "--export", page).status == 0
     scara = page.read_bytes()
     done = dh2sim("view", "stanford", "--export", page)
-    message = f"dh2sim: '{page}' exists already; choose another name, or write over it with --force\n"
+    message = f"dh2sim: '{page}' exists already; choose another name, or overwrite it with --force\n"
     assert (done.status, done.out, done.err) == (2, "", message)
     assert page.read_bytes() == scara
     assert dh2sim("view", "stanford", "--export", page, "--force").status == 0

@@ -12,7 +12,7 @@ from dh2sim.model.robot_model import RobotModel
 from tests.export.robots import ODD, RICH, small, write
 from tests.program import contents, dh2sim
 
-PAIRS = "URDF: 2 pairs of links that do not collide ('dh2sim info' lists them, as in an SRDF)"
+PAIRS = "URDF: 2 pairs of links that do not collide ('dh2sim info --srdf' lists them)"
 
 
 def words(model: RobotModel, formats: Iterable[Format]) -> list[str]:
@@ -64,7 +64,7 @@ def test_a_velocity_limit_is_not_lost_where_a_velocity_actuator_holds_it() -> No
 
 def test_a_fixed_row_loses_no_actuator() -> None:
     lost = words(build_model(parse_robot(ODD)), ALL_FORMATS)
-    assert lost == ["URDF: 8 pairs of links that do not collide ('dh2sim info' lists them, as in an SRDF)"]
+    assert lost == ["URDF: 8 pairs of links that do not collide ('dh2sim info --srdf' lists them)"]
 
 
 def test_a_converted_mesh_is_listed_and_written(tmp_path: Path) -> None:

@@ -1,0 +1,177 @@
+"""The argument Q of commands: a joint vector, as numbers in some unit or as the name of a configuration."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dh2sim.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    from dh2sim.robot.spec import RobotSpec, Row, Units
+
+QArgument = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="Q",
+        help="Joint coordinates in the robot file's units, or the name of a configuration such as home or zero. "
+        "Expressions such as pi/2 are allowed, and so are commas and [ ].",
+    ),
+]
+DegreesOption = Annotated[bool, typer.Option("--degrees", help="Read Q in deg and m.")]
+RadiansOption = Annotated[bool, typer.Option("--radians", help="Read Q in rad and m.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointVector:
+    """A joint vector and how it was given."""
+
+    q: tuple[float, ...]
+    """rad and m."""
+    name: str
+    """Of the configuration; empty for numbers."""
+    units: Units
+    """Units that it was read in."""
+    rows: tuple[Row, ...]
+    """The moving rows."""
+
+    def __str__(self) -> str:
+        """Return the coordinates in the units that they were read in."""
+        values = zip(self.rows, self.q, strict=True)
+        text = ", ".join(f"{_in_units(value, row, self.units)} {_unit(row, self.units)}" for row, value in values)
+        return f"{self.name}: {text}" if self.name and text else text or self.name
+
+
+def read_joint_vector(
+    spec: RobotSpec, texts: Sequence[str] | None, *, degrees: bool, radians: bool, command: str, options: str
+) -> JointVector:
+    """Read the argument Q; print a warning for coordinates outside their limits.
+
+    Args:
+        spec: The robot.
+        texts: The argument; without any the robot is at home.
+        degrees: Whether the command was called with ``--degrees``.
+        radians: Whether it was called with ``--radians``.
+        command: Its name, for messages.
+        options: Its options, for messages.
+
+    Raises:
+        ConfigurationError: The number of coordinates is wrong, one is not a number, or a name is unknown.
+    """
+    from dh2sim.robot.spec import AngleUnit, Units
+
+    if degrees and radians:
+        raise typer.BadParameter("cannot be combined", param_hint="--degrees, --radians")
+    units = Units(angle=AngleUnit.DEG if degrees else AngleUnit.RAD) if degrees or radians else spec.units
+    words = list(texts or ["home"])
+    known = named_configurations(spec)
+    rows = spec.moving_rows
+    if len(words) == 1 and words[0] in known:
+        vector = JointVector(q=known[words[0]], name=words[0], units=units, rows=rows)
+    else:
+        for word in words:
+            if word.startswith("--"):
+                from dh2sim.messages import shown
+
+                raise ConfigurationError(f"{command} has no option {shown(word)}. Options: {options}")
+        vector = JointVector(q=_coordinates(spec, words, units), name="", units=units, rows=rows)
+    _warn_outside(vector)
+    return vector
+
+
+def named_configurations(spec: RobotSpec) -> Mapping[str, tuple[float, ...]]:
+    """Return the configurations that have a name, rad and m: home and zero, which every robot has, and the file's."""
+    limits = [row.limits.position or (0.0, 0.0) for row in spec.moving_rows]
+    home = tuple(max(lower, 0.0) if lower > 0.0 else min(upper, 0.0) for lower, upper in limits)
+    given = {name: tuple(float(x) for x in vector) for name, vector in spec.configurations.items()}
+    return {"home": home, "zero": (0.0,) * len(limits), **given}
+
+
+def _coordinates(spec: RobotSpec, words: Sequence[str], units: Units) -> tuple[float, ...]:
+    from dh2sim.robot.expressions import ExpressionError, evaluate
+
+    rows = spec.moving_rows
+    parts = split(words, len(rows))
+    if len(parts) != len(rows):
+        raise ConfigurationError(_wrong_count(spec, words, parts, units))
+    values = []
+    for row, part in zip(rows, parts, strict=True):
+        try:
+            values.append(units.coordinate(evaluate(part, {}), turns=row.type.turns))
+        except ExpressionError as error:
+            raise ConfigurationError(f"{row.name}: {error}") from None
+    return tuple(values)
+
+
+def split(words: Sequence[str], count: int) -> list[str]:
+    """Split the argument into coordinates, at its words and at commas; '[' and ']' may enclose it.
+
+    A single word, as of a vector that was pasted in quotation marks, is split at blanks if that gives ``count``.
+    """
+    text = "\0".join(words).strip()
+    if text.startswith("["):
+        text = text[1:].removesuffix("]")
+    parts = [part.strip() for part in _split_outside_parentheses(text, ",\0") if part.strip("\0 ")]
+    if len(parts) != count and len(words) == 1:
+        blanks = [part for part in _split_outside_parentheses(text.replace(",", " "), " ") if part]
+        if len(blanks) == count:
+            return blanks
+    return parts
+
+
+def _split_outside_parentheses(text: str, separators: str) -> list[str]:
+    parts, depth = [""], 0
+    for character in text:
+        depth += (character == "(") - (character == ")")
+        if character in separators and (depth <= 0 or character == "\0"):
+            parts.append("")
+        else:
+            parts[-1] += character
+    return parts
+
+
+def _wrong_count(spec: RobotSpec, words: Sequence[str], parts: Sequence[str], units: Units) -> str:
+    from dh2sim.messages import did_you_mean, listed, shown
+
+    rows = spec.moving_rows
+    names = ", ".join(f"{row.name} ({_unit(row, units)})" for row in rows)
+    count = "1 joint coordinate" if len(rows) == 1 else f"{len(rows) or 'no'} joint coordinates"
+    message = f"{spec.name} has {count}, got {len(parts)}" + (f": {names}" if names else "")
+    if len(words) > 1 or not words[0].isidentifier():
+        return message
+    known = named_configurations(spec)
+    hint = did_you_mean(words[0], known)
+    return f"{spec.name} has no configuration {shown(words[0])}.{hint} Configurations: {listed(known)}"
+
+
+def _warn_outside(vector: JointVector) -> None:
+    for row, value in zip(vector.rows, vector.q, strict=True):
+        if row.limits.position is None:
+            continue
+        lower, upper = row.limits.position
+        slack = 1e-9 * (upper - lower)  # a limit that is written in rad with few digits
+        if not lower - slack <= value <= upper + slack:
+            value_, lower_, upper_ = (_in_units(x, row, vector.units) for x in (value, lower, upper))
+            print(
+                f"dh2sim: warning: {row.name}: {value_} {_unit(row, vector.units)} is outside the limits "
+                f"{lower_} to {upper_}",
+                file=sys.stderr,
+            )
+
+
+def _unit(row: Row, units: Units) -> str:
+    return units.angle.value if row.type.turns else units.length.value
+
+
+def _in_units(value: float, row: Row, units: Units) -> str:
+    scale = units.coordinate(1.0, turns=row.type.turns)
+    return f"{round(value / scale, 9) + 0.0:.10g}"
+
+
+def format_numbers(values: Iterable[float], width: int = 0) -> str:
+    """Return numbers to nine places, without -0."""
+    return " ".join(f"{round(float(value), 9) + 0.0:{width}.9f}" for value in values)

@@ -1,0 +1,133 @@
+"""What commands print: tables, progress, sizes, and files on standard output or on disk."""
+
+from __future__ import annotations
+
+import sys
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dh2sim.errors import OutputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+WIDEST = 1000
+"""Columns; more than any table has."""
+
+
+def make_console(width: int | None = None) -> Console:
+    """Return a console on standard output, by default as wide as the terminal."""
+    from rich.console import Console
+
+    class PlainSpoken(Console):
+        """Leaves it to the command what comes of a reader that has had enough; rich would end the program."""
+
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    return PlainSpoken(highlight=False, width=width)
+
+
+def print_whole(table: Table) -> None:
+    """Print a table at the width it needs, however narrow the terminal: no column is cut short or left out."""
+    make_console(WIDEST).print(table)
+
+
+def table_lines(rows: Sequence[Sequence[str]], *, left: int, head: int = 1) -> list[str]:
+    """Return a table in aligned columns, each as wide as it needs, with a line below its head.
+
+    Args:
+        rows: The cells, the head first.
+        left: How many columns are aligned left; the others are aligned right.
+        head: How many rows are the head.
+    """
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [
+        "  ".join(f"{cell:{'<' if k < left else '>'}{widths[k]}}" for k, cell in enumerate(row)).rstrip()
+        for row in rows
+    ]
+    return [*lines[:head], "─" * max(map(len, lines)), *lines[head:]]
+
+
+@contextmanager
+def progress_bar(doing: str, what: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
+    """Show a bar on standard error if that is a terminal; it vanishes in the end.
+
+    Args:
+        doing: what is done, as in 'comparing'.
+        what: what is counted, as in 'poses'.
+        total: how many there are.
+        quiet: show nothing.
+
+    Yields:
+        A function to call with how many are done since the last call.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    with Progress(
+        TextColumn(doing),
+        BarColumn(),
+        TextColumn("{task.completed:,.0f} of {task.total:,.0f} " + what),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda done: bar.advance(task, done)
+
+
+def size_text(count: int) -> str:
+    """Return a number of bytes as in '12.3 MB'."""
+    size, unit = float(count), "B"
+    for larger in ("kB", "MB", "GB", "TB"):
+        if size < 999.95:
+            break
+        size, unit = size / 1000.0, larger
+    return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
+
+
+def require_free(out: Path | None, *, force: bool) -> None:
+    """Refuse to write over a file, unless asked to.
+
+    Raises:
+        OutputError: There is a file, or no folder to put one in.
+    """
+    if out is None:
+        return
+    if out.is_dir():
+        raise OutputError(f"cannot write '{out}': that is a folder")
+    if not out.parent.is_dir():
+        raise OutputError(f"cannot write '{out}': there is no folder '{out.parent}'")
+    if out.exists() and not force:
+        raise OutputError(f"'{out}' exists already; choose another name, or overwrite it with --force")
+
+
+def hand_over(text: str, out: Path | None, *, summary: str, notes: Iterable[str] = (), quiet: bool = False) -> None:
+    """Print a robot file, or write it whole; what there is to say of it goes where it does not mix with the file.
+
+    Raises:
+        OutputError: It cannot be written; what stood there before stands untouched.
+    """
+    if out is None:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    else:
+        from dh2sim.files import atomic_file
+
+        with atomic_file(out) as draft:
+            draft.write_text(text, encoding="utf-8")
+    if quiet:
+        return
+    for note in notes:
+        text = textwrap.fill(f"dh2sim: note: {note}", 80, subsequent_indent="  ", break_on_hyphens=False)
+        print(text, file=sys.stderr)
+    where = "" if out is None else f"{out}: "
+    print(f"{where}{summary}", file=sys.stderr if out is None else sys.stdout)
