@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from dh2sim.errors import ControllerError
 from dh2sim.simulate.batch import BatchObservation, GravityForces, MonitoredBatch
-from dh2sim.simulate.controllers.options import ControllerChoice
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, OpenLoop, RolloutBatch
+from dh2sim.simulate.controllers.registry import ControllerChoice
 from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.initial_states import InitialStates
 from dh2sim.simulate.loops import Scheduled, checked, simulate_closed_loop, simulate_open_loop

@@ -16,8 +16,7 @@ from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
 from dh2sim.simulate.block import Job, rehearse
-from dh2sim.simulate.controllers.options import ControllerChoice
-from dh2sim.simulate.controllers.registry import choose
+from dh2sim.simulate.controllers.registry import ControllerChoice, choose
 from dh2sim.simulate.dataset_layout import FORMAT, rollout_bytes, run_layout
 from dh2sim.simulate.initial_states import InitialStates, read_initial_states
 from dh2sim.simulate.options import RolloutOptions

@@ -136,9 +136,9 @@ def test_settings_hold_everything_that_the_numbers_depend_on() -> None:
 
 def test_what_does_not_fit_the_robot_is_reported_at_once() -> None:
     problems = refused(controller="sin", start="hme").splitlines()
-    assert [problem[:31] for problem in problems] == [
-        "there is no controller 'sin'. D",
-        "start must be one of home, zero",
+    assert [problem[:24] for problem in problems] == [
+        "unknown controller 'sin'",
+        "start must be one of hom",
     ]
 
 

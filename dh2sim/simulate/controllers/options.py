@@ -1,60 +1,58 @@
-"""Options of a controller: what its constructor's signature says of them, and values read from text.
-
-Which controller a run uses, and with which options.
-
-``NAME:key=value,…`` as typed: how it is taken apart, and how it is written.
-"""
+"""Options of controllers: annotated parameters of a constructor, read from ``key=value,…`` with pydantic."""
 
 from __future__ import annotations
 
 import inspect
-import math
 import sys
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import Any, Final, Literal
+from typing import Any, Final
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.errors import PydanticUserError
 
 from dh2sim.errors import ControllerError
 from dh2sim.messages import did_you_mean, listed
-from dh2sim.robot.spec import ActuatorType
-from dh2sim.simulate.controllers.protocol import Controller, RolloutBatch
+
+_QUOTES: Final = "\"'"
+_READING: Final = ConfigDict(allow_inf_nan=False)
+_KINDS: Final = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "some text"}
+_BOUNDS: Final = {
+    "exclusiveMinimum": "above",
+    "minimum": "at least",
+    "maximum": "at most",
+    "exclusiveMaximum": "below",
+}
+"""Keywords of a JSON Schema, and how a message names them."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerChoice:
-    """A controller by name, with its options checked."""
+def Within(
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    below: float | None = None,
+    unit: str = "",
+) -> Any:
+    """Return the range of a number, for an annotation: it is put into ``Annotated`` with the type.
 
-    text: str
-    """As on the command line, ``NAME`` or ``NAME:key=value,…``: all options that were given, in a fixed order."""
-    name: str
-    make: Callable[[RolloutBatch], Controller] = field(compare=False, repr=False)
-    """Makes the controller of a group of rollouts, options already bound."""
-    actuation: ActuatorType | None
-    """The actuators that the model is simulated with, one at every joint (none: no actuators at all); None: those of
-    the robot file."""
-    options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}), compare=False)
-    digest: str = ""
-    """SHA-256 of what the options do not show: files that the controller reads, code that is not dh2sim's own."""
-    follows: bool = False
-    """Whether it follows a reference, which can be recorded."""
-
-
-_QUOTES = "\"'"
+    It is pydantic's ``Field`` with ``gt``, ``ge``, ``le`` and ``lt``, which may be used itself.
+    """
+    return Field(gt=above, ge=at_least, le=at_most, lt=below, json_schema_extra={"unit": unit} if unit else None)
 
 
 def split_pairs(text: str) -> tuple[list[tuple[str, str]], list[str]]:
-    """Take ``key=value,key=value`` apart.
+    """Split ``key=value,key=value``.
 
-    A value that holds a comma, or spaces at its ends, stands in quotation marks.
+    A value that contains a comma, or has spaces at its ends, is put in quotation marks.
 
     Args:
-        text: what follows the controller's name; may be empty.
+        text: What follows the controller's name; may be empty.
 
     Returns:
-        Keys with their values in the order given, and what is wrong, a sentence each.
+        Keys with their values in the order given, and what is wrong.
     """
     pairs: list[tuple[str, str]] = []
     problems = []
@@ -65,7 +63,7 @@ def split_pairs(text: str) -> tuple[list[tuple[str, str]], list[str]]:
             problems.append(f"{part.strip()!r} is not of the form key=value")
         elif value[:1] in _QUOTES and value[:1]:
             if len(value) < 2 or value[-1] != value[0]:
-                problems.append(f"the value of '{key}' has a quotation mark {value[0]} that is not closed")
+                problems.append(f"the value of '{key}' has an unclosed quotation mark {value[0]}")
             else:
                 pairs.append((key, value[1:-1]))
         else:
@@ -74,7 +72,7 @@ def split_pairs(text: str) -> tuple[list[tuple[str, str]], list[str]]:
 
 
 def join_pairs(name: str, pairs: Iterable[tuple[str, object]]) -> str:
-    """Write a controller's name with options, so that ``split_pairs`` gives the same values back."""
+    """Return a controller's name with options, which ``split_pairs`` splits into the same values."""
     text = ",".join(f"{key}={_quoted(value_text(value))}" for key, value in pairs)
     return f"{name}:{text}" if text else name
 
@@ -95,7 +93,7 @@ def value_text(value: object) -> str:
 
 
 def _split(text: str) -> list[str]:
-    """Split at commas that are in no value's quotation marks; empty parts are left out."""
+    """Split at commas outside quotation marks; empty parts are left out."""
     parts = [""]
     quote = ""
     for character in text:
@@ -116,111 +114,69 @@ def _quoted(text: str) -> str:
     return f"'{text}'" if '"' in text else f'"{text}"'
 
 
-_WORDS: Final = {
-    "true": True,
-    "yes": True,
-    "on": True,
-    "1": True,
-    "false": False,
-    "no": False,
-    "off": False,
-    "0": False,
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Within:
-    """Range of a number, for an annotation: ``gain: Annotated[float, Within(above=0)] = 1.0``."""
-
-    above: float = -math.inf
-    """The number is greater than this."""
-    at_least: float = -math.inf
-    at_most: float = math.inf
-    below: float = math.inf
-    """The number is less than this."""
-    unit: str = ""
-
-    def holds(self, value: float) -> bool:
-        """Return whether a number is in the range."""
-        return self.above < value < self.below and self.at_least <= value <= self.at_most
-
-    def __str__(self) -> str:
-        """Return, for example, ``above 0 Hz and at most 10 Hz``, or ``of at least 1``."""
-        words = (("above", self.above), ("at least", self.at_least), ("at most", self.at_most), ("below", self.below))
-        unit = f" {self.unit}" if self.unit else ""
-        text = " and ".join(f"{word} {value_text(float(x))}{unit}" for word, x in words if math.isfinite(x))
-        return f"of {text}" if text.startswith("at") else text
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Option:
     """One option of a controller."""
 
     name: str
     parameter: str
-    """Name in the signature; an underscore at its end, as in ``as_``, is no part of the option's name."""
-    kind: type = str
-    """float, int, bool or str."""
-    choices: tuple[str, ...] = ()
-    """What a str may be; empty: anything."""
-    empty: bool = False
-    """Whether it may be 'none'."""
-    required: bool = False
-    default: Any = None
-    within: Within | None = None
+    """Name in the signature; an underscore at its end, as in ``as_``, is not part of the option's name."""
+    required: bool
+    default: Any
+    adapter: TypeAdapter[Any] = field(repr=False, compare=False)
+    """Reads a value."""
+    schema: Mapping[str, Any] = field(repr=False)
+    """JSON Schema of the values other than None."""
+    optional: bool
+    """Whether the value may be None, which is typed as 'none'."""
 
     def __str__(self) -> str:
         """Return the name with its default."""
         return f"{self.name}=…" if self.required else f"{self.name}={value_text(self.default)}"
 
     def read(self, text: str) -> Any:
-        """Return the value that ``text`` stands for.
+        """Return the value that a text stands for.
 
         Raises:
-            ValueError: it stands for none; the text says what is allowed.
+            ValueError: It stands for none; the message says what is allowed.
         """
-        if self.empty and text.casefold() == "none":
+        if self.optional and text.casefold() == "none":
             return None
-        value = self._read(text)
-        if value is None:
-            raise ValueError(f"option '{self.name}' must be {self._allowed()}, not {text!r}{self._guess(text)}")
-        return value
-
-    def _read(self, text: str) -> Any:
-        if self.kind is bool:
-            return _WORDS.get(text.casefold())
-        if self.kind is str:
-            return text if text and (not self.choices or text in self.choices) else None
         try:
-            number = self.kind(text)
-        except ValueError:
-            return None
-        return number if math.isfinite(number) and (self.within is None or self.within.holds(number)) else None
+            if text:
+                return self.adapter.validate_strings(text)
+        except ValidationError:
+            pass
+        guess = did_you_mean(text, self._choices) if self._choices else ""
+        message = f"option '{self.name}' must be {self._allowed}, got {text!r}{guess and '.' + guess}"
+        raise ValueError(message) from None
 
+    @property
+    def _choices(self) -> list[str]:
+        return [*self.schema.get("enum", ()), *([self.schema["const"]] if "const" in self.schema else ())]
+
+    @property
     def _allowed(self) -> str:
-        if self.choices:
-            words = listed(self.choices, " or ")
-        else:
-            words = {float: "a number", int: "a whole number", bool: "true or false", str: "some text"}[self.kind]
-        if self.within is not None:
-            words = f"{words} {self.within}"
-        return f"{words}, or none" if self.empty else words
-
-    def _guess(self, text: str) -> str:
-        guess = did_you_mean(text, self.choices) if self.choices else ""
-        return f".{guess}" if guess else ""
+        """Return, for example, ``a number above 0 Hz and at most 10 Hz, or none``."""
+        words = listed(self._choices, " or ") if self._choices else _KINDS[self.schema["type"]]
+        unit = f" {self.schema['unit']}" if "unit" in self.schema else ""
+        given = [(word, self.schema[key]) for key, word in _BOUNDS.items() if key in self.schema]
+        bounds = " and ".join(f"{word} {value_text(float(bound))}{unit}" for word, bound in given)
+        if bounds:
+            words = f"{words} of {bounds}" if bounds.startswith("at") else f"{words} {bounds}"
+        return f"{words}, or none" if self.optional else words
 
 
 def options_of(constructor: Callable[..., object], module: str, *, skip: int) -> tuple[Option, ...]:
     """Return the options that a constructor takes.
 
     Args:
-        constructor: a class or function; its parameters' annotations and defaults say what the options are.
-        module: name of the module that annotations are looked up in, where the constructor does not say.
-        skip: how many of the first parameters are no options.
+        constructor: A class or function; its parameters' annotations and defaults say what the options are.
+        module: Name of the module that annotations are looked up in, where the constructor does not say.
+        skip: Number of first parameters that are not options.
 
     Raises:
-        TypeError: a parameter cannot be an option; the text says which and why.
+        TypeError: A parameter cannot be an option; the message says which and why.
     """
     parameters = list(inspect.signature(constructor).parameters.values())
     first = parameters[:skip]
@@ -237,18 +193,17 @@ def read_options(name: str, options: tuple[Option, ...], text: str) -> dict[str,
     """Return the options that ``text`` gives, in the order of ``options``.
 
     Args:
-        name: of the controller, for messages.
-        options: those that it has.
+        name: Name of the controller, for messages.
+        options: Those that it has.
         text: ``key=value,…``; may be empty.
 
     Raises:
-        ControllerError: anything is wrong with them; all of it is told.
+        ControllerError: Options are wrong; the error reports all that are.
     """
     pairs, problems = split_pairs(text)
     known = {option.name: option for option in options}
-    unknown = [key for key, _ in pairs if key not in known]
-    problems += [f"unknown option '{key}'.{did_you_mean(key, known)}" for key in unknown]
     keys = [key for key, _ in pairs]
+    problems += [f"unknown option '{key}'.{did_you_mean(key, known)}" for key in keys if key not in known]
     problems += [f"option '{key}' is given twice" for key in known if keys.count(key) > 1]
     problems += [f"option '{o.name}' is missing" for o in options if o.required and o.name not in keys]
     values: dict[str, Any] = {}
@@ -260,69 +215,61 @@ def read_options(name: str, options: tuple[Option, ...], text: str) -> dict[str,
                 problems.append(str(error))
     if problems:
         allowed = f"Options: {listed(map(str, options))}" if options else "It has no options"
-        raise ControllerError(told(name, [*problems, allowed]))
+        raise ControllerError(_report(name, problems, allowed))
     return {key: values[key] for key in known if key in values}
 
 
-def told(name: str, problems: Iterable[str]) -> str:
-    """Return the text of an error: one line, or one a problem after a line that names the controller."""
-    *rest, last = problems
-    if len(rest) == 0:
-        return f"controller '{name}': {last}"
-    if len(rest) == 1:
-        end = "" if rest[0].endswith((".", "?")) else "."
-        return f"controller '{name}': {rest[0]}{end} {last}"
-    return "\n  ".join([f"controller '{name}':", *rest, last])
+def _report(name: str, problems: list[str], allowed: str) -> str:
+    """Return one line, or one for each problem after a line that names the controller."""
+    if len(problems) == 1:
+        end = "" if problems[0].endswith((".", "?")) else "."
+        return f"controller '{name}': {problems[0]}{end} {allowed}"
+    return "\n  ".join([f"controller '{name}':", *problems, allowed])
 
 
 def _option(parameter: inspect.Parameter, module: str) -> Option:
+    name = parameter.name.removesuffix("_")
     if parameter.kind is parameter.POSITIONAL_ONLY:
         raise TypeError(f"parameter '{parameter.name}' cannot be given by name")
     required = parameter.default is parameter.empty
     default = None if required else parameter.default
-    annotation = _resolved(parameter, module)
-    if annotation is parameter.empty:
-        annotation = str if default is None else type(default)
-    within = None
-    if typing.get_origin(annotation) is typing.Annotated:
-        annotation, *extras = typing.get_args(annotation)
-        within = next((extra for extra in extras if isinstance(extra, Within)), None)
-    empty = default is None and not required
-    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
-        members = typing.get_args(annotation)
-        rest = [member for member in members if member is not types.NoneType]
-        empty = len(rest) < len(members)
-        annotation = rest[0] if len(rest) == 1 else annotation
-    choices: tuple[str, ...] = ()
-    if typing.get_origin(annotation) is Literal:
-        choices = typing.get_args(annotation)
-        annotation = str if all(isinstance(choice, str) for choice in choices) else annotation
-    if annotation not in (float, int, bool, str):
-        raise TypeError(
-            f"option '{_name(parameter)}' is of type {getattr(annotation, '__name__', annotation)}; "
-            "it may be float, int, bool, str, a Literal of texts, or one of these or None"
-        )
+    annotation = _annotation(parameter, module)
+    try:
+        adapter = TypeAdapter(annotation, config=_READING)
+        schema = adapter.json_schema()
+    except PydanticUserError:
+        raise _unreadable(name, annotation) from None
+    kinds = [kind for kind in schema.get("anyOf", [schema]) if kind.get("type") != "null"]
+    simple = len(kinds) == 1 and kinds[0].get("type") in _KINDS and not {"format", "pattern"} & kinds[0].keys()
+    if not simple or not all(isinstance(choice, str) for choice in kinds[0].get("enum", ())):
+        raise _unreadable(name, annotation)
     return Option(
-        name=_name(parameter),
+        name=name,
         parameter=parameter.name,
-        kind=annotation,
-        choices=choices,
-        empty=empty,
         required=required,
         default=default,
-        within=within,
+        adapter=adapter,
+        schema={**schema, **kinds[0]},
+        optional="anyOf" in schema or (default is None and not required),
     )
 
 
-def _name(parameter: inspect.Parameter) -> str:
-    return parameter.name.removesuffix("_")
+def _unreadable(name: str, annotation: object) -> TypeError:
+    return TypeError(
+        f"option '{name}' is of type {getattr(annotation, '__name__', annotation)}; "
+        "it may be float, int, bool, str, a Literal of texts, or one of these or None"
+    )
 
 
-def _resolved(parameter: inspect.Parameter, module: str) -> Any:
-    """Return an annotation, also one written as text; others of the same signature are not looked at."""
+def _annotation(parameter: inspect.Parameter, module: str) -> Any:
+    """Return an annotation, also one written as text; without one, the type of the default."""
+    if parameter.annotation is parameter.empty:
+        plain = parameter.default is parameter.empty or parameter.default is None
+        return str if plain else type(parameter.default)
     holder = types.SimpleNamespace(__annotations__={"option": parameter.annotation})
     names: Mapping[str, Any] = vars(sys.modules[module]) if module in sys.modules else {}
     try:
         return typing.get_type_hints(holder, dict(names), include_extras=True)["option"]
     except Exception as error:  # whatever an expression can raise
-        raise TypeError(f"the annotation of option '{_name(parameter)}' is not understood: {error}") from error
+        name = parameter.name.removesuffix("_")
+        raise TypeError(f"the annotation of option '{name}' is not understood: {error}") from error

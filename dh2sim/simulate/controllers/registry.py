@@ -1,4 +1,4 @@
-"""Which controllers there are, and how one is chosen by a text."""
+"""The known controllers, and how one is chosen by a text."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, Final
 from dh2sim.errors import ControllerError
 from dh2sim.messages import did_you_mean, listed
 from dh2sim.robot.spec import ActuatorType
-from dh2sim.simulate.controllers.options import ControllerChoice, Option, join_pairs, options_of, read_options
+from dh2sim.simulate.controllers.options import Option, join_pairs, options_of, read_options
 from dh2sim.simulate.controllers.position import Hold, RandomSpline, Sine
 from dh2sim.simulate.controllers.protocol import Controller, Prepared, RolloutBatch
 from dh2sim.simulate.controllers.replay import Replay
@@ -25,6 +25,25 @@ from dh2sim.simulate.controllers.user_code import (
     source_digest,
     user_code,
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerChoice:
+    """A controller with its options, as a run uses it."""
+
+    text: str
+    """``NAME`` or ``NAME:key=value,…``: all options that were given, in a fixed order."""
+    name: str
+    make: Callable[[RolloutBatch], Controller] = field(compare=False, repr=False)
+    """Makes the controller of a batch of rollouts, options already bound."""
+    actuation: ActuatorType | None
+    """Actuators that the model is simulated with, one at every joint; None: those of the robot file."""
+    options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}), compare=False)
+    digest: str = ""
+    """SHA-256 of what the options do not show: files that the controller reads, and code outside dh2sim."""
+    follows: bool = False
+    """Whether it follows a reference, which can be recorded."""
+
 
 BUILT_IN: Final[Mapping[str, type]] = MappingProxyType(
     {
@@ -41,7 +60,7 @@ BUILT_IN: Final[Mapping[str, type]] = MappingProxyType(
 
 
 def controllers() -> Mapping[str, str]:
-    """Return the names of all controllers, each with a line of help; no installed package is imported for it."""
+    """Return the names of all controllers, each with a line of help; no installed package is imported."""
     known = {name: (found.__doc__ or "").splitlines()[0].rstrip(".") for name, found in BUILT_IN.items()}
     for name, entries in plugins().items():
         packages = sorted({entry.dist.name if entry.dist is not None else entry.module for entry in entries})
@@ -53,11 +72,11 @@ def choose(text: str) -> ControllerChoice:
     """Return the controller that a text names.
 
     Args:
-        text: ``NAME`` or ``NAME:key=value,…`` of a controller that comes with dh2sim or with an installed package, or
-            ``MODULE:CLASS`` or ``MODULE:CLASS:key=value,…`` of one's own.
+        text: ``NAME`` or ``NAME:key=value,…`` of a controller of dh2sim or of an installed package, or
+            ``MODULE:CLASS`` or ``MODULE:CLASS:key=value,…`` of a user's class.
 
     Raises:
-        ControllerError: there is no such controller, its options or files are wrong, or its code failed.
+        ControllerError: The controller is unknown, its options or files are wrong, or its code failed.
     """
     head, _, rest = text.partition(":")
     name = head.strip()
@@ -75,20 +94,20 @@ def choose(text: str) -> ControllerChoice:
     known = [*BUILT_IN, *(plugin for plugin in installed if plugin not in BUILT_IN)]
     what = f"controller '{name}'" if written is None else f"controller and no module '{name}'"
     raise ControllerError(
-        f"there is no {what}.{did_you_mean(name, known)} Known controllers: {listed(known)}; "
-        "one of your own is named MODULE:CLASS"
+        f"unknown {what}.{did_you_mean(name, known)} Known controllers: {listed(known)}; "
+        "your own is named MODULE:CLASS"
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Maker:
-    """Makes the controller of a group of rollouts; its own class so that it can be sent to another process."""
+    """Makes the controller of a batch of rollouts; a class so that it can be sent to another process."""
 
     name: str
     make: Callable[..., Controller]
     options: Mapping[str, Any] = field(default_factory=dict)
     own: bool
-    """Whether the code is dh2sim's own."""
+    """Whether the code is part of dh2sim."""
 
     def __call__(self, batch: RolloutBatch) -> Controller:
         if self.own:
@@ -130,7 +149,7 @@ def _choice(name: str, found: type, text: str, *, own: bool) -> ControllerChoice
 
 
 def _options(name: str, found: type) -> tuple[Option, ...]:
-    """Return the options of ``prepare``, or of the constructor behind the group of rollouts that it is given."""
+    """Return the options of ``prepare``, or of the constructor after its first argument."""
     prepare = getattr(found, "prepare", None)
     try:
         if prepare is None:
@@ -141,18 +160,18 @@ def _options(name: str, found: type) -> tuple[Option, ...]:
 
 
 def _check_methods(name: str, found: object) -> None:
-    """See that a controller, or its class, has ``control`` or ``controls``, and not both."""
+    """Require a controller, or its class, to have either ``control`` or ``controls``."""
     has = [method for method in ("control", "controls") if callable(getattr(found, method, None))]
     if len(has) != 1:
         raise ControllerError(
-            f"controller '{name}': it has {'both' if has else 'neither'} control(observation) "
-            f"{'and' if has else 'nor'} controls(first, count); it needs one of them"
+            f"controller '{name}' must have either control(observation) or controls(first, count), got "
+            f"{'both' if has else 'neither'}"
         )
 
 
 @contextmanager
 def _named(name: str) -> Iterator[None]:
-    """Name the controller in an error."""
+    """Put the controller's name before an error."""
     try:
         yield
     except ControllerError as error:
@@ -167,6 +186,6 @@ def _actuation(name: str, value: object) -> ActuatorType | None:
         return ActuatorType(value)
     guess = did_you_mean(value, known) if isinstance(value, str) else ""
     raise ControllerError(
-        f"controller '{name}': its actuation is {value!r}.{guess} "
-        f"It may be {listed(repr(kind) for kind in known)}, or None for the robot's own actuators"
+        f"controller '{name}': actuation must be {listed(repr(kind) for kind in known)}, or None for the robot's own "
+        f"actuators, got {value!r}.{guess}".rstrip(".")
     )

@@ -89,8 +89,8 @@ def test_a_controller_of_an_installed_package_is_known_by_its_name(
     assert controllers()["sine"].startswith("Position actuators")
     assert refused("lost") == ("controller 'lost': AttributeError: module 'dh2sim_swing' has no attribute 'Lost'")
     assert refused("swign") == (
-        "there is no controller 'swign'. Did you mean 'swing'? Known controllers: passive, hold, "
-        "gravity-compensation, pd, computed-torque, sine, random, replay, lost, swing; one of your own is named "
+        "unknown controller 'swign'. Did you mean 'swing'? Known controllers: passive, hold, "
+        "gravity-compensation, pd, computed-torque, sine, random, replay, lost, swing; your own is named "
         "MODULE:CLASS"
     )
 

@@ -27,17 +27,24 @@ def refused(text: str) -> str:
         ("number", "'number' of module 'swinging' (swinging.py) is not a class"),
         (
             "Odd",
-            "its actuation is 'motors'. Did you mean 'motor'? It may be 'position', 'velocity', 'motor', 'none', or "
-            "None for the robot's own actuators",
+            "actuation must be 'position', 'velocity', 'motor', 'none', or None for the robot's own actuators, "
+            "got 'motors'. Did you mean 'motor'?",
         ),
-        ("Neither", "it has neither control(observation) nor controls(first, count); it needs one of them"),
-        ("Both", "it has both control(observation) and controls(first, count); it needs one of them"),
         ("Alone", "its constructor must take a RolloutBatch as its first argument"),
     ],
 )
 def test_a_class_that_cannot_be_a_controller_is_refused(folder: Path, name: str, problem: str) -> None:
     write(folder, "swinging.py", SWING)
     assert refused(f"swinging:{name}") == f"controller 'swinging:{name}': {problem}"
+
+
+@pytest.mark.parametrize("name", ["Neither", "Both"])
+def test_a_controller_looks_at_the_state_or_does_not(folder: Path, name: str) -> None:
+    write(folder, "swinging.py", SWING)
+    assert refused(f"swinging:{name}") == (
+        f"controller 'swinging:{name}' must have either control(observation) or controls(first, count), "
+        f"got {name.lower()}"
+    )
 
 
 def test_a_failing_constructor_is_told_by_its_text_and_line(folder: Path) -> None:
@@ -85,6 +92,6 @@ def test_a_module_that_cannot_be_imported_is_told_with_the_line(folder: Path, te
 @pytest.mark.parametrize("text", ["no_such_module:A", "no_such_package.part:A", "no_such_package.part:A:gain=3"])
 def test_a_module_that_is_not_there_is_an_unknown_controller(folder: Path, text: str) -> None:
     assert refused(text) == (
-        f"there is no controller and no module '{text.split(':')[0]}'. Known controllers: passive, hold, "
-        "gravity-compensation, pd, computed-torque, sine, random, replay; one of your own is named MODULE:CLASS"
+        f"unknown controller and no module '{text.split(':')[0]}'. Known controllers: passive, hold, "
+        "gravity-compensation, pd, computed-torque, sine, random, replay; your own is named MODULE:CLASS"
     )

@@ -53,7 +53,7 @@ def test_commands_on_the_page_choose_controllers(tmp_path: Path, monkeypatch: py
     assert len(commands) == 3
     for text in commands:
         if text.startswith("damped"):
-            with pytest.raises(ControllerError, match=r"^there is no controller"):
+            with pytest.raises(ControllerError, match=r"^unknown controller"):
                 choose(text)
         else:
             assert choose(text).text == text

@@ -91,13 +91,10 @@ def test_options_reach_the_controller() -> None:
 def test_an_unknown_name_is_told_with_the_known_ones(text: str) -> None:
     what = "controller and no module" if text == "sien:amplitude" else "controller"
     assert refused(text) == (
-        f"there is no {what} 'sien'. Did you mean 'sine'? Known controllers: {KNOWN}; "
-        "one of your own is named MODULE:CLASS"
+        f"unknown {what} 'sien'. Did you mean 'sine'? Known controllers: {KNOWN}; your own is named MODULE:CLASS"
     )
 
 
 @pytest.mark.parametrize("text", ["", ":", ":x"])
 def test_no_name_is_an_unknown_one(text: str) -> None:
-    assert refused(text) == (
-        f"there is no controller ''. Known controllers: {KNOWN}; one of your own is named MODULE:CLASS"
-    )
+    assert refused(text) == (f"unknown controller ''. Known controllers: {KNOWN}; your own is named MODULE:CLASS")
