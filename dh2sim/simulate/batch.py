@@ -1,9 +1,4 @@
-"""A group of rollouts in the engine: its states, which of them still run, and why others do not.
-
-Dynamics as the joints see it: of all degrees of freedom, or with a floating base that nothing holds.
-
-What a controller sees of a group of rollouts, computed when it is first asked for.
-"""
+"""A batch of rollouts in MuJoCo: what a controller sees of it, which rollouts still run, and why others stopped."""
 
 from __future__ import annotations
 
@@ -26,12 +21,13 @@ BASE = 6
 
 
 class JointSpace:
-    """Turns MuJoCo's mass matrix and forces into those of the equation tau = M a + c of the n joints.
+    """Reduces MuJoCo's mass matrix and forces to those of the equation tau = M a + c of the n joints.
 
-    On a floating base no force acts, so that its acceleration a_b is whatever the joints' one makes of it:
-    M_bb a_b + M_bj a + c_b = 0. Put into the joints' equation this leaves the inertia M_jj - M_jb M_bb⁻¹ M_bj and the
-    force c_j - M_jb M_bb⁻¹ c_b. Source: Y. Umetani, K. Yoshida, Resolved motion rate control of space manipulators
-    with generalized Jacobian matrix (1989), and R. Featherstone, Rigid Body Dynamics Algorithms (2008), section 9.3.
+    No force acts on a floating base, so that its acceleration a_b follows from that of the joints:
+    M_bb a_b + M_bj a + c_b = 0. Inserted into the joints' equation this leaves the inertia M_jj - M_jb M_bb⁻¹ M_bj
+    and the force c_j - M_jb M_bb⁻¹ c_b. Source: Y. Umetani, K. Yoshida, Resolved motion rate control of space
+    manipulators with generalized Jacobian matrix (1989), and R. Featherstone, Rigid Body Dynamics Algorithms (2008),
+    section 9.3.
     """
 
     def __init__(self, plant: Plant) -> None:
@@ -63,14 +59,14 @@ class JointSpace:
 
 
 def _of_base(M: Array) -> Array:
-    """Return the floating base's own inertia, and the identity where a simulation failed before it had any."""
+    """Return the floating base's own inertia, or the identity where a simulation failed before it was computed."""
     own = M[:, :BASE, :BASE].copy()
     own[~own.any(axis=(1, 2))] = np.eye(BASE)
     return own
 
 
 def _dense_index(model: mujoco.MjModel) -> NDArray[np.intp]:
-    """Where MuJoCo's sparse lower triangle of the mass matrix holds each entry of the dense one; a chain has all."""
+    """Return where MuJoCo's sparse lower triangle has each entry of the dense mass matrix; a chain has all."""
     index = np.zeros((model.nv, model.nv), dtype=np.intp)
     for row in range(model.nv):
         start = model.M_rowadr[row]
@@ -80,10 +76,10 @@ def _dense_index(model: mujoco.MjModel) -> NDArray[np.intp]:
 
 
 class BatchObservation:
-    """The states of a persistent batch at the present instant; see ``Observation``. Arrays are the caller's own."""
+    """The current states of a persistent batch; see ``Observation``. Arrays are copies."""
 
     def __init__(self, plant: Plant, batch: Batch, gravity_forces: GravityForces) -> None:
-        """Observe a batch whose simulations have just been given their start."""
+        """Observe a batch that is at its start."""
         self._plant, self._batch, self._gravity_forces = plant, batch, gravity_forces
         self._first_q, self._first_v = (7, 6) if plant.floating else (0, 0)
         self._space = JointSpace(plant)
@@ -92,7 +88,7 @@ class BatchObservation:
         self.step = 0
 
     def advance(self) -> None:
-        """The batch has moved on by one step."""
+        """Note that the batch has taken a step."""
         self.step += 1
         self._gravity = None
 
@@ -134,17 +130,17 @@ class BatchObservation:
         return self._gravity.copy()
 
     def _field(self, name: str) -> Array:
-        if name not in self._fields:  # a field shows what is computed after it was bound
+        if name not in self._fields:  # a field has what is computed after it was bound
             self._fields[name] = self._batch.bind(name)
             forward(self._batch)
         return self._fields[name]
 
 
 class GravityForces:
-    """The same models at rest, which tell the forces of gravity alone."""
+    """Forces of gravity alone, computed by the same models at rest."""
 
     def __init__(self, plant: Plant, simulations: int, threads: int, factors: dict[str, Array]) -> None:
-        """Describe the models; nothing is made before it is needed."""
+        """Describe the models, which are made when they are first needed."""
         self._plant, self._simulations, self._threads, self._factors = plant, simulations, threads, factors
         self._space = JointSpace(plant)
         self._batch: Batch | None = None
@@ -172,7 +168,7 @@ WARNINGS = {
 
 
 class MonitoredBatch:
-    """Simulations that run together; each that MuJoCo warns of or fails on stops alone."""
+    """Simulations that run together; one that MuJoCo warns of or fails on stops alone."""
 
     def __init__(self, plant: Plant, batch: Batch, recorder: Recorder, steps: int) -> None:
         """Take over a batch at its start."""
@@ -192,15 +188,15 @@ class MonitoredBatch:
 
     @property
     def rows(self) -> Any:
-        """The same, to index arrays with."""
+        """The simulations that still run, to index arrays with."""
         ids = self.ids
         return slice(None) if ids is None else ids
 
     def clipped(self, wanted: Array) -> tuple[Array, NDArray[np.bool_] | None]:
-        """Return controls inside their ranges, and where they were not: None if nowhere.
+        """Return controls moved inside their ranges, and where they were outside: None if nowhere.
 
         Args:
-            wanted: shape (batch, …, actuators).
+            wanted: Controls, shape (batch, …, actuators).
         """
         lower, upper = self.plant.control_lower, self.plant.control_upper
         outside = (wanted < lower) | (wanted > upper)
@@ -212,21 +208,21 @@ class MonitoredBatch:
         """Count the controls that were clipped, before the step in which a simulation stopped.
 
         Args:
-            outside: where they were, shape (batch, count or 1, actuators).
-            first: the time step that they begin with; all of ``count`` steps have been simulated.
-            count: number of time steps that they were for.
+            outside: Where they were clipped, shape (batch, count or 1, actuators).
+            first: First time step that they were for; all of ``count`` steps have been simulated.
+            count: Number of time steps that they were for.
         """
         if outside is None:
             return
         ran = np.where(self.stop_step < 0, count, np.clip(self.stop_step - first, 0, count))
         if outside.shape[1] == count:
-            meant = np.arange(count) < ran[:, None]
-            self.saturation += np.count_nonzero(outside & meant[:, :, None], axis=1)
+            simulated = np.arange(count) < ran[:, None]
+            self.saturation += np.count_nonzero(outside & simulated[:, :, None], axis=1)
         else:
             self.saturation += outside[:, 0] * ran[:, None]
 
     def call(self, function: Any, *args: Any, **kwargs: Any) -> NDArray[np.intp]:
-        """Call a method of the batch; return the simulations that MuJoCo warned of or failed on meanwhile."""
+        """Call a method of the batch and return the simulations that MuJoCo warned of or failed on."""
         failed = np.zeros(self.batch.nsim, dtype=bool)
         try:
             function(*args, **kwargs)

@@ -53,13 +53,13 @@ class Variable:
     dimensions: tuple[str, ...]
     dtype: np.dtype[Any]
     fill: float | int
-    """What stands where nothing was recorded: NaN, or what ``attributes`` explain."""
+    """Value where nothing was recorded: NaN, or one that ``attributes`` explain."""
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Layout:
-    """Everything about a run's dataset but the numbers themselves."""
+    """A run's dataset without the numbers of its variables."""
 
     sizes: Mapping[str, int]
     """Size of every dimension; ``rollout`` is the number of rollouts."""

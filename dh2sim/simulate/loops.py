@@ -1,8 +1,7 @@
-"""Simulating with controls that depend on the state: the engine stops before every time step to be looked at.
+"""The two loops that simulate a batch.
 
-What a controller returned, made sure of.
-
-Simulating with controls that are known beforehand: many time steps in one call of the engine.
+With controls that are known beforehand MuJoCo simulates many time steps in one call; with controls that depend on the
+state it stops before every time step for the controller.
 """
 
 from __future__ import annotations
@@ -25,35 +24,35 @@ def checked(returned: object, shapes: Sequence[tuple[int, ...]], axes: str, *, c
     """Return what a controller returned as an array of double precision.
 
     Args:
-        returned: by a controller, who may be a user's.
-        shapes: which it may have.
-        axes: what they count, for the message.
-        controller: its name.
-        what: it should be, as in 'controls'.
+        returned: What the controller returned.
+        shapes: Allowed shapes.
+        axes: What the axes count, for the message.
+        controller: Name of the controller.
+        what: What was asked for, as in 'controls'.
 
     Raises:
-        ControllerError: it is no array of real numbers, or has another shape.
+        ControllerError: It is not an array of real numbers, or has another shape.
     """
-    begun = f"controller '{controller}' returned"
+    start = f"controller '{controller}' returned"
     if returned is None:
-        raise ControllerError(f"{begun} nothing for {what}")
+        raise ControllerError(f"{start} None for {what}")
     try:
         found = np.asarray(returned)
         if found.dtype.kind not in "biufO":
-            raise TypeError(f"they are of type {found.dtype}")
+            raise TypeError(f"their type is {found.dtype}")
         array: Array = found.astype(np.float64, copy=False)
     except (TypeError, ValueError) as error:
-        raise ControllerError(f"{begun} {what} that are no array of numbers: {error}") from error
+        raise ControllerError(f"{start} {what} that are not an array of numbers: {error}") from error
     if array.shape not in shapes:
         allowed = " or ".join(str(shape) for shape in dict.fromkeys(shapes))
-        raise ControllerError(f"{begun} {what} of shape {array.shape}; expected is {allowed}: {axes}")
+        raise ControllerError(f"{start} {what} of shape {array.shape}, expected {allowed}: {axes}")
     return array
 
 
 SEGMENT_BYTES = 2**23
-"""How much is recorded in one call of the engine: little enough to stay in the cache."""
+"""Most that is recorded in one call of MuJoCo, so that it stays in the cache."""
 SCHEDULED_STEPS = 64
-"""Time steps of controls asked for at once where the engine stops before each."""
+"""Time steps of controls computed at a time where MuJoCo stops before each."""
 _OPEN_LOOP_AXES = "rollouts, time steps or 1, actuators"
 
 
@@ -61,12 +60,12 @@ def simulate_open_loop(monitored: MonitoredBatch, controller: OpenLoop, name: st
     """Simulate a batch from its start to its end, recording.
 
     Args:
-        monitored: at its start.
-        controller: of its rollouts.
-        name: of the controller, for errors.
+        monitored: The batch, at its start.
+        controller: Its controller.
+        name: Name of the controller, for errors.
 
     Raises:
-        ControllerError: it returned what are no controls.
+        ControllerError: It did not return controls.
     """
     segment = _Segment(monitored)
     for first in range(0, monitored.steps, segment.steps):
@@ -83,7 +82,7 @@ def controls_of(controller: OpenLoop, first: int, count: int, monitored: Monitor
     """Return the controls of some time steps, shape (batch, count or 1, actuators).
 
     Raises:
-        ControllerError: they are no such array.
+        ControllerError: They are not such an array.
     """
     simulations, actuators = monitored.batch.nsim, len(monitored.plant.actuators)
     shapes = [(simulations, count, actuators), (simulations, 1, actuators)]
@@ -91,10 +90,10 @@ def controls_of(controller: OpenLoop, first: int, count: int, monitored: Monitor
 
 
 class Scheduled:
-    """An open-loop controller, driven step by step: slower, for what can be recorded in no other way."""
+    """An open-loop controller, asked step by step: slower, for what can only be recorded between steps."""
 
     def __init__(self, controller: OpenLoop, monitored: MonitoredBatch, name: str) -> None:
-        """Ask for nothing yet."""
+        """Wrap a controller of the batch; ``name`` is its name."""
         self._controller, self._monitored, self._name = controller, monitored, name
         self._controls: Array | None = None
 
@@ -154,7 +153,7 @@ class _Segment:
         return {name: np.empty((alive, count, *old.shape[2:]), old.dtype) for name, old in self._buffers.items()}
 
     def _step_by_step(self, failed: NDArray[np.intp], before: Array, controls: Array, first: int, count: int) -> None:
-        """Simulate those that failed once more, to find out in which step, and record what went before it."""
+        """Simulate again those that failed, to find the step in which they did, and record what came before."""
         monitored, batch = self._monitored, self._monitored.batch
         batch.state[failed] = before[failed]
         batch.warning[failed] = 0
@@ -180,7 +179,7 @@ class _Segment:
 
 
 def _end(monitored: MonitoredBatch) -> None:
-    """Record what is computed from the last state."""
+    """Record what MuJoCo derives from the last state."""
     fields = {
         field: monitored.batch.bind(field)
         for field in ("sensordata", "energy")
@@ -192,9 +191,9 @@ def _end(monitored: MonitoredBatch) -> None:
 
 
 PAGE_STEPS = 64
-"""Time steps after which what was seen is put into the arrays."""
+"""Time steps that are kept before they are recorded together."""
 BEFORE_STEP = (*DERIVED, "contacts")
-"""Variables that MuJoCo has computed when a time step begins; the others of ``INTERVALS`` come with the step."""
+"""Variables that MuJoCo has computed before a time step; the others of ``INTERVALS`` come with the step."""
 _CLOSED_LOOP_AXES = "rollouts, actuators"
 
 
@@ -203,17 +202,17 @@ def simulate_closed_loop(
 ) -> None:
     """Simulate a batch from its start to its end, recording.
 
-    Before a step, what MuJoCo derives from positions and velocities is computed (``mjSTAGE_VEL``); the step goes on
-    from there, so that looking costs nothing.
+    Before a step, what MuJoCo derives from positions and velocities is computed (``mjSTAGE_VEL``); the step continues
+    from there, so that observing costs nothing.
 
     Args:
-        monitored: at its start; its batch is persistent.
-        controller: of its rollouts.
-        observation: of its batch.
-        name: of the controller, for errors.
+        monitored: The batch, at its start and persistent.
+        controller: Its controller.
+        observation: What the controller sees of the batch.
+        name: Name of the controller, for errors.
 
     Raises:
-        ControllerError: it returned what are no controls.
+        ControllerError: It did not return controls.
     """
     batch, recorder = monitored.batch, monitored.recorder
     controls = batch.bind("ctrl")
@@ -250,7 +249,7 @@ def simulate_closed_loop(
 
 
 class _Pages:
-    """Keeps what was seen in the order of time, and turns it over to the recorder many steps at once."""
+    """Keeps copies of fields step by step, and passes many steps at once to the recorder."""
 
     def __init__(self, monitored: MonitoredBatch) -> None:
         self._recorder = monitored.recorder
@@ -258,19 +257,19 @@ class _Pages:
         self._first = self._count = 0
 
     def note(self, field: str, when: str, values: NDArray[Any]) -> None:
-        """Keep a copy of what a field holds in the present step; shape (batch, …)."""
+        """Keep a copy of a field in the current step; shape (batch, …)."""
         if (field, when) not in self._kept:
             self._kept[field, when] = np.empty((PAGE_STEPS, *values.shape), values.dtype)
         self._kept[field, when][self._count] = values
 
     def turn(self) -> None:
-        """Go on to the next step."""
+        """Proceed to the next step."""
         self._count += 1
         if self._count == PAGE_STEPS:
             self.flush()
 
     def flush(self) -> None:
-        """Hand over what was kept."""
+        """Record what was kept."""
         for (field, when), values in self._kept.items():
             seen = values[: self._count].swapaxes(0, 1)
             match when:

@@ -1,4 +1,4 @@
-"""MuJoCo as a rollout wants it: no step timer, no log file."""
+"""MuJoCo's process-wide state during a run: no step timer, and no log file of warnings."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _saved: tuple[int | None, Callable[[str], None] | None] = (None, None)
 
 @contextmanager
 def quiet_engine() -> Iterator[None]:
-    """Switch off MuJoCo's step timer and its log of warnings, and restore both.
+    """Switch off MuJoCo's step timer and its log of warnings while the context lasts.
 
     Importing ``mujoco`` installs a timer, called several times in every step, that takes some 30 % of the time of a
-    small arm's step. It is switched off for the whole process; ``mjData.timer`` stands still meanwhile. Warnings
+    small arm's step. It is switched off for the whole process; ``mjData.timer`` does not advance meanwhile. Warnings
     would be printed and appended to a file in the current folder; a rollout reads the counters instead.
     """
     global _users, _saved
@@ -51,7 +51,7 @@ def quiet_engine() -> Iterator[None]:
 
 
 def forward(batch: Batch, ids: NDArray[np.intp] | None = None) -> None:
-    """Compute what MuJoCo derives from positions and velocities; those that it gives up on keep what they had."""
+    """Compute what MuJoCo derives from positions and velocities; simulations that fail keep their old values."""
     with suppress(SimulationError):
         batch.forward(ids, stage=VELOCITY_STAGE)
 

@@ -1,4 +1,4 @@
-"""What is recorded of a group of rollouts, where it comes from in MuJoCo, and where it goes."""
+"""Recording: which fields of MuJoCo a variable comes from, and where it goes in a block's arrays."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 class Recorder:
-    """Puts what a simulation yields, step by step or many steps at once, where it belongs in a block's arrays."""
+    """Copies what a simulation yields, one or many time steps at a time, into a block's arrays."""
 
     def __init__(self, plant: Plant, arrays: Arrays, every: int) -> None:
-        """Record into ``arrays``, each with the group's rollouts first; every ``every``-th time step."""
+        """Record every ``every``-th time step into ``arrays``, each with the batch's rollouts first."""
         self._arrays = arrays
         self._every = every
         self._first_q, self._first_v = (7, 6) if plant.floating else (0, 0)
         self._substeps = plant.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
         self.joints = n = plant.n
-        self._torque = slice(2 * n, 3 * n)  # sensors stand in the order of ``add_sensors``
+        self._torque = slice(2 * n, 3 * n)  # sensors are in the order of ``add_sensors``
         self._tool = slice(3 * n, 3 * n + 7)
 
     def wants(self, name: str) -> bool:
@@ -42,7 +42,7 @@ class Recorder:
 
     @property
     def looks_between_steps(self) -> bool:
-        """Whether something is recorded that a time step leaves overwritten by what it looked at on its way."""
+        """Whether something is recorded that the substeps of RK4 overwrite."""
         return self._substeps and any(map(self.wants, ("energy", "contacts")))
 
     @property
@@ -77,7 +77,7 @@ class Recorder:
     def put_field(
         self, field: str, first: int, values: NDArray[Any], rows: Any = slice(None), only: Iterable[str] | None = None
     ) -> None:
-        """Record what a field of MjData holds at time steps ``first``, …; of ``only`` these variables, if given."""
+        """Record a field of MjData at time steps ``first``, …; with ``only``, these variables of it."""
         parts: dict[str, NDArray[Any]]
         match field:
             case "qpos":

@@ -164,7 +164,7 @@ def test_every_mistake_is_told_at_once(folder: Path) -> None:
         ),
         (
             ["--controller", "random:rate=1e6"],
-            "controller 'random': option 'rate' is 1e+06 Hz, above that of the time steps, 500 Hz",
+            "controller 'random': option 'rate' must be at most that of the time steps, 500 Hz, got 1e+06 Hz",
         ),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

@@ -18,17 +18,17 @@ DRIVERS = "tests.simulate.drivers"
 @pytest.mark.parametrize(
     ("driver", "words"),
     [
-        ("Nothing", "nothing for controls"),
-        ("Flat", "controls of shape (2,); expected is (2, 2): rollouts, actuators"),
-        ("Words", "controls that are no array of numbers: they are of type <U5"),
-        ("Complex", "controls that are no array of numbers: they are of type complex128"),
+        ("Nothing", "None for controls"),
+        ("Flat", "controls of shape (2,), expected (2, 2): rollouts, actuators"),
+        ("Words", "controls that are not an array of numbers: their type is <U5"),
+        ("Complex", "controls that are not an array of numbers: their type is complex128"),
         (
             "Narrow",
-            "controls of shape (2, 1, 1); expected is (2, 1, 2): rollouts, time steps or 1, actuators",
+            "controls of shape (2, 1, 1), expected (2, 1, 2): rollouts, time steps or 1, actuators",
         ),
         (
             "Single",
-            "reference positions of shape (2, 2); expected is (2, 2, 2): rollouts, time steps, joints",
+            "reference positions of shape (2, 2), expected (2, 2, 2): rollouts, time steps, joints",
         ),
     ],
 )
@@ -41,10 +41,10 @@ def test_what_is_no_control_is_an_error_that_says_what_is(driver: str, words: st
 @pytest.mark.parametrize(
     ("driver", "words"),
     [
-        ("Late", "controls of shape (2,); expected is (3, 2): rollouts, actuators"),
+        ("Late", "controls of shape (2,), expected (3, 2): rollouts, actuators"),
         (
             "LateOpen",
-            "controls of shape (3, 0, 2); expected is (3, 7, 2) or (3, 1, 2): rollouts, time steps or 1, actuators",
+            "controls of shape (3, 0, 2), expected (3, 7, 2) or (3, 1, 2): rollouts, time steps or 1, actuators",
         ),
     ],
 )
@@ -71,7 +71,7 @@ def test_rows_of_different_lengths_are_no_array() -> None:
     with pytest.raises(ControllerError) as caught:
         rollout(robots.arm(), rollouts=3, steps=7, controller=f"{DRIVERS}:Ragged")
     told = str(caught.value)
-    assert told.startswith(f"controller '{DRIVERS}:Ragged' returned controls that are no array of numbers: ")
+    assert told.startswith(f"controller '{DRIVERS}:Ragged' returned controls that are not an array of numbers: ")
     assert "\n" not in told
 
 

@@ -240,7 +240,7 @@ def _option(parameter: inspect.Parameter, module: str) -> Option:
     except PydanticUserError:
         raise _unreadable(name, annotation) from None
     kinds = [kind for kind in schema.get("anyOf", [schema]) if kind.get("type") != "null"]
-    simple = len(kinds) == 1 and kinds[0].get("type") in _KINDS and not {"format", "pattern"} & kinds[0].keys()
+    simple = len(kinds) == 1 and kinds[0].get("type") in _KINDS and "format" not in kinds[0]
     if not simple or not all(isinstance(choice, str) for choice in kinds[0].get("enum", ())):
         raise _unreadable(name, annotation)
     return Option(

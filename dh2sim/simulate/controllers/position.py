@@ -1,11 +1,4 @@
-"""Periodic excitation, as used to identify a robot's dynamics.
-
-The actuators of a compiled model, as controllers in control space need to know them.
-
-Position actuators that keep a robot where it starts.
-
-Smooth noise.
-"""
+"""Controllers of setpoints: holding the start, smooth random splines, and sums of sines."""
 
 from __future__ import annotations
 
@@ -59,7 +52,7 @@ def of_type(plant: Plant, kind: ActuatorType) -> Array:
 
 
 def driven_joints(plant: Plant) -> list[int]:
-    """Return for each actuator the number of its joint, to index the last axis of an array with."""
+    """Return the number of each actuator's joint, to index the last axis of an array with."""
     return list(plant.driven)
 
 
@@ -82,7 +75,7 @@ def holding_controls(batch: RolloutBatch, *, against_gravity: bool) -> Array:
 
 
 class Hold:
-    """Position actuators hold the start, asked for as much more as balances gravity there."""
+    """Position actuators hold the start, with setpoints that balance gravity there."""
 
     actuation = ActuatorType.POSITION
 
@@ -96,11 +89,11 @@ class Hold:
 
 
 class RandomSpline:
-    """The robot's own actuators get smoothed noise.
+    """The robot's own actuators follow smooth random curves.
 
     Controls are uniform cubic B-splines through the neighbourhood of random points, twice continuously differentiable
     and between their least and greatest points. They start at rest, with what the actuators do at the start: its
-    position, no velocity, no force. Setpoints of positions keep the velocity limits.
+    position, no velocity, no force. Setpoints of positions respect the velocity limits.
     """
 
     actuation = None
@@ -115,18 +108,18 @@ class RandomSpline:
         """Draw the points.
 
         Args:
-            batch: the rollouts.
-            rate: random points a second, Hz.
-            amplitude: share of half the control's range that they are in, at either side of the start, or as near to
+            batch: The rollouts.
+            rate: Random points per second, Hz.
+            amplitude: Share of half the control's range that they are in, on either side of the start, or as near to
                 it as the range allows.
 
         Raises:
-            ControllerError: there is more than one point a time step.
+            ControllerError: There is more than one point per time step.
         """
         plant = batch.plant
         if rate * plant.timestep > 1.0:
             raise ControllerError(
-                f"option 'rate' is {rate:g} Hz, above that of the time steps, {1 / plant.timestep:g} Hz"
+                f"option 'rate' must be at most that of the time steps, {1 / plant.timestep:g} Hz, got {rate:g} Hz"
             )
         self._timestep, self._interval = plant.timestep, 1.0 / rate
         self._lower, self._upper = plant.control_lower, plant.control_upper
@@ -138,7 +131,7 @@ class RandomSpline:
         center = centers(start, reach, self._lower, self._upper)
         self._pieces = math.floor(batch.steps * plant.timestep * rate) + 1
         targets = center + reach * uniform(batch.generators, self._pieces, len(joints))
-        # a spline is nowhere quicker than its points are apart
+        # a spline is nowhere faster than its points are apart
         most = np.where(position, INSIDE * plant.velocity[joints] / rate, np.inf)
         self._points = follow(start, [start, start, *targets], most)
 
@@ -175,21 +168,21 @@ class Sine:
         """Draw amplitudes and phases.
 
         Args:
-            batch: the rollouts.
-            harmonics: number of sines.
-            frequency: of the first, Hz; the others are its multiples.
-            amplitude: sum of the sines' amplitudes as a share of half the joint's range, before the velocity limit.
-            fade: duration of the way from the start to the series, s.
+            batch: The rollouts.
+            harmonics: Number of sines.
+            frequency: Frequency of the first, Hz; the others are its multiples.
+            amplitude: Sum of the sines' amplitudes as a share of half the joint's range, before the velocity limit.
+            fade: Duration of the transition from the start to the series, s.
 
         Raises:
-            ControllerError: the highest frequency is more than time steps can show.
+            ControllerError: The highest frequency is above half the rate of the time steps.
         """
         plant = batch.plant
         self._timestep, self._fade, self._start = plant.timestep, fade, batch.q0
         if harmonics * frequency * plant.timestep > 0.5:
             raise ControllerError(
-                f"the highest frequency, harmonics x frequency = {harmonics * frequency:g} Hz, is above half the "
-                f"rate of the time steps, {0.5 / plant.timestep:g} Hz"
+                f"the highest frequency, harmonics x frequency, must be at most half the rate of the time steps, "
+                f"{0.5 / plant.timestep:g} Hz, got {harmonics * frequency:g} Hz"
             )
         self._rates = [2.0 * math.pi * frequency * h for h in range(1, harmonics + 1)]
         drawn = np.stack([g.standard_normal((2 * harmonics, plant.n)) for g in batch.generators], axis=1)
@@ -221,14 +214,14 @@ class Sine:
         return self._positions(first, count, values), v
 
     def _since(self, first: int, count: int) -> Array:
-        """Return the part of the way to the series that time steps are at, 0 to 1."""
+        """Return the progress of the transition to the series at time steps, 0 to 1."""
         since: Array = np.minimum(np.arange(first, first + count) * self._timestep / self._fade, 1.0)
         return since
 
     def _tables(self, first: int, count: int) -> tuple[Array, Array]:
         """Return sines, cosines and ones at time steps, and the rates of change of the sines and cosines.
 
-        By the C library, one by one: NumPy's vectors of sines may differ in the last bit with their lengths.
+        By the C library, one by one: the last bit of NumPy's sines may depend on the length of the array.
         """
         times = [k * self._timestep for k in range(first, first + count)]
         sines = np.array([[math.sin(rate * t) for t in times] for rate in self._rates])

@@ -1,10 +1,8 @@
-"""What a controller is: it drives many rollouts at once, all arrays with the rollouts first.
+"""Protocol of controllers: what they are given and must return, all arrays with the rollouts first.
 
-A rollout's controls may depend on that rollout alone: not on which others share its group, nor on how many
-there are. Then a run gives the same bits however it is cut up. So no sums over the first axis, no matrix
-products that a library blocks by size, and random numbers from the rollout's own generator only.
-
-What a controller class may say of itself before it drives anything, where its attributes do not suffice.
+A rollout's controls must depend on that rollout alone: not on which others are in its batch, nor on how many there
+are. Then a run gives the same bits however it is divided. So there must be no sums over the first axis, no matrix
+products that a library blocks by size, and no random numbers but from the rollout's own generator.
 """
 
 from __future__ import annotations
@@ -21,9 +19,9 @@ from dh2sim.typing import Array
 
 
 class Observation(Protocol):
-    """The states of a group of rollouts at one instant.
+    """The states of a batch of rollouts at one instant.
 
-    On a floating base inertia and forces are those that the joints feel while nothing holds the base.
+    With a floating base, inertia and forces are those that the joints feel while the base moves freely.
     """
 
     @property
@@ -69,13 +67,13 @@ class Observation(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RolloutBatch:
-    """A group of rollouts that are driven together, at their start."""
+    """Rollouts that are driven together, at their start."""
 
     plant: Plant
     steps: int
     """Time steps of the run."""
     rollouts: range
-    """Their numbers in the run."""
+    """Their indices in the run."""
     q0: Array
     """Joint positions at the start, rad or m, shape (batch, n)."""
     v0: Array
@@ -83,18 +81,18 @@ class RolloutBatch:
     gravity0: Array
     """Forces that balance gravity at the start, N·m or N, shape (batch, n)."""
     generators: Sequence[np.random.Generator]
-    """One a rollout, for the controller alone."""
+    """One for each rollout, used by the controller alone."""
 
 
 @runtime_checkable
 class OpenLoop(Protocol):
-    """A controller that looks at no state: its controls are known before the simulation runs."""
+    """A controller that does not look at the state: its controls are known before the simulation runs."""
 
     def controls(self, first: int, count: int) -> Array:
         """Return the controls of time steps ``first`` to ``first + count - 1``, shape (batch, count, actuators).
 
-        Or of shape (batch, 1, actuators) if they are the same at every step. Any steps may be asked for, in any
-        order, and the same step always has the same controls.
+        Or of shape (batch, 1, actuators) if they are the same at every step. It is called for any steps in any
+        order, and must return the same controls for the same step.
         """
         ...
 
@@ -118,23 +116,23 @@ class Follows(Protocol):
     def reference(self, first: int, count: int) -> tuple[Array, Array]:
         """Return reference positions and velocities at the beginning of ``count`` time steps from ``first``.
 
-        Each of shape (batch, count, n). ``first + count - 1`` may be ``steps``: the end of the run.
+        Each of shape (batch, count, n). ``first + count - 1`` may be ``steps``, the end of the run.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prepared:
-    """What the static method ``prepare`` of a controller class returns, given the options.
+    """What the static method ``prepare`` of a controller class returns for its options.
 
-    A class has one if it reads files: their digest is a part of what a run is, and what they hold may decide how the
-    robot is driven.
+    A class that reads files has this method: their digest is one of the run's settings, and their content may decide
+    how the robot is driven.
     """
 
     make: Callable[[RolloutBatch], Controller] = field(repr=False)
-    """Makes the controller of a group of rollouts."""
+    """Makes the controller of a batch of rollouts."""
     actuation: ActuatorType | str | None = None
-    """As the class attribute."""
+    """Actuators that the controller needs, like the class attribute of this name."""
     digest: str = ""
     """Hexadecimal SHA-256 of the files that were read."""
     follows: bool = False

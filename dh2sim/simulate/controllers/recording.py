@@ -1,9 +1,4 @@
-"""What a file holds that is replayed.
-
-Runs of dh2sim that are replayed: their controls, or the positions that joints went through.
-
-Files that are replayed: what they hold and which actuators that drives.
-"""
+"""Recorded controls or joint positions, read from CSV and NumPy files and from runs, to be replayed."""
 
 from __future__ import annotations
 
@@ -32,21 +27,21 @@ class Recording:
     file: str
     """As messages name it."""
     positions: bool
-    """Whether it holds positions of joints; otherwise controls."""
+    """Whether it contains positions of joints; otherwise controls."""
     actuation: ActuatorType | None
     """The actuators that it drives; None: the robot's own."""
     names: tuple[str, ...] | None
-    """Of the columns: joints or actuators; None: not said, then they are in the robot's order."""
+    """Joints or actuators of the columns; None if unnamed, and then in the robot's order."""
     width: int
     """Number of columns, m."""
     length: int
     """Number of instants, K."""
     times: Array | None
-    """Instants, s, from 0, shape (K,); None: one a time step."""
+    """Instants, s, from 0, shape (K,); None: one for each time step."""
     rollouts: int | None
-    """How many it holds; None: one, for all."""
+    """Number of rollouts; None: one, for all."""
     read: Callable[[range], Array] = field(repr=False)
-    """Gives the numbers of some rollouts, shape (rollouts, K, m)."""
+    """Reads the numbers of some rollouts, shape (rollouts, K, m)."""
     digest: str
     """SHA-256 of the file."""
 
@@ -58,15 +53,15 @@ class Recording:
         """Return one of its rollouts, for all.
 
         Raises:
-            ControllerError: it has no such rollout, or not all of it.
+            ControllerError: It does not have the rollout, or not all of it.
         """
         if rollout >= (self.rollouts or 1):
             held = "one rollout, 0" if self.rollouts in (None, 1) else f"rollouts 0 to {self.rollouts - 1}"
-            raise ControllerError(f"{self.file} has {held}; there is no rollout {rollout}")
+            raise ControllerError(f"{self.file} has {held}; rollout must be one of them, got {rollout}")
         data = self.read(range(rollout, rollout + 1))
         if not np.isfinite(data).all():
             raise ControllerError(
-                f"{self.file} does not hold all of rollout {rollout}: it stopped early, or the run is not finished"
+                f"{self.file} does not contain all of rollout {rollout}: it stopped early, or the run is not finished"
             )
         return replace(self, rollouts=None, read=lambda _: data)
 
@@ -74,12 +69,12 @@ class Recording:
         """Return which column belongs to each of the robot's joints or actuators.
 
         Args:
-            wanted: the robot's names, in its order.
+            wanted: The robot's names, in its order.
             what: 'joints' or 'actuators', for messages.
-            joints: the robot's joints.
+            joints: The robot's joints.
 
         Raises:
-            ControllerError: columns are missing, or there is one that the robot does not have.
+            ControllerError: Columns are missing, or there is one that the robot does not have.
         """
         if self.names is None:
             if self.width != len(wanted):
@@ -93,10 +88,10 @@ class Recording:
             return [self.names.index(name) for name in wanted]
         problems = []
         if missing:
-            problems.append(f"it has no column {_quoted(missing)}")
+            problems.append(f"missing column {_quoted(missing)}")
         for name in unknown:
             guess = closest(name, missing)
-            problems.append(f"column '{name}' is none of them" + (f"; did you mean '{guess}'?" if guess else ""))
+            problems.append(f"unknown column '{name}'" + (f"; did you mean '{guess}'?" if guess else ""))
         if not self.positions and set(self.names) <= set(joints):
             problems.append("the columns are joints: say as=reference")
         start = f"{self.file} does not fit the robot, whose {what} are {listed(wanted)}"
@@ -108,15 +103,15 @@ def _quoted(names: Sequence[str]) -> str:
 
 
 def read_run(path: Path, file: str, kind: str) -> Recording:
-    """Read what a run has recorded; the numbers themselves are read when they are needed.
+    """Open what a run has recorded; the numbers are read when they are needed.
 
     Args:
-        path: folder of the run.
-        file: as the user named it.
-        kind: 'reference': the positions of the joints; otherwise the controls.
+        path: Folder of the run.
+        file: Its path as the user wrote it.
+        kind: 'reference' for the positions of the joints; otherwise the controls are read.
 
     Raises:
-        ControllerError: it is no run, or has not recorded them.
+        ControllerError: It is not a run, or has not recorded them.
     """
     import zarr
 
@@ -127,10 +122,8 @@ def read_run(path: Path, file: str, kind: str) -> Recording:
         if run.attrs.get("dh2sim_run") != FORMAT:
             raise ControllerError(f"'{file}' is not a run of dh2sim")
         if variable not in run:
-            raise ControllerError(
-                f"'{file}' has recorded no {'positions' if positions else 'controls'}; "
-                f"run it again with {variable} in --record"
-            )
+            what = "positions" if positions else "controls"
+            raise ControllerError(f"'{file}' has recorded no {what}; run it again with '{variable}' in record")
         names = tuple(str(name) for name in run[labels][:])
         joints = len(run["joint"][:])
         times = read_only(run[instants][:])
@@ -151,7 +144,7 @@ def read_run(path: Path, file: str, kind: str) -> Recording:
 
 @contextmanager
 def _readable(file: str) -> Iterator[None]:
-    """Say that a folder is no run, or damaged; zarr has many ways to say so."""
+    """Turn the many exceptions of zarr for a folder that is damaged, or not a run, into one error."""
     try:
         yield
     except (ControllerError, MemoryError):
@@ -185,18 +178,18 @@ def _digest(path: Path, arrays: tuple[str, ...]) -> str:
     return digest.hexdigest()
 
 
-_MOST_TOLD = 5
+_MOST_REPORTED = 5
 
 
 def read_recording(file: str, kind: str) -> Recording:
-    """Read a file that is replayed.
+    """Read a file to be replayed.
 
     Args:
-        file: its path.
+        file: Its path.
         kind: 'auto', 'ctrl' or 'reference'.
 
     Raises:
-        ControllerError: the file cannot be used.
+        ControllerError: The file cannot be used.
     """
     try:
         path = Path(file).expanduser()
@@ -204,12 +197,12 @@ def read_recording(file: str, kind: str) -> Recording:
     except (OSError, RuntimeError) as error:
         raise ControllerError(f"cannot read '{file}': {error}") from error
     if not there:
-        raise ControllerError(f"there is no file '{file}'")
+        raise ControllerError(f"no such file '{file}'")
     if folder:
         return read_run(path, file, kind)
     readers = {".csv": _read_csv, ".npy": _read_npy}
     if path.suffix.lower() not in readers:
-        raise ControllerError(f"'{file}' cannot be replayed; what can is a .csv file, a .npy file or a run of dh2sim")
+        raise ControllerError(f"'{file}' cannot be replayed; it must be a .csv file, a .npy file or a run of dh2sim")
     try:
         return readers[path.suffix.lower()](path, file, kind)
     except OSError as error:
@@ -271,7 +264,7 @@ def _meaning(file: str, names: Sequence[str], kind: str) -> tuple[bool, Actuator
         mixed = f", but {listed(map(repr, controls))} are" if controls else ""
         raise ControllerError(
             f"'{file}': columns {listed(map(repr, joints))} are not named after actuators, as "
-            f"joint_1_motor is{mixed}. A file holds controls alone, or with as=reference positions of joints alone"
+            f"joint_1_motor is{mixed}. A file contains either controls, or with as=reference positions of joints"
         )
     found = set(types.values())
     return False, found.pop() if len(found) == 1 else None
@@ -293,23 +286,21 @@ def _numbers(file: str, header: Sequence[str], rows: Sequence[Sequence[str]]) ->
             if not np.isfinite(table[i, j]):
                 problems.append(f"line {line}, column '{header[j]}': {text!r} is not a finite number")
     if not filled:
-        problems.append("it has no values below the first line")
+        problems.append("there are no values below the first line")
     if problems:
-        more = [f"and {len(problems) - _MOST_TOLD} more"] if len(problems) > _MOST_TOLD else []
-        raise ControllerError("\n  ".join([f"'{file}' cannot be used:", *problems[:_MOST_TOLD], *more]))
+        more = [f"and {len(problems) - _MOST_REPORTED} more"] if len(problems) > _MOST_REPORTED else []
+        raise ControllerError("\n  ".join([f"'{file}' cannot be used:", *problems[:_MOST_REPORTED], *more]))
     return table[: len(filled)]
 
 
 def _times(file: str, times: Array) -> Array:
     if times[0] != 0.0:
-        raise ControllerError(
-            f"'{file}': time begins at {float(times[0])!r}; it counts seconds from the start, so the first is 0"
-        )
+        raise ControllerError(f"'{file}': time must start at 0, the start of the rollout, got {float(times[0])!r}")
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if late.size:
         i = int(late[0])
         raise ControllerError(
-            f"'{file}': time must grow from row to row; {float(times[i + 1])!r} comes after {float(times[i])!r}"
+            f"'{file}': time must increase from row to row; {float(times[i + 1])!r} comes after {float(times[i])!r}"
         )
     return read_only(times)
 
@@ -323,8 +314,8 @@ def _read_npy(path: Path, file: str, kind: str) -> Recording:
         raise ControllerError(f"'{file}' is not a NumPy file of numbers: {error}") from error
     if array.dtype.kind not in "fiu" or array.ndim not in (2, 3) or 0 in array.shape:
         raise ControllerError(
-            f"'{file}' holds {array.dtype} of shape {array.shape}; it must hold real numbers of "
-            "shape (time steps, columns) or (rollouts, time steps, columns)"
+            f"'{file}' must contain real numbers of shape (time steps, columns) or (rollouts, time steps, columns), "
+            f"got {array.dtype} of shape {array.shape}"
         )
     rows = array if array.ndim == 3 else array[None]
     for i, values in enumerate(rows):

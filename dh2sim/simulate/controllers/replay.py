@@ -1,4 +1,4 @@
-"""Controls or positions of joints from a file."""
+"""The controller ``replay``: controls or positions of joints from a file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dh2sim.simulate.controllers.recording import Recording, read_recording
 from dh2sim.typing import Array
 
 _EARLY = 1e-6
-"""Share of a time step by which a row may come late and still count for it: times are rounded."""
+"""Share of a time step by which a row may be late and still count for it, since times are rounded."""
 
 
 class Replay:
@@ -28,16 +28,16 @@ class Replay:
         as_: Literal["auto", "ctrl", "reference"] = "auto",
         rollout: Annotated[int | None, Within(at_least=0)] = None,
     ) -> Prepared:
-        """Read the file, or of a large one what it holds.
+        """Read the file; the numbers of a large one are read when they are needed.
 
         Args:
-            file: ``.csv``, ``.npy``, or a run.
-            as_: what the numbers are: controls, or positions of joints; 'auto': as the columns are named, and of a
-                run its controls.
-            rollout: which of the file's rollouts every rollout replays; None: each its own.
+            file: A ``.csv`` or ``.npy`` file, or a run.
+            as_: Whether the numbers are controls or positions of joints; 'auto': as the columns are named, and
+                controls for a run.
+            rollout: Which of the file's rollouts every rollout replays; None: the one of its own index.
 
         Raises:
-            ControllerError: the file cannot be used.
+            ControllerError: The file cannot be used.
         """
         recording = read_recording(file, as_)
         if rollout is not None:
@@ -52,13 +52,13 @@ class Replay:
 
 
 class ReplayedControls:
-    """Controls of a file, each held until the next."""
+    """Controls from a file, each held until the next."""
 
     def __init__(self, batch: RolloutBatch, *, recording: Recording) -> None:
         """Read what the rollouts need.
 
         Raises:
-            ControllerError: the file's columns are not the robot's actuators, or it has too few rollouts.
+            ControllerError: The file's columns are not the robot's actuators, or it has too few rollouts.
         """
         self._data = _rows(batch, recording, batch.plant.actuators, "actuators")
         self._times = recording.times_at(batch.plant.timestep)
@@ -73,13 +73,13 @@ class ReplayedControls:
 
 
 class ReplayedPositions:
-    """Positions of a file, straight between its instants; the last is held."""
+    """Positions from a file, interpolated linearly between its instants; the last is held."""
 
     def __init__(self, batch: RolloutBatch, *, recording: Recording) -> None:
         """Read what the rollouts need.
 
         Raises:
-            ControllerError: the file's columns are not the robot's joints, or it has too few rollouts.
+            ControllerError: The file's columns are not the robot's joints, or it has too few rollouts.
         """
         self._data = _rows(batch, recording, batch.plant.joints, "joints")
         self._times = recording.times_at(batch.plant.timestep)
@@ -91,7 +91,7 @@ class ReplayedPositions:
         return self.reference(first, count)[0]
 
     def reference(self, first: int, count: int) -> tuple[Array, Array]:
-        """Return the setpoints, and their rates: those of the straight line that begins there."""
+        """Return the setpoints, and the rates of the straight lines that start there."""
         last = len(self._times) - 1
         times = np.arange(first, first + count) * self._timestep
         before = np.minimum(np.searchsorted(self._times, times, side="right") - 1, last)
@@ -104,7 +104,7 @@ class ReplayedPositions:
 
 
 def _rows(batch: RolloutBatch, recording: Recording, names: tuple[str, ...], what: str) -> Array:
-    """Return the numbers of a group of rollouts in the order of ``names``, shape (batch or 1, K, names)."""
+    """Return the numbers of a batch in the order of ``names``, shape (batch or 1, K, names)."""
     columns = recording.columns(names, what, joints=batch.plant.joints)
     if recording.rollouts is None:
         return recording.read(range(1))[:, :, columns]
@@ -112,18 +112,18 @@ def _rows(batch: RolloutBatch, recording: Recording, names: tuple[str, ...], wha
         raise ControllerError(
             f"{recording.file} has {recording.rollouts} rollouts, 0 to {recording.rollouts - 1}; "
             f"rollout {batch.rollouts.stop - 1} of this run has none to replay. "
-            "Ask for fewer rollouts, or let all replay one with rollout=NUMBER"
+            "Simulate fewer rollouts, or let all replay one with rollout=NUMBER"
         )
     data = recording.read(batch.rollouts)[:, :, columns]
     stopped = [i for i, rows in zip(batch.rollouts, data, strict=True) if not np.isfinite(rows).all()]
     if stopped:
         raise ControllerError(
-            f"{recording.file} does not hold all of rollouts {listed(map(str, stopped))}: "
+            f"{recording.file} does not contain all of rollouts {listed(map(str, stopped))}: "
             "they stopped early, or the run is not finished"
         )
     return data
 
 
 def _for_all(rows: Array, batch: int) -> Array:
-    """Return rows that may be one for all rollouts as rows for each."""
+    """Repeat rows that are one for all rollouts."""
     return rows if rows.shape[0] == batch else np.repeat(rows, batch, axis=0)

@@ -1,13 +1,4 @@
-"""Motors that do what the robot's dynamics ask for.
-
-Gains that time steps are short enough for.
-
-No actuation at all.
-
-Motors that balance gravity.
-
-Motors as springs and dampers towards a reference.
-"""
+"""Controllers of torques and forces: none, gravity compensation, PD and computed torque."""
 
 from __future__ import annotations
 
@@ -23,17 +14,17 @@ from dh2sim.simulate.controllers.trajectories import Amplitude, Period, SmoothRe
 from dh2sim.simulate.plant import Plant
 from dh2sim.typing import Array
 
-MOST: Final = 0.4
-"""Share of its velocity that damping may take from a joint in one time step; from 2 on the arm would tremble."""
+MOST_DAMPED: Final = 0.4
+"""Largest share of its velocity that damping takes from a joint in a time step; from 2 on the arm would oscillate."""
 
 
 def steady_gains(plant: Plant) -> tuple[Array, Array]:
-    """Return the robot's stiffness and damping, softened as much as a torque that is held for a time step requires.
+    """Return the robot's stiffness and damping, reduced as far as a torque that is held for a time step requires.
 
-    A position actuator's own damping is integrated implicitly, and may be as strong as one likes; that of a
-    controller is not. With inertia M, damping D and time step h the velocities of the next step are (1 - h M⁻¹ D)
-    times the present ones, so h times the largest eigenvalue of M⁻¹ D is kept below ``MOST``, at home. Stiffness goes
-    with the square, which keeps the damping ratio.
+    A position actuator's own damping is integrated implicitly, and may be arbitrarily strong; that of a controller is
+    not. With inertia M, damping D and time step h the velocities of the next step are (1 - h M⁻¹ D) times the current
+    ones, so h times the largest eigenvalue of M⁻¹ D is kept below ``MOST_DAMPED``, at home. Stiffness is reduced
+    by the square, which keeps the damping ratio.
 
     Returns:
         Stiffness, N·m/rad or N/m, and damping, N·m·s/rad or N·s/m, each of shape (n,).
@@ -50,18 +41,18 @@ def steady_gains(plant: Plant) -> tuple[Array, Array]:
     root = np.sqrt(plant.kv)
     quickness = root[:, None] * np.linalg.inv(inertia)[joints, joints] * root
     taken = plant.timestep * float(np.linalg.eigvalsh(quickness)[-1])
-    share = min(1.0, MOST / taken) if taken > 0.0 else 1.0
+    share = min(1.0, MOST_DAMPED / taken) if taken > 0.0 else 1.0
     share = float(f"{share:.3g}")  # the last bits of an eigenvalue are not the same on every machine
     return plant.kp * share * share, plant.kv * share
 
 
 class Passive:
-    """No actuators: the robot moves as gravity, friction and its start make it."""
+    """No actuators: the robot moves by gravity, friction and its initial state alone."""
 
     actuation = ActuatorType.NONE
 
     def __init__(self, batch: RolloutBatch) -> None:
-        """Note how many rollouts there are."""
+        """Prepare empty controls."""
         self._controls = np.zeros((len(batch.rollouts), 1, 0))
 
     def controls(self, first: int, count: int) -> Array:  # noqa: ARG002 - the same at every step
@@ -70,16 +61,16 @@ class Passive:
 
 
 class GravityCompensation:
-    """Motors balance gravity, so that the robot floats where it is put."""
+    """Motors balance gravity, so that the robot stays where it is put."""
 
     actuation = ActuatorType.MOTOR
 
     def __init__(self, batch: RolloutBatch, *, damping: Annotated[float, Within(at_least=0.0)] = 0.0) -> None:  # noqa: ARG002
-        """Keep the damping.
+        """Set the damping.
 
         Args:
-            batch: the rollouts.
-            damping: torque against motion per velocity, N·m·s/rad or N·s/m.
+            batch: The rollouts.
+            damping: Torque against motion per velocity, N·m·s/rad or N·s/m.
         """
         self._damping = damping
 
@@ -91,7 +82,7 @@ class GravityCompensation:
 
 
 class PD:
-    """Motors pull as springs and dampers towards smooth random references, gravity balanced."""
+    """Motors act as springs and dampers towards smooth random references, with gravity balanced."""
 
     actuation = ActuatorType.MOTOR
 
@@ -108,13 +99,12 @@ class PD:
         """Draw the references.
 
         Args:
-            batch: the rollouts.
-            kp: stiffness of every joint, N·m/rad or N/m; None: the robot's own, softened as
-                the time step requires.
-            kd: damping of every joint, N·m·s/rad or N·s/m; None: likewise.
-            gravity: whether gravity is balanced.
-            period: duration of a motion between waypoints, s.
-            amplitude: share of the joints' range that the waypoints are in.
+            batch: The rollouts.
+            kp: Stiffness of every joint, N·m/rad or N/m; None: the robot's own, reduced as the time step requires.
+            kd: Damping of every joint, N·m·s/rad or N·s/m; None: likewise.
+            gravity: Whether gravity is balanced.
+            period: Duration of a motion between waypoints, s.
+            amplitude: Share of the joints' range that the waypoints are in.
         """
         own_kp, own_kd = steady_gains(batch.plant)
         self._kp = own_kp if kp is None else np.full(batch.plant.n, kp)
@@ -135,7 +125,7 @@ class PD:
 
 
 class ComputedTorque:
-    """Motors make the torques that the dynamics ask for to follow smooth random references.
+    """Motors apply the torques that follow smooth random references according to the robot's dynamics.
 
     tau = M(q) (a_ref + kd (v_ref - v) + kp (q_ref - q)) + c(q, v) + g(q) - passive forces, which leaves the error
     e'' + kd e' + kp e = 0; kp = bandwidth², kd = 2 bandwidth damp it critically. Source: M. Spong, S. Hutchinson,
@@ -155,10 +145,10 @@ class ComputedTorque:
         """Draw the references.
 
         Args:
-            batch: the rollouts.
-            bandwidth: how fast errors vanish, rad/s.
-            period: duration of a motion between waypoints, s.
-            amplitude: share of the joints' range that the waypoints are in.
+            batch: The rollouts.
+            bandwidth: How fast errors vanish, rad/s.
+            period: Duration of a motion between waypoints, s.
+            amplitude: Share of the joints' range that the waypoints are in.
         """
         self._kp, self._kd = bandwidth * bandwidth, 2.0 * bandwidth
         self._smooth = SmoothReference(batch, period=period, amplitude=amplitude)

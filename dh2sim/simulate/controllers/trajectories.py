@@ -1,8 +1,6 @@
-"""Smooth random references: what controllers with motors follow.
+"""Smooth random trajectories inside the limits, for many rollouts at once.
 
-Smooth curves for many rollouts at once, the same bits however the rollouts and the time steps are cut up.
-
-Ranges that setpoints and references are drawn from, inside the limits and near to where a rollout starts.
+They have the same bits however the rollouts and the time steps are divided.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ from dh2sim.typing import Array
 MINIMUM_JERK_PEAK: Final = 1.875
 """Greatest speed of a minimum-jerk motion, at its middle, over distance/duration: 30 · 1/4 · 1/4."""
 _CACHED: Final = 16384
-"""Numbers worked on at a time, of which three arrays stay in the cache."""
+"""Numbers processed at a time; three arrays of them fit into the cache."""
 
 
 def weighted_sum(weights: Array, values: Sequence[Array], out: Array | None = None) -> Array:
@@ -33,9 +31,9 @@ def weighted_sum(weights: Array, values: Sequence[Array], out: Array | None = No
     matrices, whose order of additions depends on sizes.
 
     Args:
-        weights: what varies with time, shape (terms, count).
-        values: what varies with rollout and joint, each of shape (batch, m); at least one.
-        out: where to put the result.
+        weights: What varies with time, shape (terms, count).
+        values: What varies with rollout and joint, each of shape (batch, m); at least one.
+        out: Where to put the result.
 
     Returns:
         Array of shape (batch, count, m).
@@ -65,7 +63,7 @@ def minimum_jerk(s: Array) -> tuple[Array, Array, Array]:
     coordination of arm movements, Journal of Neuroscience 5 (1985).
 
     Args:
-        s: time over duration, from 0 to 1.
+        s: Time over duration, from 0 to 1.
     """
     rest = 1.0 - s
     position = s * s * s * (10.0 + s * (6.0 * s - 15.0))
@@ -79,7 +77,7 @@ def cubic_spline_weights(u: Array) -> Array:
     C. de Boor, A Practical Guide to Splines (1978).
 
     Args:
-        u: place between the two middle points, from 0 to 1, shape (count,).
+        u: Position between the two middle points, from 0 to 1, shape (count,).
     """
     rest = 1.0 - u
     return np.stack(
@@ -93,17 +91,17 @@ def cubic_spline_weights(u: Array) -> Array:
 
 
 def pieces(first: int, count: int, timestep: float, duration: float, number: int) -> tuple[Array, Array]:
-    """Return in which of ``number`` pieces of equal duration time steps lie, and where in it.
+    """Return in which of ``number`` pieces of equal duration time steps are, and where in it.
 
     Args:
-        first: first time step.
-        count: how many.
+        first: First time step.
+        count: Number of time steps.
         timestep: s.
-        duration: of a piece, s.
-        number: pieces; what comes later is at the end of the last.
+        duration: Duration of a piece, s.
+        number: Number of pieces; later time steps are at the end of the last.
 
     Returns:
-        The pieces, whole numbers from 0, shape (count,); and the time since a piece's beginning as a share of its
+        The pieces, whole numbers from 0, shape (count,); and the time since the start of the piece as a share of its
         duration, from 0 to 1.
     """
     place = np.arange(first, first + count) * timestep / duration
@@ -118,7 +116,7 @@ def runs_of(piece: Array) -> list[tuple[int, slice]]:
 
 
 INSIDE: Final = 1.0 - 1e-9
-"""Share of what limits allow that is used, so that rounding never leads out of them."""
+"""Share of the limits that is used, so that rounding never exceeds them."""
 
 
 def half_ranges(lower: Array, upper: Array, free: Array) -> Array:
@@ -131,10 +129,10 @@ def centers(start: Array, reach: Array, lower: Array, upper: Array) -> Array:
     """Return the points nearest to ``start`` from which ``reach`` on either side is inside the limits.
 
     Args:
-        start: shape (batch, m).
-        reach: at most half of the ranges, shape (m,) or (batch, m).
-        lower: shape (m,); -inf where unlimited.
-        upper: shape (m,); inf where unlimited.
+        start: Shape (batch, m).
+        reach: At most half of the ranges, shape (m,) or (batch, m).
+        lower: Shape (m,); -inf where unlimited.
+        upper: Shape (m,); inf where unlimited.
 
     Returns:
         Array of shape (batch, m).
@@ -143,12 +141,12 @@ def centers(start: Array, reach: Array, lower: Array, upper: Array) -> Array:
 
 
 def follow(start: Array, targets: Iterable[Array], most: Array) -> Array:
-    """Return points that go from ``start`` towards each target in turn, by ``most`` at the most.
+    """Return points that go from ``start`` towards each target in turn, each at most ``most`` from the last.
 
     Args:
-        start: shape (batch, m).
-        targets: each of shape (batch, m).
-        most: greatest distance between neighbouring points, shape (m,).
+        start: Shape (batch, m).
+        targets: Each of shape (batch, m).
+        most: Greatest distance between neighbouring points, shape (m,).
 
     Returns:
         The start and the points, shape (1 + targets, batch, m).
@@ -160,13 +158,13 @@ def follow(start: Array, targets: Iterable[Array], most: Array) -> Array:
 
 
 def uniform(generators: Sequence[np.random.Generator], a: int, m: int) -> Array:
-    """Draw numbers from -1 to 1, an array of (a, m) for every rollout; returned as shape (a, batch, m)."""
+    """Draw numbers from -1 to 1, shape (a, m) for every rollout; returned with shape (a, batch, m)."""
     drawn = [generator.uniform(-1.0, 1.0, size=(a, m)) for generator in generators]
     return np.ascontiguousarray(np.moveaxis(np.stack(drawn), 0, -2))
 
 
 def widened(batch: RolloutBatch) -> tuple[Array, Array]:
-    """Return the joints' limits, and where a rollout starts outside of them its start, each of shape (batch, n)."""
+    """Return the joints' limits, extended to the start of a rollout outside of them, each of shape (batch, n)."""
     return np.minimum(batch.plant.lower, batch.q0), np.maximum(batch.plant.upper, batch.q0)
 
 
@@ -175,10 +173,10 @@ Period: TypeAlias = Annotated[float, Within(above=0.0, unit="s")]
 Amplitude: TypeAlias = Annotated[float, Within(at_least=0.0, at_most=1.0)]
 """Share of the joint's range."""
 
-_FEWEST: Final = 10
-"""Time steps of a motion between waypoints."""
+_FEWEST_STEPS: Final = 10
+"""Fewest time steps of a motion between waypoints."""
 _AHEAD: Final = 64
-"""Time steps that are computed together when they are asked for one by one."""
+"""Time steps that are computed together when they are used one by one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -202,20 +200,20 @@ class SmoothReference:
         """Draw the waypoints.
 
         Args:
-            batch: the rollouts.
-            period: duration of a motion from waypoint to waypoint, s.
-            amplitude: width of the window as a share of the joint's range, 0 to 1; of joints without limits, as a
+            batch: The rollouts.
+            period: Duration of a motion from waypoint to waypoint, s.
+            amplitude: Width of the window as a share of the joint's range, 0 to 1; for joints without limits, as a
                 share of 2 pi rad or 2 m.
 
         Raises:
-            ControllerError: a motion would be shorter than ten time steps.
+            ControllerError: A motion would be shorter than ten time steps.
         """
         plant = batch.plant
         self._timestep = plant.timestep
-        if period < _FEWEST * plant.timestep:
+        if period < _FEWEST_STEPS * plant.timestep:
+            least = _FEWEST_STEPS * plant.timestep
             raise ControllerError(
-                f"option 'period' is {period} s; a motion needs at least {_FEWEST} time steps, "
-                f"{_FEWEST * plant.timestep:g} s"
+                f"option 'period' must be at least {_FEWEST_STEPS} time steps, {least:g} s, got {period:g} s"
             )
         self._period = period
         self._motions = math.floor(batch.steps * plant.timestep / period) + 1
@@ -223,7 +221,7 @@ class SmoothReference:
         reach = INSIDE * amplitude * half_ranges(plant.lower, plant.upper, plant.free_half_ranges)
         center = centers(batch.q0, reach, plant.lower, plant.upper)
         targets = center + reach * uniform(batch.generators, self._motions, plant.n)
-        # nobody is quicker than the velocity limit, even where a start outside the limits makes the way longer
+        # no joint exceeds its velocity limit, even where a start outside the limits makes the way longer
         most = INSIDE * plant.velocity * period / MINIMUM_JERK_PEAK
         self._waypoints = follow(batch.q0, targets, most)
         self._ahead = Motion(q=np.empty((0, 0, 0)), v=np.empty((0, 0, 0)), a=np.empty((0, 0, 0)))

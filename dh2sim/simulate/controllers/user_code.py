@@ -1,7 +1,4 @@
-"""Controllers that are not dh2sim's own: of installed packages, and of a module of the user's.
-
-Failures of code that is not dh2sim's own, told by their text and place, without a traceback.
-"""
+"""Controllers of installed packages and of users' modules; their failures become errors that name the line."""
 
 from __future__ import annotations
 
@@ -35,10 +32,10 @@ def user_code(name: str) -> Iterator[None]:
     """Turn what a user's code raises into an error that says what was raised and where.
 
     Args:
-        name: of the controller, as typed.
+        name: Name of the controller, as typed.
 
     Raises:
-        ControllerError: the code raised an exception that is not dh2sim's.
+        ControllerError: The code raised an exception other than dh2sim's.
     """
     try:
         yield
@@ -49,7 +46,7 @@ def user_code(name: str) -> Iterator[None]:
 
 
 def guard_methods(name: str, controller: Controller) -> Controller:
-    """Return a controller that does the same, whose failures are told by ``user_code``."""
+    """Return a controller whose methods do the same, with their failures reported by ``user_code``."""
     methods = {}
     for method in _METHODS:
         if callable(getattr(controller, method, None)):
@@ -58,7 +55,7 @@ def guard_methods(name: str, controller: Controller) -> Controller:
 
 
 def shown_path(path: str | os.PathLike[str]) -> str:
-    """Return how a message names a file: from the current directory on if it is below that."""
+    """Return how a message names a file: relative to the current directory if it is inside it."""
     absolute = Path(path).absolute()
     return str(absolute.relative_to(Path.cwd()) if absolute.is_relative_to(Path.cwd()) else absolute)
 
@@ -78,7 +75,7 @@ def _what(error: BaseException) -> str:
 
 
 def _where(error: BaseException) -> str:
-    """Name the deepest line of the traceback in a file of the user's, or of the library that is not dh2sim's own."""
+    """Return the deepest line of the traceback in a file of the user, or else of the library outside dh2sim."""
     if isinstance(error, SyntaxError) and error.filename is not None:
         return f" ({shown_path(error.filename)}, line {error.lineno})"
     frames = [f for f in traceback.extract_tb(error.__traceback__) if not _of_python_or_dh2sim(f.filename)]
@@ -114,18 +111,18 @@ def load_plugin(name: str, entries: tuple[EntryPoint, ...]) -> type:
     """Return the controller class that an installed package offers under a name.
 
     Raises:
-        ControllerError: more than one package offers it, or it cannot be imported, or is no class.
+        ControllerError: More than one package offers it, or it cannot be imported, or is not a class.
     """
     if len(entries) > 1:
-        ways = listed((f"'{entry.value}'" for entry in entries), " or ")
-        raise ControllerError(f"controller '{name}': more than one installed package has it; choose {ways}")
+        choices = listed((f"'{entry.value}'" for entry in entries), " or ")
+        raise ControllerError(f"controller '{name}': more than one installed package has it; choose {choices}")
     with user_code(name):
         found = entries[0].load()
     return _class(name, found, f"'{entries[0].value}'")
 
 
 def module_and_class(text: str) -> tuple[str, str, str] | None:
-    """Take ``module:Class`` or ``module:Class:options`` apart; None if the text is neither."""
+    """Split ``module:Class`` or ``module:Class:options``; None if the text is neither."""
     module, _, rest = text.partition(":")
     name, _, options = rest.partition(":")
     if _MODULE.fullmatch(module.strip()) and _CLASS.fullmatch(name.strip()):
@@ -134,13 +131,13 @@ def module_and_class(text: str) -> tuple[str, str, str] | None:
 
 
 def load_class(module_name: str, class_name: str) -> type | None:
-    """Import a controller class; the current directory is looked in first.
+    """Import a controller class, searching the current directory first.
 
     Returns:
-        The class, or None if there is no such module.
+        The class, or None if the module is not found.
 
     Raises:
-        ControllerError: the module cannot be imported, or has no such class.
+        ControllerError: The module cannot be imported, or does not have the class.
     """
     name = f"{module_name}:{class_name}"
     with user_code(name), _from_here():
@@ -163,16 +160,16 @@ def load_class(module_name: str, class_name: str) -> type | None:
 
 
 def source_digest(found: type) -> str:
-    """Return the SHA-256 of the file that a class is written in.
+    """Return the SHA-256 of the file that defines a class.
 
-    If its bases are in other files, of the SHA-256 of all of them; dh2sim's own and Python's are left out.
+    If its bases are in other files, that of the SHA-256 of all of them; those of dh2sim and Python are left out.
     """
     sources = set()
     for base in found.__mro__:
         if base.__module__.split(".")[0] not in ("dh2sim", "builtins", "typing", "abc"):
             try:
                 sources.add(inspect.getsourcefile(base))
-            except TypeError:  # made in an interactive session
+            except TypeError:  # defined in an interactive session
                 continue
     digests = [hashlib.sha256(Path(source).read_bytes()) for source in sorted(filter(None, sources))]
     if len(digests) < 2:
@@ -192,7 +189,7 @@ def _is_candidate(value: object, module_name: str) -> bool:
 
 @contextmanager
 def _from_here() -> Iterator[None]:
-    """Look for modules in the current directory: first while the context lasts, last from then on.
+    """Search the current directory for modules: first while the context lasts, and last afterwards.
 
     Last, so that code which imports something later finds it, and no file there hides an installed library.
     """

@@ -148,7 +148,7 @@ def test_a_range_may_be_pydantics_own() -> None:
         read_options("swing", options, "gain=2")
 
 
-@pytest.mark.parametrize("kind", [dict, bytes, object, float | int, Literal[1, 2], complex])
+@pytest.mark.parametrize("kind", [dict, bytes, object, float | int, Literal[1, 2]])
 def test_types_that_are_not_simple_are_refused(kind: Any) -> None:
     def bad(batch: object, *, gains: Any = 1) -> None: ...
 

@@ -98,6 +98,6 @@ def test_one_time_step_at_a_time_gives_the_same_bits() -> None:
 
 @pytest.mark.parametrize("name", ["pd", "computed-torque"])
 def test_a_motion_that_time_steps_cannot_show_is_refused(name: str) -> None:
-    message = f"controller '{name}': option 'period' is 0.01 s; a motion needs at least 10 time steps, 0.02 s"
+    message = f"controller '{name}': option 'period' must be at least 10 time steps, 0.02 s, got 0.01 s"
     with pytest.raises(ControllerError, match=f"^{re.escape(message)}$"):
         make(f"{name}:period=0.01", arm())

@@ -23,7 +23,7 @@ def refused(text: str) -> str:
 def test_every_controller_is_listed_with_a_line_of_help() -> None:
     listed = controllers()
     assert list(listed)[: len(NAMES)] == NAMES
-    assert listed["hold"] == "Position actuators hold the start, asked for as much more as balances gravity there"
+    assert listed["hold"] == "Position actuators hold the start, with setpoints that balance gravity there"
     for name in NAMES:
         assert listed[name]
         assert not listed[name].endswith(".")

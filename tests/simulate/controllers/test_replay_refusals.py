@@ -25,7 +25,7 @@ def refused(text: str, rollouts: range = range(7)) -> str:
         ("", "needs a first line that names joints, such as joint_1, or actuators, such as joint_1_motor"),
         ("time\n0\n", "needs a first line that names joints, such as joint_1, or actuators, such as joint_1_motor"),
         ("joint_1,joint_1\n0,0\n", "has more than one column 'joint_1'"),
-        ("joint_1\n", "cannot be used:\n  it has no values below the first line"),
+        ("joint_1\n", "cannot be used:\n  there are no values below the first line"),
         (
             "joint_1,joint_2,joint_3\n0,1\n0,x,1\n0,0,inf\n",
             "cannot be used:\n  line 2 has 2 values; the first line names 3 columns\n"
@@ -38,22 +38,22 @@ def refused(text: str, rollouts: range = range(7)) -> str:
             + "".join(f"  line {i}, column 'joint_1': 'x' is not a finite number\n" for i in range(2, 7))
             + "  and 4 more",
         ),
-        ("time,joint_1\n5,0\n", ": time begins at 5.0; it counts seconds from the start, so the first is 0"),
-        ("time,joint_1\n0,0\n1,0\n1,0\n", ": time must grow from row to row; 1.0 comes after 1.0"),
+        ("time,joint_1\n5,0\n", ": time must start at 0, the start of the rollout, got 5.0"),
+        ("time,joint_1\n0,0\n1,0\n1,0\n", ": time must increase from row to row; 1.0 comes after 1.0"),
         (
             "joint_1,joint_2_motor\n0,0\n",
             ": columns 'joint_1' are not named after actuators, as joint_1_motor is, but 'joint_2_motor' are. "
-            "A file holds controls alone, or with as=reference positions of joints alone",
+            "A file contains either controls, or with as=reference positions of joints",
         ),
         (
             "joint_1,joint_2,joint_5\n0,0,0\n",
             " does not fit the robot, whose joints are joint_1, joint_2, joint_3:\n"
-            "  it has no column 'joint_3'\n  column 'joint_5' is none of them; did you mean 'joint_3'?",
+            "  missing column 'joint_3'\n  unknown column 'joint_5'; did you mean 'joint_3'?",
         ),
         (
             "joint_1_motor,joint_3_motor\n0,0\n",
             " does not fit the robot, whose actuators are joint_1_motor, joint_2_motor, joint_3_motor:\n"
-            "  it has no column 'joint_2_motor'",
+            "  missing column 'joint_2_motor'",
         ),
     ],
 )
@@ -71,7 +71,7 @@ def test_joints_are_not_taken_for_controls(tmp_path: Path, monkeypatch: pytest.M
     table(Path("table.csv"), JOINTS, [[0, 0, 0]])
     assert refused("replay:file=table.csv,as=ctrl") == (
         "controller 'replay': 'table.csv': columns 'joint_1', 'joint_2', 'joint_3' are not named after actuators, as "
-        "joint_1_motor is. A file holds controls alone, or with as=reference positions of joints alone"
+        "joint_1_motor is. A file contains either controls, or with as=reference positions of joints"
     )
 
 
@@ -90,9 +90,9 @@ def test_a_file_that_is_not_there_or_of_no_known_kind_is_refused(
     monkeypatch.chdir(tmp_path)
     Path("a.txt").write_text("1", encoding="utf-8")
     Path("folder").mkdir()
-    assert refused("replay:file=b.csv") == "controller 'replay': there is no file 'b.csv'"
+    assert refused("replay:file=b.csv") == "controller 'replay': no such file 'b.csv'"
     assert refused("replay:file=a.txt") == (
-        "controller 'replay': 'a.txt' cannot be replayed; what can is a .csv file, a .npy file or a run of dh2sim"
+        "controller 'replay': 'a.txt' cannot be replayed; it must be a .csv file, a .npy file or a run of dh2sim"
     )
     assert refused("replay:file=~nobody_of_this_name/b.csv") == (
         "controller 'replay': cannot read '~nobody_of_this_name/b.csv': Could not determine home directory."
@@ -112,14 +112,14 @@ def test_a_file_that_is_not_there_or_of_no_known_kind_is_refused(
         (
             np.zeros(3),
             ",as=ctrl",
-            " holds float64 of shape (3,); it must hold real numbers of shape (time steps, columns) or "
-            "(rollouts, time steps, columns)",
+            " must contain real numbers of shape (time steps, columns) or (rollouts, time steps, columns), "
+            "got float64 of shape (3,)",
         ),
         (
             np.zeros((4, 3), dtype=complex),
             ",as=ctrl",
-            " holds complex128 of shape (4, 3); it must hold real numbers of shape (time steps, columns) or "
-            "(rollouts, time steps, columns)",
+            " must contain real numbers of shape (time steps, columns) or (rollouts, time steps, columns), "
+            "got complex128 of shape (4, 3)",
         ),
         (np.full((4, 3), np.nan), ",as=ctrl", ": time step 0, column 0: nan is not a finite number"),
         (
@@ -136,11 +136,11 @@ def test_a_file_that_is_not_there_or_of_no_known_kind_is_refused(
         (
             np.zeros((5, 4, 3)),
             ",as=ctrl",
-            " has 5 rollouts, 0 to 4; rollout 6 of this run has none to replay. Ask for fewer rollouts, or let all "
+            " has 5 rollouts, 0 to 4; rollout 6 of this run has none to replay. Simulate fewer rollouts, or let all "
             "replay one with rollout=NUMBER",
         ),
-        (np.zeros((5, 4, 3)), ",as=ctrl,rollout=5", " has rollouts 0 to 4; there is no rollout 5"),
-        (np.zeros((4, 3)), ",as=ctrl,rollout=1", " has one rollout, 0; there is no rollout 1"),
+        (np.zeros((5, 4, 3)), ",as=ctrl,rollout=5", " has rollouts 0 to 4; rollout must be one of them, got 5"),
+        (np.zeros((4, 3)), ",as=ctrl,rollout=1", " has one rollout, 0; rollout must be one of them, got 1"),
     ],
 )
 def test_a_numpy_file_that_cannot_be_replayed_is_refused(
@@ -172,7 +172,7 @@ def test_a_run_without_controls_is_refused(tmp_path: Path, monkeypatch: pytest.M
         "b.zarr", zarr_format=3, consolidated=False
     )
     assert refused("replay:file=b.zarr") == (
-        "controller 'replay': 'b.zarr' has recorded no controls; run it again with ctrl in --record"
+        "controller 'replay': 'b.zarr' has recorded no controls; run it again with 'ctrl' in record"
     )
 
 
@@ -184,10 +184,11 @@ def test_a_rollout_that_stopped_early_is_refused(tmp_path: Path, monkeypatch: py
     whole.assign(ctrl=ctrl).to_zarr("run.zarr", zarr_format=3, consolidated=False)
     why = "they stopped early, or the run is not finished"
     assert refused("replay:file=run.zarr") == (
-        f"controller 'replay': 'run.zarr' does not hold all of rollouts 1, 4: {why}"
+        f"controller 'replay': 'run.zarr' does not contain all of rollouts 1, 4: {why}"
     )
     assert refused("replay:file=run.zarr,rollout=4") == (
-        "controller 'replay': 'run.zarr' does not hold all of rollout 4: it stopped early, or the run is not finished"
+        "controller 'replay': 'run.zarr' does not contain all of rollout 4: it stopped early, or the run is not "
+        "finished"
     )
     controller, _ = make("replay:file=run.zarr", arm(), range(2, 4))
     assert isinstance(controller, OpenLoop)

@@ -101,8 +101,8 @@ def test_amplitudes_of_sines_add_up_to_the_share_that_is_asked_for() -> None:
 
 def test_a_frequency_that_time_steps_cannot_show_is_refused() -> None:
     message = (
-        "controller 'sine': the highest frequency, harmonics x frequency = 300 Hz, is above half the rate of the "
-        "time steps, 250 Hz"
+        "controller 'sine': the highest frequency, harmonics x frequency, must be at most half the rate of the "
+        "time steps, 250 Hz, got 300 Hz"
     )
     with pytest.raises(ControllerError, match=f"^{re.escape(message)}$"):
         make("sine:frequency=60", arm())
@@ -151,6 +151,6 @@ def test_noise_for_a_robot_without_actuators_is_nothing() -> None:
 
 
 def test_noise_of_more_points_than_time_steps_is_refused() -> None:
-    message = "controller 'random': option 'rate' is 501 Hz, above that of the time steps, 500 Hz"
+    message = "controller 'random': option 'rate' must be at most that of the time steps, 500 Hz, got 501 Hz"
     with pytest.raises(ControllerError, match=f"^{re.escape(message)}$"):
         make("random:rate=501", arm())
