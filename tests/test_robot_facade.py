@@ -142,7 +142,7 @@ def test_a_saved_robot_is_loaded_as_the_same(arm: Robot, tmp_path: Path) -> None
 
 def test_a_conversion_keeps_its_notes(tmp_path: Path) -> None:
     robot = Robot.load("stanford").convert("modified")
-    assert robot.notes[-1] == "Parameters are written as the numbers that they gave."
+    assert robot.notes[-1] == "Parameters are replaced by their values."
     robot.save(tmp_path / "stanford.yaml")
     assert robot.notes[-1] in (tmp_path / "stanford.yaml").read_text(encoding="utf-8")
 

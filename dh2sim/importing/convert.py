@@ -40,7 +40,7 @@ class Converted:
 
     @property
     def summary(self) -> str:
-        """What to tell of it, in one line."""
+        """Name, rows, conventions and errors, in one line."""
         conventions = " and ".join(dict.fromkeys(row.convention.value for row in self.spec.rows))
         rows = f"{len(self.spec.rows)} {'row' if len(self.spec.rows) == 1 else 'rows'}"
         return (
@@ -55,7 +55,7 @@ def convert_robot(spec: SpecLike, to: Convention, *, folder: Path | None = None)
     Args:
         spec: The robot, in any form.
         to: Standard or modified.
-        folder: Where the robot file will stand, which paths of meshes are relative to.
+        folder: Of the robot file, to which paths of meshes are relative.
 
     Raises:
         MismatchError: The poses differ by more than rounding.
@@ -64,7 +64,7 @@ def convert_robot(spec: SpecLike, to: Convention, *, folder: Path | None = None)
     conversion = convert_rows(spec, to)
     notes = list(conversion.notes)
     if spec.parameters:
-        notes.append("Parameters are written as the numbers that they gave.")
+        notes.append("Parameters are replaced by their values.")
     text = robot_file_text(conversion.spec, header=[f"Note: {note}" for note in notes], folder=folder)
     read = parse_robot(text, file="the robot file", directory=folder)
     position, rotation = _errors(spec, read)

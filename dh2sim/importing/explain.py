@@ -1,13 +1,4 @@
-"""An assignment of frames, told step by step as a textbook tells it.
-
-A frame assignment in the words of a textbook.
-
-Numbers, points and directions in words.
-
-What was decided between a joint's axis and the next one, in words.
-
-The first and the last frame, and where sliding joints' axes were put, in words.
-"""
+"""An assignment of frames explained step by step, as in a textbook: axes, first frame, every link, last frame."""
 
 from __future__ import annotations
 
@@ -34,11 +25,11 @@ from dh2sim.robot.spec import Convention, Pose
 from dh2sim.typing import Array
 
 GLUE = "\N{NO-BREAK SPACE}"
-"""Stands for a space at which no line ends, such as those inside a point."""
+"""A space at which no line ends, such as those inside a point."""
 _LEAST = 1e-9
 """Of the reach: lengths below it are rounding."""
 _NEARLY = math.radians(0.5)
-"""Directions closer than this to an axis are told as that axis, and by how much they miss it."""
+"""Directions closer than this to an axis are named as that axis, with the angle between them."""
 
 
 def number(value: float) -> str:
@@ -99,7 +90,7 @@ def _listed(values: Iterable[str]) -> str:
 
 
 def link_words(placed: PlacedFrames, joint: int) -> str:
-    """Return how frame i came about: how the axes of joints i and i + 1 lie, and what was chosen.
+    """Explain frame i: how the axes of joints i and i + 1 lie, and what was chosen.
 
     Args:
         placed: The frames at joint coordinates zero.
@@ -136,7 +127,7 @@ def numbers(placed: PlacedFrames, joint: int) -> str:
 
 
 def beginning(placed: PlacedFrames, joint: int) -> str:
-    """Return what the point is called where the row of a joint begins, on the joint's own axis."""
+    """Return the name of the point at which the row of a joint begins, on the joint's own axis."""
     if joint == 1:
         leads = placed.assignment.base_rule is BaseRule.FIRST_LINK
         return f"where x0 meets z{placed.axis_index(1)}" if leads else "o0"
@@ -186,7 +177,7 @@ def _parallel(placed: PlacedFrames, joint: int, step: Step) -> str:
     how = "antiparallel" if step.antiparallel else "parallel"
     return (
         f"{z} and {following} are {how}, {number(step.distance)} apart, so that any common normal would do. "
-        f"{_x(placed, joint)} lies along the one {_free_foot(placed, joint, step)}. {_stand(placed, joint)}"
+        f"{_x(placed, joint)} lies along the one {_free_foot(placed, joint, step)}. {_end_of_normal(placed, joint)}"
     )
 
 
@@ -194,14 +185,14 @@ def _coincident(placed: PlacedFrames, joint: int, step: Step) -> str:
     z, following = _z(placed, joint)
     opposite = ", pointing opposite ways" if step.antiparallel else ""
     return (
-        f"{z} and {following} are one line{opposite}: frame {joint} may stand anywhere on it, turned any way about "
+        f"{z} and {following} are one line{opposite}: frame {joint} may be anywhere on it, turned any way about "
         f"it. {_origin(placed, joint)} is {_free_foot(placed, joint, step)}; {_x(placed, joint)} stays as "
         f"x{joint - 1} is, so that theta{joint} is zero."
     )
 
 
-def _stand(placed: PlacedFrames, joint: int) -> str:
-    """At which end of the common normal frame i stands."""
+def _end_of_normal(placed: PlacedFrames, joint: int) -> str:
+    """Return at which end of the common normal frame i is."""
     on = placed.following_index(joint) if joint <= placed.distal else placed.axis_index(joint)
     return f"On z{on}: {_origin(placed, joint)}."
 
@@ -231,7 +222,7 @@ def _nearly_parallel(placed: PlacedFrames, joint: int, step: Step) -> str:
     return (
         f"{z} and {following} are nearly {'antiparallel' if step.antiparallel else 'parallel'}, {tilt:.3g} degrees "
         f"apart. {why} So row {joint} is Hayati's: {leads}; alpha and beta turn {z} onto {following}. "
-        f"{_stand(placed, joint)}"
+        f"{_end_of_normal(placed, joint)}"
     )
 
 
@@ -239,7 +230,7 @@ def _sense(joint: int, step: Step) -> str:
     match step.sense_rule:
         case SenseRule.LEAST_THETA:
             return ""
-        case SenseRule.FREE if step.case is Case.COINCIDENT:  # told already
+        case SenseRule.FREE if step.case is Case.COINCIDENT:  # explained already
             return ""
         case SenseRule.FREE:
             return f"x{joint} stays as x{joint - 1} is, so that theta{joint} is zero."
@@ -250,20 +241,20 @@ def _sense(joint: int, step: Step) -> str:
 
 
 def axes_words(placed: PlacedFrames) -> str:
-    """Return which way every joint's axis points; names are told where they say more than the number."""
+    """Explain which way every joint's axis points, with the joint's name unless it is the default."""
     parts = []
     for joint, row in enumerate(placed.spec.rows, start=1):
         name = "" if row.name == f"joint_{joint}" else row.name
         notes = ", ".join(filter(None, (name, "" if row.type.turns else "sliding")))
         i = placed.axis_index(joint)
-        shared = f"z{i - 1} and " if 0 < placed.distal == joint - 1 else ""  # the last distal frame stands on it too
+        shared = f"z{i - 1} and " if 0 < placed.distal == joint - 1 else ""  # the last distal frame is on it, too
         along = direction(placed.axis(joint).direction)
         parts.append(f"{shared}z{i} along {along}{f' ({notes})' if notes else ''}")
     return f"{', '.join(parts)}."
 
 
 def slide_words(placed: PlacedFrames) -> list[str]:
-    """Return a sentence for every sliding joint: where its axis was put, and why."""
+    """Explain for every sliding joint where its axis was put, and why."""
     sliding = [joint for joint, row in enumerate(placed.spec.rows, start=1) if not row.type.turns]
     return [_slide(placed, joint, slide.rule) for joint, slide in zip(sliding, placed.assignment.slides, strict=True)]
 
@@ -323,7 +314,7 @@ def _frame_0(placed: PlacedFrames) -> str:
 
 
 def tip_words(placed: PlacedFrames) -> str:
-    """Return how frame n came about, and what is left to the tool."""
+    """Explain frame n, and what is left to the tool."""
     left = pose(placed.spec.tool)
     tool = f"Left to tool: {left}." if left else "Nothing is left to tool."
     return f"{_last_frame(placed, 'all but tool0' if left else 'tool0')} {tool}"
@@ -336,17 +327,17 @@ def _last_frame(placed: PlacedFrames, tip: str) -> str:
         case TipRule.TIP:
             a, alpha, _ = placed.link(n)
             if a == 0.0 and alpha == 0.0:
-                return f"tool0 stands on {z}, turned about it: frame {n} is {tip}."
+                return f"tool0 is on {z}, turned about it: frame {n} is {tip}."
             return f"x of tool0 meets {z} at a right angle, as x{n} has to: frame {n} is {tip}."
         case TipRule.TIP_AXES:
             beside = "antiparallel" if placed.link(n)[1] != 0.0 else "parallel"
-            return f"tool0 stands beside {z}, its z {beside} to it: frame {n} has its axes, and its height on {z}."
+            return f"tool0 is beside {z}, its z {beside} to it: frame {n} has its axes, and its height on {z}."
         case TipRule.TIP_HEIGHT:
-            return f"tool0 stands on {z}, turned otherwise than about it: frame {n} has its origin, theta{n} is zero."
+            return f"tool0 is on {z}, and not just turned about it: frame {n} has its origin, theta{n} is zero."
         case TipRule.TOOL:
             gap = placed.T_base_tip[:3, 3] - placed.axis(n).foot_of(placed.T_base_tip[:3, 3])
             far = number(float(np.linalg.norm(gap)))
-            return f"tool0 stands {far} beside {z}, and no row leads there: frame {n} stays where row {n} begins."
+            return f"tool0 is {far} away from {z}, and no row leads there: frame {n} stays where row {n} begins."
 
 
 WIDTH = 98
@@ -355,11 +346,11 @@ _INDENT = 10
 
 
 def explanation(imported: Imported) -> tuple[str, ...]:
-    """Tell how the frames of a robot were assigned.
+    """Explain how the frames of a robot were assigned.
 
-    The rules are those of ``kinematics.assignment``, the words those of M. W. Spong, S. Hutchinson, M. Vidyasagar,
-    Robot Modeling and Control, 2006, section 3.2 (standard), and of J. J. Craig, Introduction to Robotics, 3rd ed.,
-    2005, section 3.4 (modified).
+    The rules are those of ``kinematics.frame_assignment``, the words those of M. W. Spong, S. Hutchinson,
+    M. Vidyasagar, Robot Modeling and Control, 2006, section 3.2 (standard), and of J. J. Craig, Introduction to
+    Robotics, 3rd ed., 2005, section 3.4 (modified).
 
     Args:
         imported: A robot made of a chain.
@@ -399,7 +390,7 @@ def _paragraphs(imported: Imported, placed: PlacedFrames) -> Iterator[tuple[str,
 def _opening(placed: PlacedFrames) -> str:
     return (
         f"{_convention(placed)} Points and directions are in base_link at joint coordinates zero, in m and degrees "
-        "to six digits. x(i) can point two ways; unless something else is said, the one with the smaller theta is "
+        "to six digits. x(i) can point two ways; unless stated otherwise, the one with the smaller theta is "
         "taken."
     )
 
@@ -411,7 +402,7 @@ def _convention(placed: PlacedFrames) -> str:
         return f"Frames of {name}, standard convention: {standard}."
     modified = (
         "z(i) is the axis of joint i, x(i) lies along the common normal from z(i) to z(i+1); "
-        "a(i) and alpha(i) stand in row i+1"
+        "a(i) and alpha(i) are in row i+1"
     )
     p = placed.distal
     if p == 0:

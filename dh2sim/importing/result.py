@@ -1,7 +1,4 @@
-"""Where an assignment's frames and axes stand, and what they are called.
-
-What came out of an import, whatever the format.
-"""
+"""The result of an import, whatever the format, and its assigned frames placed at a configuration."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ from dh2sim.typing import Array, read_only
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Imported:
-    """A robot file, and how it came about."""
+    """A robot file made from another source, and how it was made."""
 
     text: str = field(repr=False)
     """The robot file."""
@@ -95,7 +92,7 @@ class PlacedFrames:
         return np.asarray(math.cos(beta) * T[:3, 0] + math.sin(beta) * T[:3, 2])
 
     def foot(self, joint: int) -> Array:
-        """Return where x of a joint's link begins on the joint's own axis, in base_link, m, shape (3,)."""
+        """Return where x of a joint's link starts on the joint's own axis, in base_link, m, shape (3,)."""
         origin: Array = self.frames[joint][:3, 3]
         return self.axis(joint).foot_of(origin) if joint <= self.distal else origin
 
@@ -104,11 +101,11 @@ def placed_frames(imported: Imported, q: ArrayLike | None = None) -> PlacedFrame
     """Place the frames that an import assigned.
 
     Args:
-        imported: Made of a chain.
+        imported: An import with a chain: not of a table.
         q: Joint vector, rad and m, shape (n,); by default zero.
 
     Raises:
-        ValueError: The import was made of a table, to which no frames were assigned.
+        ValueError: The import was of a table, for which no frames were assigned.
     """
     if imported.assignment is None or imported.chain is None:
         raise ValueError("frames were not assigned: the source is a table")

@@ -1,11 +1,4 @@
-"""Serial robots of any format to robot files.
-
-Names of other formats as names that a robot file allows.
-
-What could make a table simpler.
-
-A chain's table and what hangs on its links, put together as a robot.
-"""
+"""Serial robots of any format to robot files: the table is recovered, all else carried over, the text compared."""
 
 from __future__ import annotations
 
@@ -44,7 +37,7 @@ _FALLBACK = "robot"
 
 
 def robot_name(name: str) -> str:
-    """Return a name that a robot file allows, as near to ``name`` as can be."""
+    """Return a name that a robot file allows, as close to ``name`` as possible."""
     return _legal(name) or _FALLBACK
 
 
@@ -52,7 +45,7 @@ def joint_names(names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
     """Return names that a robot file allows, all different, and a sentence for each that had to be changed.
 
     Args:
-        names: The joints' names, base first; an empty one stands for a joint without a name.
+        names: The joints' names, base first; empty for a joint without a name.
     """
     taken = {name for name in names if _fits(name)}
     used: set[str] = set()
@@ -63,7 +56,7 @@ def joint_names(names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
             stem = _legal(name) or f"joint_{i}"
             new = next(n for n in (stem, *(f"{stem}_{k}" for k in range(2, len(names) + 3))) if n not in taken | used)
             if name:
-                notes.append(f"Joint {shown(name)} is named {new} here: a robot file does not allow its name.")
+                notes.append(f"Joint {shown(name)} is named {new} here, as a robot file does not allow its name.")
         used.add(new)
         changed.append(new)
     return tuple(changed), notes
@@ -74,7 +67,7 @@ def _fits(name: str) -> bool:
 
 
 def _legal(name: str) -> str:
-    """Return the name with what is not allowed replaced; empty where nothing is left."""
+    """Return the name with forbidden characters replaced; empty if nothing is left."""
     cleaned = re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_-")
     if cleaned and not cleaned[0].isalpha():
         cleaned = f"n{cleaned}"
@@ -83,8 +76,8 @@ def _legal(name: str) -> str:
 
 
 _STEP = math.radians(15.0)
-_LOOKS_MEANT = 1e-5
-"""rad: 1.5708, 3.1416 and 0.7854 are nearer to what they stand for; calibrated angles seldom are."""
+_LOOKS_ROUNDED = 1e-5
+"""rad: 1.5708, 3.1416 and 0.7854 are closer than that to a multiple of 15 degrees; calibrated angles seldom are."""
 
 
 def simpler_with(spec: RobotSpec, tolerance: float) -> str | None:
@@ -94,7 +87,7 @@ def simpler_with(spec: RobotSpec, tolerance: float) -> str | None:
         spec: A table within the tolerance.
         tolerance: That it was made with.
     """
-    gaps = {where: gap for where, angle in _angles(spec) if tolerance < (gap := _gap(angle)) <= _LOOKS_MEANT}
+    gaps = {where: gap for where, angle in _angles(spec) if tolerance < (gap := _gap(angle)) <= _LOOKS_ROUNDED}
     if not gaps:
         return None
     where = max(gaps, key=gaps.__getitem__)
@@ -125,7 +118,7 @@ _ROUNDING = 1e-15
 def assemble(robot: SerialRobot, recovery: Recovery, *, name: str, joint_names: Sequence[str]) -> RobotSpec:
     """Return the robot with its table, limits, dynamics, actuators, masses and meshes.
 
-    What stands in a link's own frame in the file stands in DH frame i here.
+    What the file gives in a link's own frame is given in DH frame i here.
 
     Args:
         robot: As read from its file.
@@ -174,7 +167,7 @@ def _links(robot: SerialRobot, recovery: Recovery) -> list[LinkSpec]:
 
 
 def _limits(limits: Limits, row: Row, tolerances: Tolerances) -> Limits:
-    """Return limits that are as simple as the table: a file's 2.9670597 rad may have been meant for 170 degrees."""
+    """Return limits that are as simple as the table: a file's 2.9670597 rad may mean 170 degrees."""
     simple = simple_turn if row.type.turns else simple_length
     if limits.velocity is not None:
         limits = replace(limits, velocity=simple(limits.velocity, tolerances) or limits.velocity)
@@ -237,10 +230,10 @@ def import_serial(
         robot: As read from its file.
         convention: Of the table.
         tolerance: Greatest residual, rad, and m for a reach of up to 1 m, then of the reach.
-        folder: Where the robot file will stand, which paths of meshes are relative to.
+        folder: Of the robot file, to which paths of meshes are relative.
         name: Of the robot, instead of the file's.
-        header: Comment lines to begin the file with.
-        source: Where the numbers come from; by default the robot's description.
+        header: Comment lines for the top of the file.
+        source: Origin of the numbers; by default the robot's description.
         description: What the robot is.
 
     Raises:
@@ -280,7 +273,7 @@ def residual_text(residual: Residual) -> str:
 
 
 def residual_sentence(residual: Residual) -> str:
-    """Return what the robot file's source says of a residual."""
+    """Return the sentence on a residual in the robot file's source."""
     return (
         f"Made by dh2sim; at {residual.configurations} random configurations all joint axes and the tip differ from "
         f"the source's by at most {residual_text(residual)}."

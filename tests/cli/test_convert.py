@@ -14,7 +14,7 @@ def test_the_other_table_is_printed() -> None:
     spec = parse_robot(run.out)
     assert {row.convention.value for row in spec.rows} == {"modified"}
     assert run.err.splitlines() == [
-        "dh2sim: note: Parameters are written as the numbers that they gave.",
+        "dh2sim: note: Parameters are replaced by their values.",
         run.err.splitlines()[1],
     ]
     assert run.err.splitlines()[1].startswith("stanford, 6 rows, modified; tool0 off by at most ")

@@ -47,7 +47,7 @@ def test_the_summary_says_how_well_it_was_checked() -> None:
         f"stanford, 6 rows, modified; tool0 off by at most {made.position_error:.1e} m and "
         f"{made.rotation_error:.1e} rad at 1000 configurations"
     )
-    assert made.notes == ("Parameters are written as the numbers that they gave.",)
+    assert made.notes == ("Parameters are replaced by their values.",)
 
 
 def test_a_conversion_that_moves_the_tool_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -69,13 +69,13 @@ def told(imported: Imported) -> dict[str, str]:
         ),
         (
             (TURN, (0, 0, 0.2), UP),
-            "z0 and z1 are one line: frame 1 may stand anywhere on it, turned any way about it. o1 = (0, 0, 0.2) "
+            "z0 and z1 are one line: frame 1 may be anywhere on it, turned any way about it. o1 = (0, 0, 0.2) "
             "is at the height of joint 2, which d1 then holds; x1, +x, stays as x0 is, so that theta1 is zero. "
             "theta1 = 0, d1 = 0.2, a1 = 0, alpha1 = 0.",
         ),
         (
             (TURN, (0, 0, 0.2), DOWN),
-            "z0 and z1 are one line, pointing opposite ways: frame 1 may stand anywhere on it, turned any way "
+            "z0 and z1 are one line, pointing opposite ways: frame 1 may be anywhere on it, turned any way "
             "about it. o1 = (0, 0, 0.2) is at the height of joint 2, which d1 then holds; x1, +x, stays as x0 is, "
             "so that theta1 is zero. theta1 = 0, d1 = 0.2, a1 = 0, alpha1 = 180.",
         ),
@@ -212,7 +212,7 @@ def test_the_first_frame_is_told(first: Axis, second: Axis | None, convention: C
             (0, 0, 0.2),
             (0, 0, 30),
             STANDARD,
-            "tool0 stands on z0, turned about it: frame 1 is tool0. Nothing is left to tool. theta1 = 30, d1 = "
+            "tool0 is on z0, turned about it: frame 1 is tool0. Nothing is left to tool. theta1 = 30, d1 = "
             "0.2, a1 = 0, alpha1 = 0.",
         ),
         (
@@ -226,35 +226,35 @@ def test_the_first_frame_is_told(first: Axis, second: Axis | None, convention: C
             (0.1, 0, 0.2),
             (0, 0, 90),
             STANDARD,
-            "tool0 stands beside z0, its z parallel to it: frame 1 has its axes, and its height on z0. Left to "
+            "tool0 is beside z0, its z parallel to it: frame 1 has its axes, and its height on z0. Left to "
             "tool: xyz (0, -0.1, 0). theta1 = 90, d1 = 0.2, a1 = 0, alpha1 = 0.",
         ),
         (
             (0.1, 0, 0.2),
             (180, 0, 90),
             STANDARD,
-            "tool0 stands beside z0, its z antiparallel to it: frame 1 has its axes, and its height on z0. Left "
+            "tool0 is beside z0, its z antiparallel to it: frame 1 has its axes, and its height on z0. Left "
             "to tool: xyz (0, 0.1, 0). theta1 = 90, d1 = 0.2, a1 = 0, alpha1 = 180.",
         ),
         (
             (0, 0, 0.2),
             (0, 30, 0),
             STANDARD,
-            "tool0 stands on z0, turned otherwise than about it: frame 1 has its origin, theta1 is zero. Left to "
+            "tool0 is on z0, and not just turned about it: frame 1 has its origin, theta1 is zero. Left to "
             "tool: rpy (0, 30, 0). theta1 = 0, d1 = 0.2, a1 = 0, alpha1 = 0.",
         ),
         (
             (0.3, 0.4, 0.2),
             (0, 30, 0),
             STANDARD,
-            "tool0 stands 0.5 beside z0, and no row leads there: frame 1 stays where row 1 begins. Left to tool: "
+            "tool0 is 0.5 away from z0, and no row leads there: frame 1 stays where row 1 begins. Left to tool: "
             "xyz (0.3, 0.4, 0.2), rpy (0, 30, 0). theta1 = 0, d1 = 0, a1 = 0, alpha1 = 0.",
         ),
         (
             (0, 0, 0.2),
             (180, 0, 0),
             MODIFIED,
-            "tool0 stands on z1, turned otherwise than about it: frame 1 has its origin, theta1 is zero. Left to "
+            "tool0 is on z1, and not just turned about it: frame 1 has its origin, theta1 is zero. Left to "
             "tool: rpy (180, 0, 0). theta1 = 0, d1 = 0.2.",
         ),
     ],
@@ -320,9 +320,9 @@ def test_a_modified_table_with_a_hayati_row_tells_both_conventions() -> None:
     assert text[""] == (
         "Frames of sample. Row 1 ends with the link part, as Hayati's row 1 has to: z(i-1) is the axis of joint "
         "i, x(i) lies along the common normal from z(i-1) to z(i). The rows behind are modified ones: z(i) is the "
-        "axis of joint i, x(i) lies along the common normal from z(i) to z(i+1); a(i) and alpha(i) stand in row "
+        "axis of joint i, x(i) lies along the common normal from z(i) to z(i+1); a(i) and alpha(i) are in row "
         "i+1. Points and directions are in base_link at joint coordinates zero, in m and degrees to six digits. "
-        "x(i) can point two ways; unless something else is said, the one with the smaller theta is taken."
+        "x(i) can point two ways; unless stated otherwise, the one with the smaller theta is taken."
     )
     assert text["z axes"] == "z0 along +z, z1 and z2 along +z, z3 along +y."
     assert text["frame 2"] == (

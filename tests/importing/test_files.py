@@ -61,7 +61,7 @@ def test_a_urdf_becomes_a_robot_file_that_says_where_it_is_from() -> None:
         "dh2sim; at 1000 random configurations all joint axes and the tip differ from the source's by at most "
         f"{residual.position:.1e} m and {residual.rotation:.1e} rad."
     )
-    assert "Joint 'fore arm' is named fore_arm here: a robot file does not allow its name." in imported.notes
+    assert "Joint 'fore arm' is named fore_arm here, as a robot file does not allow its name." in imported.notes
     assert "# Note: Joint 'fore arm' is named fore_arm" in imported.text
 
 

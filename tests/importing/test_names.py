@@ -29,7 +29,7 @@ def test_a_name_that_is_not_allowed_is_changed_and_told(name: str, changed: str)
     names, notes = joint_names([name])
     assert names == (changed,)
     assert len(notes) == 1
-    assert notes[0].endswith(f"is named {changed} here: a robot file does not allow its name.")
+    assert notes[0].endswith(f"is named {changed} here, as a robot file does not allow its name.")
 
 
 def test_a_changed_name_is_not_one_that_is_taken() -> None:
