@@ -26,7 +26,7 @@ from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Dynamics
 
 
 class Format(StrEnum):
-    """What a robot can be exported as."""
+    """A format of an export."""
 
     URDF = "urdf"
     MJCF = "mjcf"
@@ -51,9 +51,7 @@ def render(model: RobotModel, formats: Collection[Format], *, dh_frames: bool = 
         files[f"{model.name}.urdf"] = to_urdf(model, dh_frames=dh_frames).encode()
     if Format.MJCF in formats:
         if model.name.lower() == "scene":
-            raise ModelError(
-                f"{model.name}: its MJCF and the scene around it would both be scene.xml; rename the robot"
-            )
+            raise ModelError(f"{model.name}: its MJCF and its scene would both be scene.xml; rename the robot")
         files[f"{model.name}.xml"] = to_mjcf(model).encode()
         files["scene.xml"] = to_scene(model).encode()
     for link in model.all_links:
@@ -79,7 +77,7 @@ class Lost(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loss:
-    """Something that the robot file says and an export leaves out."""
+    """Something in the robot file that an export leaves out."""
 
     what: Lost
     format: Format | None
@@ -111,7 +109,7 @@ class Loss:
 
 
 def losses(model: RobotModel, formats: Collection[Format]) -> list[Loss]:
-    """List what the robot file says and the formats cannot hold."""
+    """List what is in the robot file and the formats cannot hold."""
     found: list[Loss] = []
     if Format.URDF in formats:
         found += _lost_in_urdf(model)
@@ -231,7 +229,7 @@ class ExportReport:
     verified: tuple[Verified, ...]
     """Empty without verification."""
     losses: tuple[Loss, ...]
-    """What the robot file says and the formats cannot hold."""
+    """What is in the robot file and the formats cannot hold."""
     estimates: tuple[FilledIn, ...]
     """Masses and inertias that were estimated from the shapes."""
     assumptions: tuple[FilledIn, ...]

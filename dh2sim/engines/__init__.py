@@ -1,1 +1,1 @@
-"""How each engine reads the files that were written: poses, Jacobians and dynamics, straight from a file on disk."""
+"""Engines that read exported files: poses, Jacobians and dynamics, straight from a file on disk."""

@@ -1,4 +1,4 @@
-"""What is asked of an engine."""
+"""Protocols of the engines: poses of frames, Jacobians and dynamics read from a model file."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ class DynamicTerms:
 
 
 class PoseEngine(Protocol):
-    """Reads a model file and tells where its frames are."""
+    """Reads a model file and computes the poses of its frames."""
 
     name: str
     """Such as ``mujoco-mjcf``."""
     frames: tuple[str, ...]
-    """The frames that the file has, of those asked for."""
+    """The requested frames that the file has."""
 
     def frame_poses(self, q: Array) -> Array:
-        """Poses of ``frames`` in base_link, shape (N, number of frames, 4, 4); q in rad and m, shape (N, n)."""
+        """Return the poses of ``frames`` in base_link, shape (N, frames, 4, 4); q in rad and m, shape (N, n)."""
         ...
 
 
 class DynamicsEngine(PoseEngine, Protocol):
-    """Also knows velocities and masses."""
+    """Computes velocities and dynamics, too."""
 
     def jacobian(self, q: Array) -> Array:
-        """Geometric Jacobian of tool0 in base_link, linear rows first, shape (N, 6, n); q of shape (N, n)."""
+        """Return the Jacobian of tool0 in base_link, linear rows first, shape (N, 6, n); q of shape (N, n)."""
         ...
 
     def dynamic_terms(self, q: Array, velocity: Array, gravity: Array) -> DynamicTerms:
-        """Dynamic terms; q and velocity of shape (N, n), gravity in m/s² in base_link, shape (3,)."""
+        """Return the dynamic terms; q and velocity of shape (N, n), gravity in m/s² in base_link, shape (3,)."""
         ...
 
 
@@ -73,7 +73,7 @@ def require_joints(path: str, found: Sequence[str], wanted: Sequence[str]) -> No
     """Check that a file's moving joints are those of the robot, in any order.
 
     Raises:
-        EngineError: a joint is missing, or there is one too many.
+        EngineError: a joint is missing, or another one moves.
     """
     missing = [name for name in wanted if name not in set(found)]
     extra = [name for name in found if name not in set(wanted)]

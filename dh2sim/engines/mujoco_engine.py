@@ -15,7 +15,7 @@ from dh2sim.model.mass import MassProperties
 from dh2sim.typing import Array, read_only
 
 BLOCK_BYTES = 2**22
-"""How much of the recorded poses is kept in one batch."""
+"""Of poses that are computed in one batch."""
 
 
 class MujocoEngine:
@@ -60,10 +60,10 @@ class MujocoEngine:
         return self._model
 
     def frame_poses(self, q: Array) -> Array:
-        """Poses of ``frames`` in the world, where base_link stands; see ``PoseEngine``.
+        """Return the poses of ``frames`` in the world, which is base_link; see ``PoseEngine``.
 
         Raises:
-            EngineError: a coordinate is so large, or no number, that MuJoCo would silently take another.
+            EngineError: a coordinate is NaN or so large that MuJoCo would silently replace it.
         """
         if not (np.abs(q) <= mujoco.mjMAXVAL).all():
             raise EngineError(f"{self._path}: MuJoCo takes joint coordinates up to {mujoco.mjMAXVAL!r} only")
@@ -89,7 +89,7 @@ class MujocoEngine:
         return poses
 
     def mass_properties(self, body: str) -> MassProperties:
-        """Mass properties of a body in its own frame.
+        """Return the mass properties of a body in its own frame.
 
         Raises:
             EngineError: there is no such body.
@@ -107,7 +107,7 @@ class MujocoEngine:
         )
 
     def jacobian(self, q: Array) -> Array:
-        """Geometric Jacobian of tool0; see ``DynamicsEngine``."""
+        """Return the geometric Jacobian of tool0; see ``DynamicsEngine``."""
         data = mujoco.MjData(self._model)
         result = np.zeros((len(q), 6, len(self._dofs)))
         linear, angular = np.zeros((3, self._model.nv)), np.zeros((3, self._model.nv))
@@ -122,13 +122,13 @@ class MujocoEngine:
         return result
 
     def dynamic_terms(self, q: Array, velocity: Array, gravity: Array) -> DynamicTerms:
-        """Mass matrix (without armature), bias and gravity terms; see ``DynamicsEngine``."""
+        """Return mass matrix (without armature), bias and gravity terms; see ``DynamicsEngine``."""
         model = self._model
         model.opt.gravity[:] = gravity
-        # left out here rather than taken off the result, where it would take digits with it
+        # set to zero rather than subtracted from the result, which would lose digits
         model.dof_armature[:] = 0.0
         data = mujoco.MjData(model)
-        mujoco.mj_setConst(model, data)  # of bodies that spin in place MuJoCo computes the inertia beforehand
+        mujoco.mj_setConst(model, data)  # MuJoCo computes the inertia of bodies that spin in place in advance
         n = len(self._dofs)
         mass, bias, load = np.zeros((len(q), n, n)), np.zeros((len(q), n)), np.zeros((len(q), n))
         full = np.zeros((model.nv, model.nv))

@@ -12,8 +12,8 @@ from dh2sim.engines.engine import DynamicTerms, present_frames, require_joints
 from dh2sim.errors import EngineCapacityError, EngineError
 from dh2sim.typing import Array
 
-MOST_JOINTS = 240
-"""pinocchio's work space holds four tensors of second derivatives, n³ doubles each: 0.44 GB for so many joints."""
+MAX_JOINTS = 240
+"""pinocchio's work space has four tensors of second derivatives, n³ doubles each: 0.44 GB for 240 joints."""
 
 
 class PinocchioEngine:
@@ -31,7 +31,7 @@ class PinocchioEngine:
 
         Raises:
             ImportError: pinocchio is not installed.
-            EngineCapacityError: the robot has more than ``MOST_JOINTS`` moving joints.
+            EngineCapacityError: the robot has more than ``MAX_JOINTS`` moving joints.
             EngineError: pinocchio refuses the file, or frames or joints are missing.
         """
         import pinocchio
@@ -44,10 +44,10 @@ class PinocchioEngine:
         except (ValueError, RuntimeError) as error:
             raise EngineError(f"{path}: pinocchio refuses the file: {' '.join(str(error).split())}") from error
         model = self._model
-        if model.nv > MOST_JOINTS:
+        if model.nv > MAX_JOINTS:
             needed = 4 * 8 * model.nv**3 / 1e9
             raise EngineCapacityError(
-                f"pinocchio needs {needed:.1f} GB for {model.nv} joints; it is asked up to {MOST_JOINTS}"
+                f"pinocchio needs {needed:.1f} GB for {model.nv} joints; at most {MAX_JOINTS} are allowed"
             )
         self._data: Any = model.createData()
         found = list(model.names)[1:]  # the first one is the world
@@ -56,11 +56,11 @@ class PinocchioEngine:
         self._dofs = np.array([joint.idx_v for joint in self._joints], dtype=int)
         links = [frame.name for frame in model.frames if frame.type == pinocchio.FrameType.BODY]
         self.frames = present_frames(str(path), links, rows, dh_frames_required=False)
-        # a joint may bear the name of a link
+        # a joint may have the name of a link
         self._ids = [model.getFrameId(name, pinocchio.FrameType.BODY) for name in self.frames]
 
     def frame_poses(self, q: Array) -> Array:
-        """Poses of ``frames`` in base_link; see ``PoseEngine``."""
+        """Return the poses of ``frames`` in base_link; see ``PoseEngine``."""
         poses = np.empty((len(q), len(self._ids), 4, 4))
         for k, row in enumerate(q):
             self._pin.framesForwardKinematics(self._model, self._data, self._configuration(row))
@@ -69,7 +69,7 @@ class PinocchioEngine:
         return poses
 
     def jacobian(self, q: Array) -> Array:
-        """Geometric Jacobian of tool0; see ``DynamicsEngine``."""
+        """Return the geometric Jacobian of tool0; see ``DynamicsEngine``."""
         result = np.empty((len(q), 6, len(self._dofs)))
         for k, row in enumerate(q):
             jacobian = self._pin.computeFrameJacobian(
@@ -83,7 +83,7 @@ class PinocchioEngine:
         return result
 
     def dynamic_terms(self, q: Array, velocity: Array, gravity: Array) -> DynamicTerms:
-        """Mass matrix, bias and gravity terms; see ``DynamicsEngine``."""
+        """Return mass matrix, bias and gravity terms; see ``DynamicsEngine``."""
         pin, model, data = self._pin, self._model, self._data
         model.gravity.linear = np.array(gravity)
         n = len(self._dofs)
@@ -99,7 +99,7 @@ class PinocchioEngine:
         return DynamicTerms(mass_matrix=mass, bias=bias, gravity=load)
 
     def _configuration(self, row: Array) -> Array:
-        """Pinocchio's own vector: a continuous joint is stored as cosine and sine."""
+        """Return pinocchio's own vector: a continuous joint is stored as cosine and sine."""
         configuration = np.zeros(self._model.nq)
         for joint, value in zip(self._joints, row, strict=True):
             if joint.nq == 2:

@@ -14,7 +14,7 @@ from dh2sim.typing import Array
 
 
 class YourdfpyEngine:
-    """One URDF file, read by yourdfpy; a Python loop, so it is asked for fewer configurations."""
+    """One URDF file, read by yourdfpy; a Python loop, so it is used for fewer configurations."""
 
     name = "yourdfpy"
 
@@ -33,7 +33,7 @@ class YourdfpyEngine:
 
         try:
             self._urdf: Any = yourdfpy.URDF.load(str(path), load_meshes=False)
-        except Exception as error:  # its parser raises whatever it trips over
+        except Exception as error:  # its parser raises many types
             raise EngineError(f"{path}: yourdfpy refuses the file: {' '.join(str(error).split())}") from error
         found = list(self._urdf.actuated_joint_names)
         require_joints(str(path), found, joints)
@@ -41,13 +41,13 @@ class YourdfpyEngine:
         self.frames = present_frames(str(path), list(self._urdf.link_map), rows, dh_frames_required=False)
 
     def frame_poses(self, q: Array) -> Array:
-        """Poses of ``frames`` in base_link; see ``PoseEngine``."""
+        """Return the poses of ``frames`` in base_link; see ``PoseEngine``."""
         poses = np.empty((len(q), len(self.frames), 4, 4))
         for k, row in enumerate(q):
             self._urdf.update_cfg(np.array(row[self._order], dtype=np.float64))
             T, before = np.eye(4), "base_link"
             for i, frame in enumerate(self.frames):
-                # from frame to frame: the time for a long way through its scene graph grows with the cube of the way
+                # from frame to frame: the time for a path through its scene graph grows with the cube of its length
                 T = T @ self._urdf.get_transform(frame, before)
                 poses[k, i], before = T, frame
         return poses

@@ -165,7 +165,7 @@ def _shift(offset: Array) -> Array:
 
 
 STDIN = "-"
-MOST_BYTES = 50_000_000
+MAX_BYTES = 50_000_000
 _ROOT = re.compile(rb"<\s*([A-Za-z_][\w:.-]*)")
 _HIDDEN = re.compile(rb"<\?.*?\?>|<!--.*?-->|<![^>]*>", re.DOTALL)
 
@@ -219,11 +219,11 @@ def read_file(path: Path) -> bytes:
     """
     try:
         with path.open("rb") as stream:
-            data = stream.read(MOST_BYTES + 1)
+            data = stream.read(MAX_BYTES + 1)
     except OSError as error:
         raise Dh2simError(f"{path}: cannot be read: {error.strerror or error}") from error
-    if len(data) > MOST_BYTES:
-        raise Dh2simError(f"{path}: has more than {MOST_BYTES} bytes, the most that is read")
+    if len(data) > MAX_BYTES:
+        raise Dh2simError(f"{path}: more than {MAX_BYTES} bytes, the most that is read")
     return data
 
 

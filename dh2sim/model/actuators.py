@@ -13,6 +13,7 @@ from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import reference_joint_poses
 from dh2sim.model.link_shapes import neat
 from dh2sim.model.mass import MassProperties, in_frame, shift_inertia
+from dh2sim.model.shapes import cross
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType
 from dh2sim.typing import Array
 
@@ -45,7 +46,7 @@ def gravity_loads(
             weight = [body.mass * float(g) for g in gravity]
             if joint.type.turns:
                 arm = [float(body.com[k]) - float(poses[i][k, 3]) for k in range(3)]
-                moved = _cross(axis, arm)
+                moved = cross(axis, arm)
             else:
                 moved = axis
             terms.append(-_dot(weight, moved))
@@ -93,10 +94,6 @@ def _dot(a: Sequence[float], b: Sequence[float]) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
 ASSUMED_BANDWIDTH = 100.0
 """rad/s: natural frequency that assumed gains give each joint, critically damped, in the home configuration."""
 
@@ -118,7 +115,7 @@ def actuator_model(actuator: ActuatorSpec, inertia: float) -> ActuatorModel:
     """Fill in gains that make a joint a critically damped oscillator, kp = I w² and kv = 2 I w.
 
     Args:
-        actuator: what the robot file says.
+        actuator: as in the robot file.
         inertia: what the joint moves, armature included, kg·m² or kg.
     """
     kp = kv = 0.0

@@ -1,4 +1,4 @@
-"""RobotSpec -> RobotModel: fills in whatever the robot file leaves open, and says what it filled in."""
+"""RobotSpec -> RobotModel: fills in what the robot file leaves open, and records what it filled in."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dh2sim.typing import Array, read_only
 SLENDERNESS = 0.16
 """Radius of the base's shapes as a share of the mean segment."""
 TAPER = 0.45
-"""By which share the last link is thinner than the base."""
+"""Share by which the last link is thinner than the base."""
 PALETTE: tuple[Color, ...] = (
     (0.90, 0.45, 0.13, 1.0),
     (0.93, 0.60, 0.18, 1.0),

@@ -1,4 +1,4 @@
-"""Which pairs of links touch by construction, and so must not collide with each other."""
+"""Pairs of links that touch by construction, and so must not collide with each other."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dh2sim.typing import Array
 
 
 class Reason(StrEnum):
-    """Why a pair of links does not collide; the words that SRDF files use where they have one."""
+    """Why a pair of links does not collide, in the words of SRDF files."""
 
     ADJACENT = "Adjacent"
     """Neighbours on the chain, fixed links counted with the link that carries them."""
@@ -45,11 +45,11 @@ def excluded_pairs(
         chain: the chain, n rows.
         names: of the n + 1 links, the base link's first.
         shapes: of the links, each in its link's frame.
-        configurations: joint vectors (rad, m) in which whatever touches does so by construction.
+        configurations: joint vectors (rad, m); links that touch in one of them do so by construction.
 
     Returns:
-        The pairs in the order of the links. Shapes are taken as capsules here: a cylinder counts with a rounded end
-        of its own radius, so that what nearly touches is left out too.
+        The pairs in the order of the links. Shapes count as capsules here, a cylinder with rounded ends of its own
+        radius, so that links that nearly touch are among the pairs.
     """
     group = [0]
     for joint in chain.joints:
@@ -91,7 +91,7 @@ def _overlaps(chain: KinematicChain, shapes: Sequence[Sequence[Shape]], q: Array
 
 
 def segment_distance(a: Array, b: Array, starts: Array, ends: Array) -> Array:
-    """Distance, m, shape (k,), of the segment from a to b, shape (3,) each, to k segments, shape (k, 3) each.
+    """Return the distance, m, shape (k,), of a segment from a to b, shape (3,), to k segments, shape (k, 3) each.
 
     Neither may be of zero length; those that are parallel to within 1e-6 rad count as parallel. (Ericson, Real-Time
     Collision Detection, 5.1.9.)

@@ -1,7 +1,7 @@
-"""Which shapes stand for which link: from the chain alone, a robot that looks like a robot.
+"""The shapes of every link, made from the chain alone so that it looks like a robot.
 
 Every joint gets a body along its axis. From a link's frame the solid runs to the next joint by way of the elbow, the
-point of the next axis that is nearest to the link's own z axis: along the link's axis, across (|a|), and along the
+point of the next axis nearest to the link's own z axis: along the link's axis, across (|a|), and along the
 next axis (|d|). A prismatic joint is a rod that slides in a sleeve, or a carriage on a rail where the rod would run
 into the mast that carries it.
 """
@@ -22,13 +22,12 @@ from dh2sim.typing import Array, read_only
 NEGLIGIBLE = 1e-6
 """Segments shorter than this share of the robot's scale get no shape."""
 DETOUR = 3.0
-"""The way over the elbow is taken while it is at most this many times the straight one; axes that are nearly
-parallel have theirs far away."""
+"""A route over the elbow is at most this many times the straight one; the elbow of nearly parallel axes is far."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Route:
-    """The way from a link's frame to the next joint's origin."""
+    """The route from a link's frame to the next joint's origin."""
 
     foot: float
     """Height on the link's own z axis where the common normal starts, m."""
@@ -41,7 +40,7 @@ class _Route:
 
 
 def link_scale(chain: KinematicChain, travels: Sequence[tuple[float, float]]) -> float:
-    """Mean length, m, of the segments and travels that a robot is made of; 1 m for a robot without any.
+    """Return the mean length, m, of the segments and travels that a robot is made of; 1 m for a robot without any.
 
     Args:
         chain: the chain.
@@ -67,7 +66,7 @@ def link_scale(chain: KinematicChain, travels: Sequence[tuple[float, float]]) ->
 def lay_out(
     chain: KinematicChain, travels: Sequence[tuple[float, float]], radii: Sequence[float], scale: float
 ) -> tuple[tuple[Shape, ...], ...]:
-    """Shapes of the base link and of every link, each in its link's frame.
+    """Return the shapes of the base link and of every link, each in its link's frame.
 
     Args:
         chain: the chain, n rows.
@@ -157,13 +156,13 @@ def _sleeve(T: Array, route: _Route, r: float) -> Shape:
 
 
 def _rod(route: _Route, travel: tuple[float, float], r: float, r_sleeve: float) -> Shape:
-    """From the joint's origin back through the sleeve, wherever along the travel the sleeve is seen from it."""
+    """Return a rod from the joint's origin back through the sleeve, long enough for the whole travel."""
     low, high = -route.run - travel[1] - 1.5 * r_sleeve, -route.run - travel[0]
     return along_z(ShapeKind.CYLINDER, ShapePart.LINK, neat(0.7 * r), min(0.0, low), max(0.0, high))
 
 
 def _on_axis(T: Array, part: ShapePart, radius: float, low: float, high: float) -> Shape:
-    """A cylinder on the next joint's axis, between two heights measured from that joint's origin."""
+    """Return a cylinder on the next joint's axis, between two heights measured from that joint's origin."""
     z = [float(T[i, 2]) for i in range(3)]
     centre = [float(T[i, 3]) + 0.5 * (low + high) * z[i] for i in range(3)]
     return Shape(
@@ -176,7 +175,7 @@ def _on_axis(T: Array, part: ShapePart, radius: float, low: float, high: float) 
 
 
 def neat(size: float) -> float:
-    """A size to three significant digits: it is a matter of taste, and should read well."""
+    """Round to three significant digits, which are enough for a size that was chosen."""
     return float(f"{size:.3g}")
 
 

@@ -18,13 +18,13 @@ from dh2sim.robot.spec import LinkSpec
 from dh2sim.typing import Array, read_only
 
 ROUNDING = (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
-"""By which shares of its trace an inertia may be mended: numbers in robot files are rounded."""
+"""Shares of its trace by which an inertia may be mended: numbers in robot files are rounded."""
 _TRIANGLE_TOLERANCE = 1e-9
 ASSUMED_DENSITY = 1000.0
-"""kg/m³: what a hollow arm with its motors weighs is nearer to water than to aluminium."""
-LEAST_MASS = 1e-9
+"""kg/m³: a hollow arm with its motors is closer to water than to aluminium."""
+MIN_MASS = 1e-9
 """kg: estimates are no smaller."""
-LEAST_INERTIA = 1e-14
+MIN_INERTIA = 1e-14
 """kg·m²: estimates are no smaller. MuJoCo refuses moving bodies of less than 1e-15."""
 
 
@@ -145,7 +145,7 @@ def link_inertial(
     """Return the mass properties of a link; what the robot file gives wins over estimates from the shapes.
 
     Args:
-        link: what the file says; centre of mass and inertia in DH frame i.
+        link: as in the file; centre of mass and inertia in DH frame i.
         joint: the link's joint.
         shapes: of the link, solid. A given mass scales their inertia, a given centre of mass moves it.
 
@@ -157,7 +157,7 @@ def link_inertial(
     if not shapes and all(value is None for value in given.values()):
         return None, ()
     estimate = _estimate(link, shapes)
-    estimate = _of_mass(estimate, max(estimate.mass, LEAST_MASS) if link.mass is None else link.mass)
+    estimate = _of_mass(estimate, max(estimate.mass, MIN_MASS) if link.mass is None else link.mass)
     mass, com, inertia = estimate.mass, estimate.com, estimate.inertia
     in_dh = in_frame(
         joint.T_joint_dh,
@@ -178,13 +178,13 @@ def link_inertial(
 def of_shapes(shapes: Iterable[Shape], density: float) -> MassProperties:
     """Return the mass properties of a link of solid shapes, none too small for MuJoCo; ``density`` in kg/m³."""
     whole = combine(of_shape(shape, density) for shape in shapes)
-    whole = _of_mass(whole, max(whole.mass, LEAST_MASS))
+    whole = _of_mass(whole, max(whole.mass, MIN_MASS))
     return replace(whole, inertia=made_possible(whole.inertia))
 
 
 def _of_mass(body: MassProperties, mass: float) -> MassProperties:
     """Return a body of the same shape and another mass, kg; its inertia is not too small for MuJoCo."""
-    return replace(body, mass=mass, inertia=at_least(read_only(body.inertia * (mass / body.mass)), LEAST_INERTIA))
+    return replace(body, mass=mass, inertia=at_least(read_only(body.inertia * (mass / body.mass)), MIN_INERTIA))
 
 
 def _estimate(link: LinkSpec, shapes: tuple[Shape, ...]) -> MassProperties:

@@ -1,4 +1,4 @@
-"""Meshes that show links: read with trimesh, handed on in the one form that every engine reads, binary STL."""
+"""Meshes that show links, read with trimesh and converted to binary STL, which every engine reads."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from dh2sim.typing import Array
 if TYPE_CHECKING:
     import trimesh
 
-MOST_FACES = 200_000
+MAX_FACES = 200_000
 """MuJoCo refuses an STL file with more."""
-FEWEST_CORNERS = 4
+MIN_CORNERS = 4
 """MuJoCo refuses a mesh with fewer."""
-LEAST_AREA = 1e-12
-"""m²: of a smaller surface MuJoCo cannot tell the centre."""
+MIN_AREA = 1e-12
+"""m²: MuJoCo finds no centre of a smaller surface."""
 STL_HEADER, STL_FACE = 84, 50
 """Bytes of a binary STL file: before the faces, and for each."""
 
@@ -47,13 +47,13 @@ def load_mesh(mesh: MeshSpec, link_name: str) -> MeshAsset:
         link_name: names the exported file.
 
     Raises:
-        MeshError: it cannot be read, holds no faces or too many, fewer than four corners, no area, or numbers that
+        MeshError: it cannot be read, has no faces or too many, fewer than four corners, no area, or numbers that
             are not finite; the text names the row of the robot file.
     """
     try:
         original = mesh.file.read_bytes()
         surface = _read(mesh)
-    except Exception as error:  # trimesh's readers raise whatever their formats trip over
+    except Exception as error:  # trimesh's readers raise many types
         raise MeshError(f"{mesh.location}: cannot read the mesh '{mesh.file}': {_words(error)}") from error
     _check(surface, mesh)
     suffix = mesh.file.suffix.lower()
@@ -81,24 +81,24 @@ def _check(surface: trimesh.Trimesh, mesh: MeshSpec) -> None:
 
     faces = len(getattr(surface, "faces", ()))
     if faces == 0:
-        raise MeshError(f"{mesh.location}: the mesh '{mesh.file}' holds no faces")
-    if faces > MOST_FACES:
+        raise MeshError(f"{mesh.location}: the mesh '{mesh.file}' has no faces")
+    if faces > MAX_FACES:
         raise MeshError(
-            f"{mesh.location}: the mesh '{mesh.file}' holds {faces} faces; MuJoCo reads at most {MOST_FACES}. "
+            f"{mesh.location}: the mesh '{mesh.file}' has {faces} faces; MuJoCo reads at most {MAX_FACES}. "
             "Simplify it, for instance with Blender's Decimate or trimesh's simplify_quadric_decimation"
         )
     corners = np.asarray(surface.vertices)[np.unique(surface.faces)]
     if not (np.abs(corners) <= np.finfo(np.float32).max).all():  # STL files hold single precision
-        raise MeshError(f"{mesh.location}: the mesh '{mesh.file}' holds coordinates that are no finite numbers")
-    if len(np.unique(corners.astype(np.float32), axis=0)) < FEWEST_CORNERS:
+        raise MeshError(f"{mesh.location}: the mesh '{mesh.file}' has coordinates that are not finite")
+    if len(np.unique(corners.astype(np.float32), axis=0)) < MIN_CORNERS:
         raise MeshError(
-            f"{mesh.location}: the mesh '{mesh.file}' has fewer than {FEWEST_CORNERS} corners; MuJoCo refuses it"
+            f"{mesh.location}: the mesh '{mesh.file}' has fewer than {MIN_CORNERS} corners; MuJoCo refuses it"
         )
     area = float(surface.area) * mesh.scale**2
-    if not area >= LEAST_AREA:
+    if not area >= MIN_AREA:
         raise MeshError(
             f"{mesh.location}: the mesh '{mesh.file}' has an area of {area:.3g} m² with scale {mesh.scale!r}; MuJoCo "
-            f"needs at least {LEAST_AREA!r}"
+            f"needs at least {MIN_AREA!r}"
         )
 
 

@@ -128,7 +128,7 @@ class JointModel:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotModel:
-    """Everything the writers need; SI units."""
+    """A robot with everything that the writers need; SI units."""
 
     spec: RobotSpec
     chain: KinematicChain
@@ -181,7 +181,7 @@ class RobotModel:
         return gravity_loads(self.chain, self.bodies, q, self.spec.gravity)
 
     def holding_controls(self, q: Array) -> list[float]:
-        """Return the controls, one an actuator, with which the robot stands still at ``q`` (rad or m, shape (m,)).
+        """Return the controls, one an actuator, with which the robot is at rest at ``q`` (rad or m, shape (m,)).
 
         A position actuator is asked for a little more than the joint's position, so that its pull balances gravity.
         Clipped to the control's range.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -18,7 +19,7 @@ class ShapeKind(StrEnum):
 
 
 class ShapePart(StrEnum):
-    """What a shape stands for; joints are drawn darker than links."""
+    """The part that a shape shows; joints are drawn darker than links."""
 
     JOINT = "joint"
     LINK = "link"
@@ -39,7 +40,7 @@ class Shape:
 
     @property
     def ends(self) -> tuple[Array, Array]:
-        """Ends of the cylindrical part's axis in the link frame, m, two arrays of shape (3,)."""
+        """The ends of the cylindrical part's axis in the link frame, m, two arrays of shape (3,)."""
         centre, half = self.T_link_shape[:3, 3], 0.5 * self.length * self.T_link_shape[:3, 2]
         return centre - half, centre + half
 
@@ -85,14 +86,15 @@ def pose_with_z(origin: list[float], z: list[float]) -> Array:
     if z[2] == 1.0:
         x, y = [1.0, 0.0, -z[0]], [0.0, 1.0, -z[1]]  # components too small to show in z[2]
     else:
-        y = _cross(z, other)
+        y = cross(z, other)
         norm = math.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
         y = [component / norm for component in y]
-        x = _cross(y, z)
+        x = cross(y, z)
     return read_only(
         [[x[i] + 0.0, y[i] + 0.0, z[i] + 0.0, origin[i] + 0.0] for i in range(3)] + [[0.0, 0.0, 0.0, 1.0]]
     )
 
 
-def _cross(a: list[float], b: list[float]) -> list[float]:
+def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
+    """Return the cross product of two vectors."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

@@ -129,4 +129,4 @@ def test_pinocchio_is_not_asked_for_more_joints_than_memory_allows(tmp_path: Pat
     path.write_text(to_urdf(build_model(RobotSpec(name="snake", rows=rows))), encoding="utf-8")
     with pytest.raises(EngineCapacityError) as refusal:
         PinocchioEngine(path, [row.name for row in rows], len(rows))
-    assert str(refusal.value) == "pinocchio needs 0.4 GB for 241 joints; it is asked up to 240"
+    assert str(refusal.value) == "pinocchio needs 0.4 GB for 241 joints; at most 240 are allowed"

@@ -80,7 +80,7 @@ def test_more_bodies_than_mujoco_reads_are_refused(tmp_path: Path) -> None:
 
 def test_a_robot_whose_name_is_that_of_the_scene_is_refused(tmp_path: Path) -> None:
     run = dh2sim("export", write(tmp_path, small("Scene")), "--out", tmp_path / "made", "--no-verify")
-    message = "dh2sim: Scene: its MJCF and the scene around it would both be scene.xml; rename the robot\n"
+    message = "dh2sim: Scene: its MJCF and its scene would both be scene.xml; rename the robot\n"
     assert run == Outcome(status=2, out="", err=message)
     assert not (tmp_path / "made").exists()
 

@@ -10,7 +10,7 @@ import pytest
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
-from dh2sim.model.mass import ASSUMED_DENSITY, LEAST_INERTIA, LEAST_MASS, MassProperties
+from dh2sim.model.mass import ASSUMED_DENSITY, MIN_INERTIA, MIN_MASS, MassProperties
 from dh2sim.model.robot_model import LinkModel
 from dh2sim.robot.spec import Convention, LinkSpec, RobotSpec, Row
 from dh2sim.typing import Array, read_only
@@ -142,8 +142,8 @@ def test_mujoco_reads_robots_however_small_they_are(size: float) -> None:
         assert mujoco.MjModel.from_xml_string(text).nv == 3
     for link in built.links:
         assert link.inertial is not None
-        assert link.inertial.mass >= LEAST_MASS
-        assert np.linalg.eigvalsh(link.inertial.inertia)[0] >= 0.999 * LEAST_INERTIA
+        assert link.inertial.mass >= MIN_MASS
+        assert np.linalg.eigvalsh(link.inertial.inertia)[0] >= 0.999 * MIN_INERTIA
 
 
 def test_a_given_mass_is_kept_however_small_it_is() -> None:

@@ -8,7 +8,7 @@ import trimesh
 
 from dh2sim.errors import MeshError, RobotFileError
 from dh2sim.model.build import build_model
-from dh2sim.model.meshes import MOST_FACES
+from dh2sim.model.meshes import MAX_FACES
 from dh2sim.robot.read import parse_robot
 
 WHERE = "robot.yaml:5:58: joints[1].link.mesh.file"
@@ -50,7 +50,7 @@ def triangles(vertices: list[list[float]], faces: list[list[int]]) -> bytes:
 )
 def test_a_file_without_faces_is_refused(tmp_path: Path, name: str, data: bytes) -> None:
     (tmp_path / name).write_bytes(data)
-    assert message(tmp_path, name) == f"{WHERE}: the mesh '{tmp_path / name}' holds no faces"
+    assert message(tmp_path, name) == f"{WHERE}: the mesh '{tmp_path / name}' has no faces"
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_a_file_that_disappears_after_the_robot_was_read_is_named_with_its_place
 def test_coordinates_that_are_no_finite_numbers_are_refused(tmp_path: Path, value: float) -> None:
     file = tmp_path / "part.obj"
     file.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {value}\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n")
-    expected = f"{WHERE}: the mesh '{file}' holds coordinates that are no finite numbers"
+    expected = f"{WHERE}: the mesh '{file}' has coordinates that are not finite"
     assert message(tmp_path, file.name) == expected
 
 
@@ -119,11 +119,11 @@ def test_a_mesh_that_its_scale_makes_too_small_is_refused(tmp_path: Path) -> Non
 
 
 def test_more_faces_than_mujoco_reads_are_refused(tmp_path: Path) -> None:
-    vertices = np.random.default_rng(0).uniform(-1, 1, (MOST_FACES + 3, 3))
-    faces = np.arange(MOST_FACES + 1)[:, None] + np.arange(3)
+    vertices = np.random.default_rng(0).uniform(-1, 1, (MAX_FACES + 3, 3))
+    faces = np.arange(MAX_FACES + 1)[:, None] + np.arange(3)
     file = tmp_path / "part.ply"
     file.write_bytes(trimesh.Trimesh(vertices, faces, process=False).export(file_type="ply"))
     assert message(tmp_path, file.name) == (
-        f"{WHERE}: the mesh '{file}' holds 200001 faces; MuJoCo reads at most 200000. Simplify it, for instance "
+        f"{WHERE}: the mesh '{file}' has 200001 faces; MuJoCo reads at most 200000. Simplify it, for instance "
         "with Blender's Decimate or trimesh's simplify_quadric_decimation"
     )

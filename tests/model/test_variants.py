@@ -12,7 +12,7 @@ import pytest
 import dh2sim
 from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
 from dh2sim.model.build import build_model
-from dh2sim.model.mass import LEAST_MASS
+from dh2sim.model.mass import MIN_MASS
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType
@@ -78,7 +78,7 @@ def test_mujoco_takes_a_base_that_floats_however_small_the_robot_is(row: str) ->
     tiny = dh2sim.parse_robot(f"name: tiny\nconvention: standard\njoints: [{{type: revolute, {row}}}]\n")
     heavy = with_base_mass(build_model(tiny))
     compiled = mujoco.MjModel.from_xml_string(to_mjcf(heavy, MjcfOptions(floating_base=True)))
-    assert compiled.body("base_link").mass[0] >= LEAST_MASS
+    assert compiled.body("base_link").mass[0] >= MIN_MASS
     assert compiled.body("base_link").inertia.min() > 0.0
 
 

@@ -1,8 +1,8 @@
-"""DH frames in an MJCF: sites, placed so that MuJoCo keeps their poses to the last bit.
+"""DH frames as sites of an MJCF, placed so that MuJoCo keeps their poses to the last bit.
 
 MuJoCo compares every site with its body's frame and with the body's principal frame. Where position or quaternion
-differ by less than 1e-6 it takes one for the other, and the site is off by as much: a twist of 1.570796 where pi/2
-was meant is enough. A body that has no mass is placed exactly, so such a site gets one of its own.
+differ by less than 1e-6 it uses the frame for the site, which is off by as much then: a twist of 1.570796 for pi/2
+is enough. A body that has no mass is placed exactly, so such a site gets one of its own.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from dh2sim.typing import Array
 NEAR = 1e-5
 """Frames that differ by less may be one frame to MuJoCo; m, and components of a rotation matrix."""
 NOISE = 1e-15
-"""Frames that differ by less may as well be one."""
+"""Frames that differ by less count as one."""
 
 
 def placed(T: Array) -> dict[str, str]:
-    """Attributes of an element with pose ``T``, shape (4, 4), in its body."""
+    """Return the attributes of an element with pose ``T``, shape (4, 4), in its body."""
     return {"pos": numbers(T[:3, 3]), "quat": numbers(quaternion_from_rotation(T[:3, :3]))}
 
 
@@ -41,7 +41,7 @@ def add_site(body: ET.Element, name: str, T: Array, inertial: MassProperties | N
 
 
 def needs_body(T: Array, inertial: MassProperties | None) -> bool:
-    """Whether MuJoCo may take a site with pose ``T`` in a link for another frame that is only near it."""
+    """Whether MuJoCo may replace a site with pose ``T`` in a link by another frame that is only near it."""
     position, R = T[:3, 3], T[:3, :3]
     turned, moved = _gap(R, identity()[:3, :3]), _gap(position, 0.0)
     if NOISE < turned < NEAR:

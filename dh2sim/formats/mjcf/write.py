@@ -65,13 +65,13 @@ def add_keyframes(mujoco: ET.Element, model: RobotModel, *, floating_base: bool 
             key.set("ctrl", numbers(controls))
 
 
-MOST_BODIES = 496
+MAX_BODIES = 496
 """MuJoCo's XML reader refuses a deeper nesting of bodies; base_link is one of them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MjcfOptions:
-    """How a robot is simulated, as far as an MJCF says so."""
+    """Options of the simulation in an MJCF."""
 
     timestep: float = 0.002
     """s."""
@@ -80,7 +80,7 @@ class MjcfOptions:
     energy: bool = False
     """Whether MuJoCo computes the energy at every step."""
     sensors: bool = True
-    """Whether it evaluates the sensors, which takes some of the time of a small arm's step."""
+    """Whether it evaluates the sensors, which takes time at every step of a small arm."""
     floating_base: bool = False
     """Whether base_link floats; it needs mass then, see ``with_base_mass``."""
 
@@ -104,10 +104,10 @@ def to_mjcf(model: ModelLike, options: MjcfOptions = EXPORTED) -> str:
     """
     model = model_of(model)
     nested = 1 + len(model.links) + any(needs_body(T, model.links[-1].inertial) for _, T in _last_frames(model))
-    if nested > MOST_BODIES:
+    if nested > MAX_BODIES:
         raise ModelError(
             f"{model.name}: {len(model.links)} rows make {nested} nested bodies with base_link; MuJoCo "
-            f"reads at most {MOST_BODIES}. Split the chain, or export it as URDF only"
+            f"reads at most {MAX_BODIES}. Split the chain, or export it as URDF only"
         )
     mujoco = ET.Element("mujoco", model=model.name)
     child(mujoco, "compiler", angle="radian", autolimits="true", meshdir="meshes")
@@ -144,7 +144,7 @@ def _defaults(mujoco: ET.Element, model: RobotModel) -> None:
 
 
 def _class(model: RobotModel) -> str:
-    """Name of the robot's default class; MuJoCo has a class main already."""
+    """Return the name of the robot's default class; MuJoCo has a class main already."""
     return "main_robot" if model.name == "main" else model.name
 
 
@@ -194,13 +194,13 @@ def _bodies(mujoco: ET.Element, model: RobotModel, materials: dict[Color, str], 
 
 
 def _last_frames(model: RobotModel) -> list[tuple[str, Array]]:
-    """Names of the last DH frame and of tool0, and their poses in the last link."""
+    """Return the names of the last DH frame and of tool0, and their poses in the last link."""
     T = model.joints[-1].joint.T_joint_dh
     return [(f"dh_{len(model.links)}", T), ("tool0", compose(T, model.chain.T_dhn_tool0))]
 
 
 def _moved(T: Array) -> dict[str, str]:
-    """As ``placed``, without what is the identity."""
+    """Return the attributes of a pose, like ``placed``, without those of the identity."""
     return {name: text for name, text in placed(T).items() if text not in ("0.0 0.0 0.0", "1.0 0.0 0.0 0.0")}
 
 
@@ -240,7 +240,7 @@ def _geoms(
             class_=f"{model.name}_visual",
             mesh=link.name,
             material=material,
-            **placed(compose(T_link_dh, link.mesh.T_dh_mesh)),  # of the file's frame; MuJoCo sees to its own
+            **placed(compose(T_link_dh, link.mesh.T_dh_mesh)),  # of the file's frame, not of MuJoCo's own
         )
     kind = "shape" if link.mesh is None else "collision"
     # a base that does not move needs no mass, and so MuJoCo gives it no principal frame of its own; that of one that
