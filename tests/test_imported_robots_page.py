@@ -199,7 +199,7 @@ def test_the_counts_are_those_of_the_tables() -> None:
     assert len(ARM_LINES) >= 20
     assert f"{len(ARM_LINES)} arms and legs" in PAGE
     assert f"{rows} joints in all" in PAGE
-    assert f"out of {len({(arm.package.name, arm.file) for arm in ARMS})}\nfiles" in PAGE
+    assert f"from {len({(arm.package.name, arm.file) for arm in ARMS})}\npublic files" in PAGE
 
 
 def test_every_error_in_the_tables_is_within_its_tolerance() -> None:

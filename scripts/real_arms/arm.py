@@ -1,4 +1,4 @@
-"""A chain in a file that somebody else wrote."""
+"""An arm or a leg in a third-party file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TOLERANCE = ImportOptions().tolerance
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arm:
-    """A chain in a file, and what the import of it is asked for."""
+    """An arm or a leg in a file, and the options of its import."""
 
     robot: str
     """Name and, where a file has more than one, which arm or leg."""
@@ -22,7 +22,7 @@ class Arm:
     file: str
     """Below the package's folder of robots."""
     base: str
-    """Where it begins: asked for, or found by the import itself."""
+    """Where it begins: given, or found by the import."""
     tip: str
     ask_base: bool = False
     ask_tip: bool = False
@@ -41,7 +41,7 @@ class Arm:
 
     @property
     def options(self) -> ImportOptions:
-        """What the import is given."""
+        """Options of the import."""
         return ImportOptions(
             base=self.base if self.ask_base else None,
             tip=self.tip if self.ask_tip else None,
