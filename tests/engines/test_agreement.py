@@ -59,7 +59,7 @@ def turns(built: RobotModel, count: int, seed: int) -> Array:
 
 
 @pytest.mark.parametrize("name", ENGINES)
-def test_frames_of_every_engine_stand_where_the_table_says(name: str, folder: Path) -> None:
+def test_frames_of_every_engine_are_where_the_table_says(name: str, folder: Path) -> None:
     built = model("odd")
     engine = pose_engine(name, path_of(name, folder), joint_names(built), len(built.joints))
     assert engine.name == name
@@ -70,7 +70,7 @@ def test_frames_of_every_engine_stand_where_the_table_says(name: str, folder: Pa
 
 @settings(max_examples=10)
 @given(robots_with_joint_vectors(max_rows=6, must_move=False))
-def test_frames_of_any_robot_in_every_engine_stand_where_the_table_says(
+def test_frames_of_any_robot_in_every_engine_are_where_the_table_says(
     tmp_path_factory: pytest.TempPathFactory, drawn: tuple[RobotSpec, Array]
 ) -> None:
     spec, q = drawn
@@ -149,7 +149,7 @@ def test_the_order_of_joints_is_that_of_the_robot_and_not_of_the_file(name: str,
         np.testing.assert_array_equal(b.mass_matrix, a.mass_matrix[:, order][:, :, order])
 
 
-def test_the_elements_of_a_urdf_may_stand_in_any_order(tmp_path: Path) -> None:
+def test_the_elements_of_a_urdf_may_be_in_any_order(tmp_path: Path) -> None:
     built = model("odd")
     root = parsed(to_urdf(built))
     root[:] = list(reversed(root))
@@ -183,7 +183,7 @@ def test_mujoco_refuses_coordinates_that_it_would_replace(value: float, folder: 
     assert str(caught.value) == (f"{folder / 'robot.xml'}: MuJoCo takes joint coordinates up to 10000000000.0 only")
 
 
-def test_mujoco_tells_the_mass_properties_of_a_body(folder: Path) -> None:
+def test_mujoco_reports_the_mass_properties_of_a_body(folder: Path) -> None:
     built = model("odd")
     for file in ("robot.xml", "robot.urdf"):
         engine = MujocoEngine(folder / file, joint_names(built), 6)

@@ -55,7 +55,7 @@ def test_a_missing_file_is_found(exported: Path) -> None:
     assert _check(exported) == Outcome(status=1, out=f"small: {path}: missing\n", err=ADVICE)
 
 
-def test_what_cannot_be_read_is_told_apart_from_what_is_missing(exported: Path) -> None:
+def test_what_cannot_be_read_is_distinguished_from_what_is_missing(exported: Path) -> None:
     path = exported / "made" / "small" / "scene.xml"
     path.unlink()
     path.mkdir()

@@ -79,7 +79,7 @@ def test_an_export_cut_off_at_any_moment_leaves_whole_files(tmp_path: Path, kind
         process.stdout.readline()  # the first set stands
         time.sleep(rng.uniform(0.0, 0.02))
         process.send_signal(kind)
-        told = process.communicate(timeout=30)[1]
+        stderr = process.communicate(timeout=30)[1]
         stands = {name: data for name, data in contents(out).items() if not name.startswith(".")}
         if kind is signal.SIGKILL:  # which nothing can put off: each file by itself is whole
             assert set(stands) == set(versions[0][1])
@@ -88,19 +88,19 @@ def test_an_export_cut_off_at_any_moment_leaves_whole_files(tmp_path: Path, kind
             assert stands in [made for _, made in versions]
         if kind is signal.SIGINT:
             assert process.returncode == INTERRUPTED
-            assert told == ""
+            assert stderr == ""
             assert [path.name for path in out.iterdir()] == ["small"], "the temporary folder is removed"
 
 
 @pytest.mark.parametrize(("kind", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_the_program_ends_in_good_order_when_it_is_told_to(tmp_path: Path, kind: signal.Signals, status: int) -> None:
+def test_the_program_ends_in_good_order_on_a_signal(tmp_path: Path, kind: signal.Signals, status: int) -> None:
     process = _start("-m", "dh2sim", "export", *builtin_robots(), "--out", tmp_path)
     assert process.stdout is not None
     first = process.stdout.readline()
     process.send_signal(kind)
-    _, told = process.communicate(timeout=30)
+    _, stderr = process.communicate(timeout=30)
     assert first == f"arm_5r: {tmp_path / 'arm_5r'}\n"
-    assert (process.returncode, told) == (status, "dh2sim: interrupted\n" if kind is signal.SIGINT else "")
+    assert (process.returncode, stderr) == (status, "dh2sim: interrupted\n" if kind is signal.SIGINT else "")
     for folder in tmp_path.iterdir():
         name = load_robot(folder.name).name
         assert {path.name for path in folder.iterdir()} == {f"{name}.urdf", f"{name}.xml", "scene.xml"}
@@ -115,9 +115,9 @@ def test_an_interruption_during_a_long_validation_is_heeded_at_once(tmp_path: Pa
     time.sleep(moment)  # while engines are imported, and while they are compared
     process.send_signal(signal.SIGINT)
     started = time.monotonic()
-    out, told = process.communicate(timeout=60)
+    out, stderr = process.communicate(timeout=60)
     assert time.monotonic() - started < 8.0
-    assert (process.returncode, out, told) == (130, "", "dh2sim: interrupted\n")
+    assert (process.returncode, out, stderr) == (130, "", "dh2sim: interrupted\n")
     assert not list(tmp_path.iterdir())
 
 
@@ -130,11 +130,11 @@ def test_an_interruption_while_the_program_starts_is_no_traceback(tmp_path: Path
         process.stdout.readline()
         time.sleep(rng.uniform(0.0, 0.5))
         process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=30)
+        _, stderr = process.communicate(timeout=30)
         # before the program listens, and after it is done, the signal itself ends the process
         assert process.returncode in (0, 130, -signal.SIGINT)
         if process.returncode == 130:
-            assert told == "dh2sim: interrupted\n"
+            assert stderr == "dh2sim: interrupted\n"
 
 
 def test_an_interruption_that_whoever_started_the_program_ignores_is_ignored(tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ SPECK = small("speck").replace("a: 0.3,", "a: 0.3, link: {mass: 1.0e-20},")
 """A robot with a link that weighs less than MuJoCo takes for something."""
 
 
-def test_what_mujoco_refuses_is_told_without_a_temporary_path(tmp_path: Path) -> None:
+def test_what_mujoco_refuses_is_reported_without_a_temporary_path(tmp_path: Path) -> None:
     robot = write(tmp_path, SPECK)
     run = dh2sim("export", robot, "--out", tmp_path / "made")
     assert (run.status, run.out) == (2, "")

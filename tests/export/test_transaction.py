@@ -12,7 +12,7 @@ from tests.export.robots import small, write
 from tests.program import Outcome, contents, dh2sim, environment
 
 
-def test_a_file_where_a_folder_is_needed_is_told(tmp_path: Path) -> None:
+def test_a_file_where_a_folder_is_needed_is_reported(tmp_path: Path) -> None:
     robot = write(tmp_path, small())
     blocked = tmp_path / "file"
     blocked.write_bytes(b"mine")
@@ -34,7 +34,7 @@ def test_a_file_where_a_folder_is_needed_is_told(tmp_path: Path) -> None:
     assert contents(tmp_path / "made") == {"small": b"mine"}
 
 
-def test_a_folder_at_a_files_name_is_told_and_old_files_stay(tmp_path: Path) -> None:
+def test_a_folder_at_a_files_name_is_reported_and_old_files_stay(tmp_path: Path) -> None:
     robot, out = write(tmp_path, small()), tmp_path / "made"
     dh2sim("export", robot, "--out", out)
     (out / "small" / "scene.xml").unlink()
@@ -112,7 +112,7 @@ def test_a_full_file_system_leaves_old_files_untouched(tmp_path: Path, own_mount
     assert contents(before) == contents(after)
 
 
-def test_a_file_system_that_is_only_read_is_told(tmp_path: Path, own_mounts: str) -> None:
+def test_a_file_system_that_is_only_read_is_reported(tmp_path: Path, own_mounts: str) -> None:
     out = tmp_path / "disk"
     out.mkdir()
     script = f"""{own_mounts} sh -c '

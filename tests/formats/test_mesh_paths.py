@@ -79,7 +79,7 @@ def test_given_folders_win_over_those_of_ros_and_these_over_folders_above_the_fi
     assert mesh_finder(home, [tmp_path / "given"])("package://arm/a.stl") == given
 
 
-def test_a_package_that_stands_in_two_places_is_searched_in_both(tmp_path: Path) -> None:
+def test_a_package_in_two_places_is_searched_in_both(tmp_path: Path) -> None:
     mesh(tmp_path / "given" / "arm" / "a.stl")
     found = mesh(tmp_path / "home" / "arm" / "b.stl")
     assert mesh_finder(tmp_path / "home", [tmp_path / "given"])("package://arm/b.stl") == found

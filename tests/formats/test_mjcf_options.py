@@ -34,7 +34,7 @@ def test_defaults_are_the_exported_file_byte_for_byte(name: str) -> None:
     assert list(option) == []
 
 
-def test_the_mass_of_the_base_changes_nothing_of_a_base_that_stands() -> None:
+def test_the_mass_of_the_base_changes_nothing_of_a_base_that_is_fixed() -> None:
     assert to_mjcf(with_base_mass(model("odd"))) == to_mjcf(model("odd"))
 
 
@@ -60,7 +60,7 @@ def test_the_timestep_reaches_mujoco_as_the_same_double(timestep: float) -> None
 
 
 @pytest.mark.parametrize("energy", [False, True])
-def test_energy_is_computed_if_wished(energy: bool) -> None:
+def test_energy_is_computed_on_request(energy: bool) -> None:
     compiled = mujoco.MjModel.from_xml_string(to_mjcf(model("stanford"), MjcfOptions(energy=energy)))
     data = mujoco.MjData(compiled)
     data.qvel[:] = 1.0
@@ -118,7 +118,7 @@ def test_any_robot_can_float(spec: RobotSpec) -> None:
     assert M[0, 0] == pytest.approx(robot.mass + robot.base.inertial.mass, rel=1e-9)  # type: ignore[union-attr]
 
 
-def test_keyframes_of_a_floating_base_stand_at_the_origin() -> None:
+def test_keyframes_of_a_floating_base_start_at_the_origin() -> None:
     compiled = floating("odd")
     home = compiled.key("home")
     assert home.qpos.tolist() == [0, 0, 0, 1, 0, 0, 0, 0.4, 0.2, -2.5, 0.3, 1.1]

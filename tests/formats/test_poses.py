@@ -37,7 +37,7 @@ def assert_poses_are_the_tables(built: RobotModel, q: Array) -> None:
 
 
 @pytest.mark.parametrize("name", [*NAMES, "odd"])
-def test_frames_of_both_formats_stand_where_the_table_says(name: str) -> None:
+def test_frames_of_both_formats_are_where_the_table_says(name: str) -> None:
     built = model(name)
     assert_poses_are_the_tables(built, in_limits(built, 100, seed=6))
 
@@ -45,21 +45,21 @@ def test_frames_of_both_formats_stand_where_the_table_says(name: str) -> None:
 @pytest.mark.slow
 @settings(max_examples=80)
 @given(robots_with_joint_vectors(max_rows=12, must_move=False))
-def test_frames_of_any_robot_stand_where_the_table_says(drawn: tuple[RobotSpec, Array]) -> None:
+def test_frames_of_any_robot_are_where_the_table_says(drawn: tuple[RobotSpec, Array]) -> None:
     spec, q = drawn
     assert_poses_are_the_tables(build_model(spec), q)
 
 
 @settings(max_examples=20)
 @given(robot_specs(max_rows=12))
-def test_frames_of_any_robot_stand_where_the_table_says_within_all_limits(spec: RobotSpec) -> None:
+def test_frames_of_any_robot_are_where_the_table_says_within_all_limits(spec: RobotSpec) -> None:
     built = build_model(spec)
     assert_poses_are_the_tables(built, in_limits(built, 5, seed=9))
 
 
 @pytest.mark.parametrize("quarter", [1.57, 1.570796, 1.5707963, 1.57079633, 1.570796327, 1.5707963267949])
 @pytest.mark.parametrize("name", NAMES)
-def test_frames_stand_where_the_table_says_where_right_angles_are_rounded(name: str, quarter: float) -> None:
+def test_frames_are_where_the_table_says_where_right_angles_are_rounded(name: str, quarter: float) -> None:
     spec = robot(name)
     rows = tuple(dataclasses.replace(row, alpha=row.alpha * quarter / (math.pi / 2)) for row in spec.rows)
     built = build_model(dataclasses.replace(spec, rows=rows))
@@ -71,7 +71,7 @@ TINY = [1e-3, 1e-5, 1e-6, 3e-7, 1e-8, 1e-12, 1e-15, 5e-324]
 
 @pytest.mark.parametrize("tiny", TINY)
 @pytest.mark.parametrize("what", ["alpha", "a", "both", "beta", "tool", "base", "com"])
-def test_frames_that_are_nearly_others_stand_where_the_table_says(tiny: float, what: str) -> None:
+def test_frames_that_are_nearly_others_are_where_the_table_says(tiny: float, what: str) -> None:
     link = LinkSpec(com=read_only([tiny, 0, 0]), inertia=read_only(np.diag([0.1, 0.2, 0.25])), mass=1.0)
     row = Row(
         name="one",
@@ -104,7 +104,7 @@ def test_a_robot_of_one_row_works(kind: str, convention: str) -> None:
         assert_poses_are_the_tables(built, in_limits(built, 3, seed=11))
 
 
-def test_an_arm_of_nearly_parallel_axes_stands_where_the_table_says() -> None:
+def test_an_arm_of_nearly_parallel_axes_is_where_the_table_says() -> None:
     """A calibrated arm: Hayati rows where axes are parallel but for half a degree, a slide among them."""
     rows = (
         Row(name="waist", type=REVOLUTE, convention=STANDARD, alpha=-math.pi / 2 + 1e-3, d=0.6),

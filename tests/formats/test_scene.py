@@ -90,13 +90,13 @@ def lifted(height: float) -> RobotModel:
     return build_model(dataclasses.replace(ODD_ROBOT, base=base))
 
 
-def test_the_floor_is_at_zero_below_a_robot_that_stands_above_it() -> None:
+def test_the_floor_is_at_zero_below_a_robot_that_is_above_it() -> None:
     mj, _ = compiled(lifted(3.0))
     assert mj.geom("floor").pos[2] == 0.0
     assert "pedestal" not in [mj.geom(i).name for i in range(mj.ngeom)]
 
 
-def test_a_robot_that_hangs_lower_stands_on_a_pedestal_that_nothing_touches() -> None:
+def test_a_robot_that_reaches_lower_is_on_a_pedestal_that_nothing_touches() -> None:
     mj, _ = compiled(lifted(-1.0))
     floor, pedestal = mj.geom("floor"), mj.geom("pedestal")
     assert floor.pos[2] < -1.0

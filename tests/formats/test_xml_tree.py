@@ -173,7 +173,7 @@ def test_a_report_raises_every_problem_once_in_the_order_of_the_file() -> None:
     assert str(report.failure(root, "", "is worse")).startswith("a.xml:1:1: is worse\n")
 
 
-def test_of_very_many_problems_the_first_are_told_and_the_others_counted() -> None:
+def test_of_very_many_problems_the_first_are_reported_and_the_others_counted() -> None:
     root = parse("<a>" + "\n<b/>" * (MAX_PROBLEMS + 50) + "</a>")
     report = XmlReport("a.xml")
     for element in root.children:

@@ -61,7 +61,7 @@ def test_the_files_convention_is_taken_where_none_is_asked_for() -> None:
     assert import_axes(_read(ODD)).spec.convention is Convention.STANDARD
 
 
-def test_a_slide_without_a_point_stands_where_the_joint_before_it_does() -> None:
+def test_a_slide_without_a_point_is_where_the_joint_before_it_is() -> None:
     chain = serial_robot(_read(ODD)).chain
     assert chain.joints[1].T_parent_link.tolist() == np.eye(4).tolist()
 
@@ -78,8 +78,8 @@ def test_the_puma_560s_table_comes_out_of_its_axes_number_for_number() -> None:
         assert (one.xyz.tolist(), one.rpy.tolist()) == (other.xyz.tolist(), other.rpy.tolist())
 
 
-def test_an_explanation_stands_at_the_head_of_the_file_and_changes_nothing_else() -> None:
-    plain, told = import_axes(_read(ODD)).text, import_axes(_read(ODD), explain=True).text
-    assert told.endswith(plain)
-    assert all(line.startswith("#") for line in told.removesuffix(plain).splitlines())
-    assert "slide" in told.removesuffix(plain)
+def test_an_explanation_is_at_the_top_of_the_file_and_changes_nothing_else() -> None:
+    plain, explained = import_axes(_read(ODD)).text, import_axes(_read(ODD), explain=True).text
+    assert explained.endswith(plain)
+    assert all(line.startswith("#") for line in explained.removesuffix(plain).splitlines())
+    assert "slide" in explained.removesuffix(plain)

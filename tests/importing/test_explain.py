@@ -19,7 +19,7 @@ OPTIONS = ImportOptions(convention=STANDARD, angle=AngleUnit.DEG, length=LengthU
 COLUMN: Axis = (TURN, (0, 0, 0), UP)
 
 
-def told(imported: Imported) -> dict[str, str]:
+def explained(imported: Imported) -> dict[str, str]:
     """The paragraphs by their labels, each on one line; sliding joints' sentences together."""
     found: dict[str, str] = {"": ""}
     label = ""
@@ -102,10 +102,10 @@ def told(imported: Imported) -> dict[str, str]:
         ),
     ],
 )
-def test_every_case_is_told_with_its_numbers(axis: Axis, expected: str) -> None:
+def test_every_case_is_explained_with_its_numbers(axis: Axis, expected: str) -> None:
     x, y, z = axis[1]
     tip = (x, y, z + 0.1)
-    assert told(made_of(COLUMN, axis, tip=tip))["frame 1"] == expected
+    assert explained(made_of(COLUMN, axis, tip=tip))["frame 1"] == expected
 
 
 @pytest.mark.parametrize(
@@ -124,9 +124,9 @@ def test_every_case_is_told_with_its_numbers(axis: Axis, expected: str) -> None:
         ),
     ],
 )
-def test_modified_frames_stand_at_the_near_end(axis: Axis, expected: str) -> None:
+def test_modified_frames_are_at_the_near_end(axis: Axis, expected: str) -> None:
     imported = made_of(COLUMN, axis, tip=axis[1], convention=MODIFIED)
-    assert told(imported)["frame 1"] == expected
+    assert explained(imported)["frame 1"] == expected
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_modified_frames_stand_at_the_near_end(axis: Axis, expected: str) -> Non
 def test_a_free_normal_is_the_one_without_an_offset(convention: Convention, expected: str) -> None:
     elbow, wrist = (TURN, (0.1, 0, 0.4), UP), (TURN, (0.3, 0, 0.7), UP)
     imported = made_of(COLUMN, elbow, wrist, tip=(0.3, 0, 0.7), convention=convention)
-    assert told(imported)["frame 2"] == expected
+    assert explained(imported)["frame 2"] == expected
 
 
 @pytest.mark.parametrize(
@@ -200,9 +200,11 @@ def test_a_free_normal_is_the_one_without_an_offset(convention: Convention, expe
         ),
     ],
 )
-def test_the_first_frame_is_told(first: Axis, second: Axis | None, convention: Convention, expected: str) -> None:
+def test_the_first_frame_is_explained(
+    first: Axis, second: Axis | None, convention: Convention, expected: str
+) -> None:
     axes = [first] if second is None else [first, second]
-    assert told(made_of(*axes, tip=axes[-1][1], convention=convention))["frame 0"] == expected
+    assert explained(made_of(*axes, tip=axes[-1][1], convention=convention))["frame 0"] == expected
 
 
 @pytest.mark.parametrize(
@@ -259,13 +261,13 @@ def test_the_first_frame_is_told(first: Axis, second: Axis | None, convention: C
         ),
     ],
 )
-def test_the_last_frame_of_a_robot_of_one_joint_is_told(
+def test_the_last_frame_of_a_robot_of_one_joint_is_explained(
     tip: tuple[float, ...], rpy: tuple[float, ...], convention: Convention, expected: str
 ) -> None:
-    assert told(made_of(COLUMN, tip=tip, rpy=rpy, convention=convention))["frame 1"] == expected
+    assert explained(made_of(COLUMN, tip=tip, rpy=rpy, convention=convention))["frame 1"] == expected
 
 
-def test_sliding_joints_are_told_where_their_axes_were_put() -> None:
+def test_where_the_axes_of_sliding_joints_were_put_is_explained() -> None:
     first = made_of(
         (SLIDE, (0.1, 0.2, 0), X),
         (TURN, (0.1, 0.2, 0), X),
@@ -283,11 +285,11 @@ def test_sliding_joints_are_told_where_their_axes_were_put() -> None:
         tip=(0.3, 0.2, 0.1),
         convention=MODIFIED,
     )
-    assert told(first)["sliding"] == (
+    assert explained(first)["sliding"] == (
         "Of z0, joint 1 needs the direction only. It is put on z1, which is parallel to it. Of z2, joint 3 needs "
         "the direction only. It is put on z1, which is parallel to it."
     )
-    assert told(second)["sliding"] == (
+    assert explained(second)["sliding"] == (
         "Of z1, joint 1 needs the direction only. It is put through the origin of base_link. Of z3, joint 3 needs "
         "the direction only. It is put where it meets both z2 and z4: a2 and a3 are zero. Of z5, joint 5 needs "
         "the direction only. It is put where it meets both z4 and z6: a4 and a5 are zero. Of z6, joint 6 needs "
@@ -295,7 +297,7 @@ def test_sliding_joints_are_told_where_their_axes_were_put() -> None:
     )
 
 
-def test_axes_are_told_with_names_that_say_something_and_with_how_they_miss_an_axis() -> None:
+def test_axes_are_explained_with_telling_names_and_with_how_they_miss_an_axis() -> None:
     imported = made_of(
         COLUMN,
         (SLIDE, (0, 0, 0), (0, 1e-3, -1)),
@@ -303,12 +305,12 @@ def test_axes_are_told_with_names_that_say_something_and_with_how_they_miss_an_a
         tip=(0, 0, 0),
         names=("joint_1", "lift", "wrist_roll"),
     )
-    assert told(imported)["z axes"] == (
+    assert explained(imported)["z axes"] == (
         "z0 along +z, z1 along -z but for 0.057 degrees (lift, sliding), z2 along (0.6, 0.8, 0) (wrist_roll)."
     )
 
 
-def test_a_modified_table_with_a_hayati_row_tells_both_conventions() -> None:
+def test_a_modified_table_with_a_hayati_row_explains_both_conventions() -> None:
     imported = made_of(
         COLUMN,
         (TURN, (0.4, 0, 0.1), (1e-7, 0, 1)),
@@ -316,7 +318,7 @@ def test_a_modified_table_with_a_hayati_row_tells_both_conventions() -> None:
         tip=(0.4, 0.2, 0.3),
         convention=MODIFIED,
     )
-    text = told(imported)
+    text = explained(imported)
     assert text[""] == (
         "Frames of sample. Row 1 ends with the link part, as Hayati's row 1 has to: z(i-1) is the axis of joint "
         "i, x(i) lies along the common normal from z(i-1) to z(i). The rows behind are modified ones: z(i) is the "
@@ -331,10 +333,10 @@ def test_a_modified_table_with_a_hayati_row_tells_both_conventions() -> None:
     )
 
 
-def test_the_residual_is_told() -> None:
+def test_the_residual_is_explained() -> None:
     imported = made_of(COLUMN, tip=(0, 0, 0.1))
     assert imported.residual is not None
-    assert told(imported)["residual"] == (
+    assert explained(imported)["residual"] == (
         "At 1000 random configurations all joint axes and tool0 differ from the source's by at most "
         f"{imported.residual.position:.1e} m and {imported.residual.rotation:.1e} rad."
     )
@@ -342,11 +344,11 @@ def test_the_residual_is_told() -> None:
 
 @pytest.mark.parametrize("convention", [STANDARD, MODIFIED])
 @pytest.mark.parametrize("seed", range(40))
-def test_what_is_told_of_any_robot_is_true_of_its_axes_and_rows(seed: int, convention: Convention) -> None:
+def test_what_is_explained_of_any_robot_is_true_of_its_axes_and_rows(seed: int, convention: Convention) -> None:
     imported = made_of(*random_axes(seed), tip=(0.3, -0.2, 0.7), convention=convention)
     lines = explanation(imported)
     assert all(len(line) <= 98 and line.isascii() and line == line.rstrip() for line in lines)
-    text = told(imported)
+    text = explained(imported)
     axes = _axes(imported)
     shift = 0 if convention is STANDARD else 1  # of the index of a joint's z
     n = len(axes)
@@ -424,6 +426,8 @@ def test_a_robot_made_of_a_table_has_nothing_to_explain() -> None:
 
 
 def test_the_random_robots_meet_every_case_but_the_nearly_parallel_one() -> None:
-    words = " ".join(" ".join(told(made_of(*random_axes(seed), tip=(0.3, -0.2, 0.7))).values()) for seed in range(40))
+    words = " ".join(
+        " ".join(explained(made_of(*random_axes(seed), tip=(0.3, -0.2, 0.7))).values()) for seed in range(40)
+    )
     for case in ("are one line", "opposite ways", " parallel, ", " antiparallel, ", "intersect at", "skew, at"):
         assert case in words

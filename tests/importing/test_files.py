@@ -141,7 +141,7 @@ def test_an_mjcf_is_not_read_from_standard_input() -> None:
     )
 
 
-def test_a_missing_file_and_a_folder_are_told(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_folder_are_reported(tmp_path: Path) -> None:
     for path, why in ((tmp_path / "no.urdf", "No such file or directory"), (tmp_path, "Is a directory")):
         with pytest.raises(Dh2simError) as caught:
             import_robot(path)

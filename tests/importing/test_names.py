@@ -25,7 +25,7 @@ def test_names_that_are_allowed_stay() -> None:
         ("x" * 200, "x" * 92),
     ],
 )
-def test_a_name_that_is_not_allowed_is_changed_and_told(name: str, changed: str) -> None:
+def test_a_name_that_is_not_allowed_is_changed_and_noted(name: str, changed: str) -> None:
     names, notes = joint_names([name])
     assert names == (changed,)
     assert len(notes) == 1

@@ -76,7 +76,7 @@ def test_other_endings_are_refused(name: str, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_is_not_there_is_reported(tmp_path: Path) -> None:
     out = tmp_path / "nowhere" / "a.svg"
     with pytest.raises(OutputError) as caught:
         draw_assignment(puma(), out)
@@ -144,7 +144,7 @@ def test_frames_in_one_place_share_their_arrows() -> None:
     assert len(scene.origins) == 4
 
 
-def test_joints_in_line_share_an_axis_in_the_order_in_which_they_stand() -> None:
+def test_joints_in_line_share_an_axis_in_their_order() -> None:
     scene = make_scene(puma())
     assert [axis.joints for axis in scene.axes] == [(1,), (2,), (3,), (4, 6), (5,)]
     [shared] = [axis for axis in scene.axes if axis.joints == (4, 6)]
@@ -153,7 +153,7 @@ def test_joints_in_line_share_an_axis_in_the_order_in_which_they_stand() -> None
     np.testing.assert_allclose(shared.end, [0.4521, -0.15005, 0.4318], atol=1e-12)
 
 
-def test_joints_in_line_that_turn_against_each_other_are_told_apart() -> None:
+def test_joints_in_line_that_turn_against_each_other_are_distinguished() -> None:
     scene = make_scene(made_of((TURN, (0, 0, 0), UP), (TURN, (0, 0, 0.3), (0, 0, -1)), tip=(0, 0, 0.5)))
     [axis] = scene.axes
     assert (axis.joints, axis.senses) == ((1, 2), (1, -1))

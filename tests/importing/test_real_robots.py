@@ -1,4 +1,4 @@
-"""Robots that nobody of this project wrote, out of packages that may be installed: from file to table and back.
+"""Third-party robots, from packages that may be installed: from file to table and back.
 
 What stands against the import reads the same files by itself: pinocchio and MuJoCo.
 """
@@ -120,7 +120,7 @@ def weights(path: Path, base: str, joints: list[str], q: Array) -> list[Any]:
 
 
 @every_urdf
-def test_every_link_weighs_what_it_weighs_in_the_file_and_where_it_stands_there(arm: Arm, tmp_path: Path) -> None:
+def test_every_link_weighs_what_it_weighs_in_the_file_and_where_it_is_there(arm: Arm, tmp_path: Path) -> None:
     rows = imported_arm(arm).spec.rows
     q = joint_vectors(imported_arm(arm).spec, 1)[0]
     expected = weights(file_of(arm), arm.base, file_joints(arm), q)
@@ -227,11 +227,11 @@ def test_the_xarm7_has_the_table_of_ufactory() -> None:
     assert_table(imported_arm(XARM7).spec, expected)
 
 
-def test_nearly_parallel_axes_are_told_and_vanish_with_a_tolerance_that_has_room_for_them() -> None:
+def test_nearly_parallel_axes_are_noted_and_vanish_with_a_tolerance_that_has_room_for_them() -> None:
     strict, loose = (arm for arm in ARMS if arm.robot == "Lynxmotion AL5D")
     assert (strict.tolerance, loose.tolerance) == (TOLERANCE, 1e-7)
-    told = [note for note in imported_arm(strict).notes if "nearly parallel" in note]
-    assert [note.partition(",")[0] for note in told] == [
+    parallel = [note for note in imported_arm(strict).notes if "nearly parallel" in note]
+    assert [note.partition(",")[0] for note in parallel] == [
         "The axes of j2 and j3 are nearly parallel",
         "The axes of j3 and j4 are nearly parallel",
     ]

@@ -10,7 +10,7 @@ from dh2sim.robot.spec import Convention
 ROUNDED = b"theta,d (m),a (m),alpha (rad)\nq1,0.4,0,-1.571\nq2,0.15000004,0.3,0.5\n"
 
 
-def test_numbers_stay_as_printed_and_what_was_assumed_is_told_in_sentences() -> None:
+def test_numbers_stay_as_printed_and_what_was_assumed_is_noted_in_sentences() -> None:
     imported = import_table(ROUNDED, file="t.csv", convention=Convention.STANDARD)
     assert [row.alpha for row in imported.spec.rows] == [-1.571, 0.5]
     assert imported.residual is None

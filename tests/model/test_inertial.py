@@ -125,7 +125,7 @@ def test_mujoco_reads_links_that_are_flat() -> None:
             mujoco.MjModel.from_xml_string(text)
 
 
-def test_a_given_inertia_is_not_changed_by_what_stands_behind_it() -> None:
+def test_a_given_inertia_is_not_changed_by_what_follows_it() -> None:
     spec = robot(LinkSpec(mass=MASS, com=COM, inertia=INERTIA))
     longer = dataclasses.replace(spec, rows=(spec.rows[0], dataclasses.replace(spec.rows[1], d=3.0)))
     one, other = (build_model(one).links[0].inertial for one in (spec, longer))

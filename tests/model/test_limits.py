@@ -108,7 +108,7 @@ def test_nothing_of_any_robot_is_farther_away_than_its_reach(spec: RobotSpec) ->
     assert farthest(built, 50) <= built.reach * (1 + 1e-12) + 1e-15
 
 
-def test_the_reach_counts_dh_frames_that_stand_farther_out_than_their_neighbours() -> None:
+def test_the_reach_counts_dh_frames_that_are_farther_out_than_their_neighbours() -> None:
     out = Row(name="out", type=REVOLUTE, convention=STANDARD, a=1.0)
     back = Row(name="back", type=REVOLUTE, convention=MODIFIED, a=-1.0)
     assert build_model(RobotSpec(name="r", rows=(out, back))).reach == 1.0

@@ -63,7 +63,7 @@ def test_a_base_that_floats_weighs_what_its_shapes_do(name: str) -> None:
     compiled = mujoco.MjModel.from_xml_string(to_mjcf(heavy, MjcfOptions(floating_base=True)))
     base = compiled.body("base_link")
     assert base.mass[0] == heavy.base.inertial.mass > 0.0
-    # MuJoCo weighs shapes by itself, where it is told their density instead
+    # MuJoCo computes the mass of shapes itself, given their density instead
     plain = to_mjcf(model(name)).replace('mass="0.0"', 'density="1000"')
     weighed = mujoco.MjModel.from_xml_string(plain)
     geoms = [i for i in range(weighed.ngeom) if weighed.geom_bodyid[i] == weighed.body("base_link").id]

@@ -63,7 +63,7 @@ def refusal(folder: Path, text: str) -> str:
         ),
     ],
 )
-def test_a_wrong_file_is_told_of_with_its_place(text: str, message: str, tmp_path: Path) -> None:
+def test_a_wrong_file_is_reported_with_its_place(text: str, message: str, tmp_path: Path) -> None:
     assert refusal(tmp_path, text) == message.replace("FOLDER", str(tmp_path))
 
 

@@ -82,7 +82,7 @@ def box_file(folder: Path) -> trimesh.Trimesh:
 
 @pytest.mark.parametrize("ref", ["", 'refpos="0.1 0.2 0.3" refquat="0.5 0.1 -0.7 0.2"'])
 @pytest.mark.parametrize("suffix", ["stl", "obj"])
-def test_a_mesh_stands_where_mujoco_shows_it(suffix: str, ref: str, tmp_path: Path) -> None:
+def test_a_mesh_is_where_mujoco_shows_it(suffix: str, ref: str, tmp_path: Path) -> None:
     mesh = box_file(tmp_path / "meshes")
     before = f"""<compiler meshdir="meshes"/><asset><mesh name="m" file="box.{suffix}" scale="2 2 2" {ref}/>
       <material name="red" rgba="0.8 0.1 0 1"/></asset>"""

@@ -62,7 +62,7 @@ def test_headings_of_index_i_minus_1_say_modified() -> None:
     assert found.notes == ("no unit of lengths is given: they were read in m",)
 
 
-def test_headings_of_index_i_throughout_are_read_as_standard_and_told() -> None:
+def test_headings_of_index_i_throughout_are_read_as_standard_and_noted() -> None:
     found = imported(INDEXED)
     assert found.spec.convention is Convention.STANDARD
     assert found.notes[-1] == (

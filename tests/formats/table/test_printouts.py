@@ -123,14 +123,14 @@ def test_limits_names_and_configurations_of_a_printout_are_read() -> None:
     assert (spec.name, spec.description, spec.source) == ("r", "Cobra600", "robot.txt, line 3")
 
 
-def test_a_configuration_outside_the_limits_is_left_out_and_told() -> None:
+def test_a_configuration_outside_the_limits_is_left_out_and_noted() -> None:
     found = imported(_printed("puma560"), "robot.txt")
     assert sorted(found.spec.configurations) == ["qr", "qs", "qz"]
     assert found.spec.configurations["qr"].tolist() == [0, math.radians(90), math.radians(-90), 0, 0, 0]
     assert "the configuration 'qn' was left out: '180°' is outside the limits of joint_3" in found.notes
 
 
-def test_a_base_that_the_toolbox_does_not_print_is_told() -> None:
+def test_a_base_that_the_toolbox_does_not_print_is_noted() -> None:
     assert "the printout names a base without its pose: it was left out" in imported(_printed("p8")).notes
 
 

@@ -139,7 +139,7 @@ def test_a_table_of_numbers_asks_for_its_convention() -> None:
     ]
 
 
-def test_the_stanford_arm_of_a_book_has_symbols_whose_values_stand_below_it() -> None:
+def test_the_stanford_arm_of_a_book_has_symbols_whose_values_are_below_it() -> None:
     q = (0.4, -0.8, 0.5, 1.2, 0.9, -0.3)
     rows = [
         standard(q[0], 0, 0, -H),

@@ -152,7 +152,7 @@ def test_tables_of_a_wrong_shape_are_refused() -> None:
     assert complaints(many, "t.csv") == ["t.csv:1:1: the table has 1001 rows; at most 1000 are allowed"]
 
 
-def test_what_stands_behind_a_table_between_separators_is_told() -> None:
+def test_text_after_a_table_between_separators_is_noted() -> None:
     found = imported("theta,d,a,alpha\nq1,0,1,0\n\nq2,0,1,0\nThe end.\n", "t.csv", **STANDARD)
     assert len(found.spec.rows) == 2
     assert found.notes[-1] == "the text after the table, from line 5, was not read as rows"

@@ -52,7 +52,7 @@ def test_rows_above_the_headings_are_no_part_of_the_table() -> None:
     assert (numbers(found.spec), found.notes) == ([(0, 0, 1, 0)], ())
 
 
-def test_a_fixed_row_is_told_and_has_no_actuator() -> None:
+def test_a_fixed_row_is_noted_and_has_no_actuator() -> None:
     found = imported(_rows("q1,0,1,0", "0.5,0,0,0", "0.5,1,0,0"), "t.csv", **STANDARD, angle=AngleUnit.RAD)
     assert [row.actuator.type for row in found.spec.rows] == [
         ActuatorType.POSITION,
@@ -90,7 +90,7 @@ def test_symbols_without_a_value_are_refused_all_at_once() -> None:
     ]
 
 
-def test_values_in_the_text_are_used_and_told() -> None:
+def test_values_in_the_text_are_used_and_noted() -> None:
     text = "# d1 = 40 cm, $a_{2}$ = 0.3; L = 200 mm\n" + _rows("θ1,d1,L,0", "θ2,0,-a_2/2,0")
     found = imported(text, "t.csv", **STANDARD)
     assert numbers(found.spec) == [(0, 0.4, 0.2, 0), (0, 0, -0.15, 0)]

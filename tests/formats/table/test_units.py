@@ -68,7 +68,7 @@ def test_options_say_the_unit() -> None:
     assert (found.units.angle, found.units.length, found.notes) == (DEG, MM, ())
 
 
-def test_headings_say_the_unit_and_an_option_goes_before_them_and_is_told() -> None:
+def test_headings_say_the_unit_and_an_option_goes_before_them_and_is_noted() -> None:
     text = _table("90", "400", alpha_heading="α (deg)", a_heading="a [mm]")
     assert numbers(imported(text, **STANDARD).spec) == [(0, 0, 0.4, H)]
     found = imported(text, **STANDARD, angle=RAD, length=M)
@@ -79,7 +79,7 @@ def test_headings_say_the_unit_and_an_option_goes_before_them_and_is_told() -> N
     )
 
 
-def test_one_heading_speaks_for_the_others_and_is_told() -> None:
+def test_one_heading_counts_for_the_others_and_is_noted() -> None:
     found = imported(_table("90", "400", alpha_heading="α (deg)", a_heading="a [mm]", theta="θ1 + 45"), **STANDARD)
     assert numbers(found.spec) == [(math.pi / 4, 0, 0.4, H)]
     assert found.notes == ("an angle without a unit was read in deg, the unit of other columns",)
@@ -123,7 +123,7 @@ def test_a_unit_of_the_wrong_kind_is_refused() -> None:
     ]
 
 
-def test_a_decimal_comma_and_grouped_thousands_are_told_apart_or_refused() -> None:
+def test_a_decimal_comma_and_grouped_thousands_are_distinguished_or_refused() -> None:
     head = "theta;d;a;alpha\n"
     spec = imported(head + "q1;0,089;-0,425;0\n", "t.csv", **STANDARD).spec
     assert numbers(spec) == [(0, 0.089, -0.425, 0)]

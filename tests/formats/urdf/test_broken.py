@@ -157,14 +157,14 @@ def outcome(data: bytes, tip: str | None, rng: Rng) -> str:
     try:
         found = read_urdf(data, file="bad.urdf", base=base, tip=tip, find_mesh=find_mesh)
     except ImportedFileError as error:
-        told = error
+        refusal = error
     else:
         assert_sound(found)
         return "read"
     lines = len(re.split(b"\r\n|\r|\n", data))
-    assert told.problems
-    assert all(line.startswith("bad.urdf:") for line in str(told).split("\n"))
-    assert all(1 <= problem.line <= lines and problem.column >= 1 for problem in told.problems)
+    assert refusal.problems
+    assert all(line.startswith("bad.urdf:") for line in str(refusal).split("\n"))
+    assert all(1 <= problem.line <= lines and problem.column >= 1 for problem in refusal.problems)
     return "refused"
 
 

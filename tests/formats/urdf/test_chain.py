@@ -149,7 +149,7 @@ def test_where_several_frames_are_fixed_to_the_last_link_that_link_is_the_tip_an
     assert not any("The tip is" in note for note in read(text, tip="camera").notes)
 
 
-def test_a_base_and_a_tip_that_are_not_there_are_told_with_what_is() -> None:
+def test_a_base_and_a_tip_that_do_not_exist_are_reported_with_those_that_do() -> None:
     text = robot(links("l0", "l1", "l2", "l3"), *THREE)
     known = "Its links: 'l0', 'l1', 'l2', 'l3'"
     assert refusal(text, base="l9", tip="L3") == (
@@ -177,7 +177,7 @@ def test_an_arm_without_a_joint_that_moves_is_refused() -> None:
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar"])
-def test_a_joint_of_several_coordinates_is_refused_on_the_arm_and_told_off_it(kind: str) -> None:
+def test_a_joint_of_several_coordinates_is_refused_on_the_arm_and_noted_off_it(kind: str) -> None:
     on = robot(links("world", "l0", "l1", "l2", "l3"), joint("free", "world", "l0", kind), *THREE)
     assert refusal(on) == (
         f"arm.urdf:3:1: joint[free].type: a {kind} joint has no row in a table; "
@@ -220,7 +220,7 @@ def test_broken_numbers_off_the_arm_are_noted_and_harm_nothing() -> None:
     ]
 
 
-def test_what_is_above_another_base_is_told_and_gravity_turns_with_the_base() -> None:
+def test_what_is_above_another_base_is_noted_and_gravity_turns_with_the_base() -> None:
     mount = '<origin rpy="0 1.5707963267948966 0"/>'
     text = robot(
         links("world", "torso", "l0", "l1", "l2", "l3"),
@@ -239,19 +239,19 @@ def test_what_is_above_another_base_is_told_and_gravity_turns_with_the_base() ->
     assert not any("Gravity" in note for note in straight.notes)
 
 
-def test_of_many_branches_the_first_are_told_one_by_one() -> None:
+def test_of_many_branches_the_first_are_noted_one_by_one() -> None:
     text = robot(
         links("l0", "l1", "l2", "l3", *(f"b{i}" for i in range(25))),
         *THREE,
         *(joint(f"jb{i}", "l1", f"b{i}") for i in range(25)),
     )
-    told = [note for note in read(text, tip="l3").notes if note.startswith("Left out")]
-    assert len(told) == 21
-    assert told[19] == "Left out with joint 'jb19' (revolute) on 'l1': link 'b19'."
-    assert told[20] == "Left out: 5 more branches."
+    left_out = [note for note in read(text, tip="l3").notes if note.startswith("Left out")]
+    assert len(left_out) == 21
+    assert left_out[19] == "Left out with joint 'jb19' (revolute) on 'l1': link 'b19'."
+    assert left_out[20] == "Left out: 5 more branches."
 
 
-def test_elements_that_have_no_place_are_told_in_one_sentence() -> None:
+def test_elements_that_have_no_place_are_noted_in_one_sentence() -> None:
     text = robot(
         links("l0", "l1", "l2", "l3"),
         *THREE[:2],

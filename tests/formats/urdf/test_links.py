@@ -63,15 +63,15 @@ def values(limits: Limits) -> tuple[tuple[float, float] | None, float | None, fl
 def test_limits_that_limit_are_read_and_others_noted(
     limit: str, expected: tuple[object, object, object], notes: tuple[str, ...], kind: str
 ) -> None:
-    limits, told = one_joint(limit, kind)
+    limits, found = one_joint(limit, kind)
     assert values(limits) == expected
-    assert told == notes
+    assert found == notes
 
 
 def test_a_continuous_joint_has_no_position_limits() -> None:
-    limits, told = one_joint('<limit lower="-3" upper="3" velocity="2" effort="1"/>', "continuous")
+    limits, found = one_joint('<limit lower="-3" upper="3" velocity="2" effort="1"/>', "continuous")
     assert values(limits) == (None, 2.0, 1.0)
-    assert told == ("Position limits of continuous joints are left out: 'j' (-3.0, 3.0).",)
+    assert found == ("Position limits of continuous joints are left out: 'j' (-3.0, 3.0).",)
     assert one_joint('<limit velocity="2" effort="1" lower="0" upper="0"/>', "continuous")[1] == ()
     assert one_joint(" ", "continuous")[1] == ()
 

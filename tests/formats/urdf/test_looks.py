@@ -82,7 +82,7 @@ RED, BLUE = (1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 0.5)
 NAMED = '<material name="red"><color rgba="1 0 0 1"/></material>'
 
 
-def test_colours_are_read_where_they_stand_or_by_their_name() -> None:
+def test_colours_are_read_in_place_or_by_their_name() -> None:
     own = '<material name=""><color rgba="0 0 1 0.5"/></material>'
     by_name = '<material name="red"/>'
     assert looking(mesh("found/a.stl", own)).links[0].color == BLUE
@@ -108,7 +108,7 @@ def test_looks_that_cannot_be_read_are_left_out_and_noted() -> None:
     ]
 
 
-def test_collision_shapes_are_told_once() -> None:
+def test_collision_shapes_are_noted_once() -> None:
     text = robot(
         '<link name="a"><collision/></link>', '<link name="b"><collision/><collision/></link>', joint("j", "a", "b")
     )

@@ -115,7 +115,7 @@ def test_what_is_no_urdf_is_named() -> None:
     assert refusal("joints: []") == ["arm.urdf:1:1: not well-formed XML: syntax error"]
 
 
-def test_every_error_in_the_structure_is_told_with_its_place() -> None:
+def test_every_error_in_the_structure_is_reported_with_its_place() -> None:
     text = robot(
         links("base", "elbow", "hand"),
         "<link/>",
@@ -168,7 +168,7 @@ def test_loops_and_several_roots_are_refused() -> None:
     ]
 
 
-def test_every_wrong_number_of_the_arm_is_told_with_its_place() -> None:
+def test_every_wrong_number_of_the_arm_is_reported_with_its_place() -> None:
     text = robot(
         links("a", "b", "c", "d"),
         '<joint name="ab" type="revolute"><parent link="a"/><child link="b"/>',
