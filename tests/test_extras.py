@@ -23,11 +23,23 @@ MODULES = {
     "plot": {"matplotlib", "xarray"},
     "video": {"PIL", "imageio_ffmpeg", "xarray"},
     "data": {"xarray", "pyarrow", "h5netcdf", "h5py"},
-    "engines": {"yourdfpy", "pinocchio"},
+    "engines": {"yourdfpy"},
 }
 """What is imported of each extra's libraries."""
-BROUGHT = {"pandas", "scipy", "qpsolvers", "daqp", "websockets", "requests", "imageio", "lxml", "shapely", "embreex"}
-"""Some of what they bring along."""
+BROUGHT = {
+    "pinocchio",
+    "pandas",
+    "scipy",
+    "qpsolvers",
+    "daqp",
+    "websockets",
+    "requests",
+    "imageio",
+    "lxml",
+    "shapely",
+    "embreex",
+}
+"""Some of what they bring along, and an engine that comes with none of them."""
 OPTIONAL = {*BROUGHT, *(module for modules in MODULES.values() for module in modules)}
 AXES = """\
 name: two_joints

@@ -161,14 +161,14 @@ def frames(
     wanted = choice(convention, Convention, "--convention", without=(Convention.HAYATI,))
     allowed = tolerance_of(tolerance)
     if picture is not None:
-        _require_picture_ending(picture)
+        _require_frame_figure(picture)
     require_free(out, force=force)
     spec = read_axes(read_file(Path(axes)), file=axes, directory=Path(axes).parent)
     drawing = picture
     if drawing is None and explain:
         drawing = (out.parent if out is not None else Path()) / f"{spec.name}-frames.svg"
         try:
-            _require_picture_ending(drawing)
+            _require_frame_figure(drawing)
         except MissingExtraError as error:
             drawing = None
             print(f"dh2sim: no picture is drawn: {error}", file=sys.stderr)
@@ -184,10 +184,10 @@ def frames(
             print(f"{drawing}: axes and frames", file=sys.stderr if out is None else sys.stdout)
 
 
-def _require_picture_ending(path: Path) -> None:
-    from dh2sim.draw.frame_figure.figure import require_picture_ending
+def _require_frame_figure(path: Path) -> None:
+    from dh2sim.draw.frame_figure.figure import require_frame_figure
 
-    require_picture_ending(path)
+    require_frame_figure(path)
 
 
 def convert(

@@ -1,4 +1,4 @@
-"""Where a picture is taken from: far enough away that nothing of a motion is cut off."""
+"""The camera of a picture: far enough away that nothing of a motion is cut off."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from dh2sim.draw.motion import Motion
-from dh2sim.draw.offscreen import import_mujoco
 from dh2sim.errors import PictureError
 from dh2sim.formats.mjcf.scene import FIELD_OF_VIEW, VIEW_DIRECTION
 from dh2sim.messages import did_you_mean, listed, shown
@@ -18,35 +18,35 @@ from dh2sim.typing import Array
 MARGIN = 0.07
 """Share of the picture's width and height that stays free on each side."""
 FURTHEST = 20.0
-"""What is further from the scene's centre than this many times its extent is not framed: the robot has come apart."""
+"""Extents of the scene: what is further from its centre is not framed, since the robot has come apart."""
 FOLLOWED = 4.0
-"""A camera goes along with a floating base that goes further than this many times the scene's extent."""
+"""Extents of the scene: a camera follows a floating base that goes further."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class View:
-    """A choice of camera: one of the model's by name, or a direction; the overview's if nothing is given."""
+class CameraChoice:
+    """A camera of the model by name, or a direction in which to look; by default that of the scene's overview."""
 
     name: str | None = None
     azimuth: float | None = None
-    """Of the direction in which the camera looks, degrees, from x to y."""
+    """Azimuth of the direction in which the camera looks, degrees, from x to y."""
     elevation: float | None = None
-    """Likewise, above the horizon: negative looks down."""
+    """Elevation of that direction, degrees; negative looks down."""
     distance: float | None = None
-    """From the middle of what is shown, m; None: as near as shows everything."""
+    """From the middle of what is shown, m; None: the nearest from which everything is seen."""
 
 
-def parse_view(text: str | None) -> View:
+def parse_camera(text: str | None) -> CameraChoice:
     """Read ``NAME`` or ``azimuth,elevation[,distance]``, degrees and m.
 
     Raises:
-        PictureError: numbers that cannot be.
+        PictureError: they are not numbers, or out of range.
     """
     if text is None:
-        return View()
+        return CameraChoice()
     parts = text.split(",")
     if len(parts) == 1:
-        return View(name=text)
+        return CameraChoice(name=text)
     allowed = "allowed: a camera's name, or azimuth,elevation[,distance] in degrees and m, such as 120,-20"
     try:
         numbers = [float(part) for part in parts]
@@ -58,14 +58,14 @@ def parse_view(text: str | None) -> View:
         raise PictureError(f"camera {shown(text)}: the elevation must be from -90 to 90 degrees")
     if len(numbers) == 3 and not 0.0 < numbers[2] <= 1e6:
         raise PictureError(f"camera {shown(text)}: the distance must be above 0, and at most a million metres")
-    return View(azimuth=numbers[0], elevation=numbers[1], distance=numbers[2] if len(numbers) == 3 else None)
+    return CameraChoice(azimuth=numbers[0], elevation=numbers[1], distance=numbers[2] if len(numbers) == 3 else None)
 
 
-def make_camera(view: View, model: Any, points: Array, aspect: float) -> Any:
-    """Return a ``mujoco.MjvCamera``; the model's field of view and far end of sight are adapted to it.
+def make_camera(choice: CameraChoice, model: Any, points: Array, aspect: float) -> Any:
+    """Return a ``mujoco.MjvCamera``; the model's field of view and far clipping plane are adapted to it.
 
     Args:
-        view: the choice.
+        choice: a name, or a direction.
         model: ``mujoco.MjModel``, changed in place.
         points: that must be in the picture, shape (count, 3), m.
         aspect: width of the picture over its height.
@@ -73,25 +73,24 @@ def make_camera(view: View, model: Any, points: Array, aspect: float) -> Any:
     Raises:
         PictureError: the model has no camera of that name.
     """
-    mujoco = import_mujoco()
     camera = mujoco.MjvCamera()
-    if view.name is not None:
+    if choice.name is not None:
         names = [model.camera(i).name for i in range(model.ncam)]
-        if view.name not in names:
-            hint = did_you_mean(view.name, names)
+        if choice.name not in names:
+            hint = did_you_mean(choice.name, names)
             raise PictureError(
-                f"there is no camera {shown(view.name)}.{hint} Cameras: {listed(names)}; or azimuth,elevation"
+                f"unknown camera {shown(choice.name)}.{hint} Cameras: {listed(names)}; or azimuth,elevation"
                 "[,distance] in degrees and m, such as 120,-20"
             )
         camera.type = mujoco.mjtCamera.mjCAMERA_FIXED.value
-        camera.fixedcamid = names.index(view.name)
+        camera.fixedcamid = names.index(choice.name)
         return camera
     x, y, z = (-component for component in VIEW_DIRECTION)
-    azimuth = math.degrees(math.atan2(y, x)) if view.azimuth is None else view.azimuth
-    elevation = math.degrees(math.atan2(z, math.hypot(x, y))) if view.elevation is None else view.elevation
+    azimuth = math.degrees(math.atan2(y, x)) if choice.azimuth is None else choice.azimuth
+    elevation = math.degrees(math.atan2(z, math.hypot(x, y))) if choice.elevation is None else choice.elevation
     model.vis.global_.fovy = FIELD_OF_VIEW
     lookat, distance = fit(points, azimuth, elevation, aspect)
-    distance = distance if view.distance is None else view.distance
+    distance = distance if choice.distance is None else choice.distance
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE.value
     camera.azimuth, camera.elevation, camera.distance = azimuth, elevation, distance
     camera.lookat[:] = lookat
@@ -104,12 +103,12 @@ def fit(points: Array, azimuth: float, elevation: float, aspect: float) -> tuple
     """Return where to look, shape (3,), and from how far, so that all points are in the picture and fill it.
 
     A point at right r, up u, back b is seen by a camera at (R, U, B) if |r - R| <= h (B - b) and
-    |u - U| <= v (B - b), with h and v the tangents of half the fields of view. So r + h b <= R + h B and
+    |u - U| <= v (B - b), with h and v the tangents of half the fields of choice. So r + h b <= R + h B and
     -r + h b <= -R + h B for all points: the sum of both greatest left sides is at most 2 h B. Likewise for u.
 
     Args:
         points: shape (count, 3), m.
-        azimuth: of the direction of sight, degrees.
+        azimuth: of the direction in which the camera looks, degrees.
         elevation: likewise.
         aspect: width over height.
     """
@@ -129,20 +128,19 @@ def fit(points: Array, azimuth: float, elevation: float, aspect: float) -> tuple
     return place - middle * forward, back - middle
 
 
-def goes_along(view: View, motion: Motion) -> bool:
-    """Whether the camera goes along with the base: where it floats far away, the robot would be too small to see."""
+def follows_base(choice: CameraChoice, motion: Motion) -> bool:
+    """Whether the camera follows the base: where that floats far away, the robot would be too small to see."""
     furthest = float(np.abs(motion.travel).max())
-    return view.name is None and furthest > FOLLOWED * motion.model.stat.extent
+    return choice.name is None and furthest > FOLLOWED * motion.model.stat.extent
 
 
-def extreme_points(motion: Motion, *, along: bool = False) -> Array:
+def extreme_points(motion: Motion, *, follows: bool = False) -> Array:
     """Return corners of boxes around all parts of the robot in all its positions, shape (count, 3), m.
 
     Args:
         motion: what moves.
-        along: as seen by somebody who goes along with the base.
+        follows: whether the camera follows the base.
     """
-    mujoco = import_mujoco()
     model = motion.model
     data = mujoco.MjData(model)
     planes = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE.value
@@ -150,7 +148,7 @@ def extreme_points(motion: Motion, *, along: bool = False) -> Array:
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
     boxes = model.geom_aabb[geoms]
     corners = boxes[:, None, :3] + signs * boxes[:, None, 3:]
-    travel = motion.travel if along else np.zeros((len(motion.time), 3))
+    travel = motion.travel if follows else np.zeros((len(motion.time), 3))
     found = []
     for number in motion.sampled():
         motion.place(data, number)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import mujoco
 import numpy as np
 
-from dh2sim.draw.offscreen import import_mujoco
 from dh2sim.errors import PictureError
 from dh2sim.messages import did_you_mean, listed, shown
 from dh2sim.typing import Array, read_only
@@ -34,7 +34,7 @@ class Motion:
     @property
     def floats(self) -> bool:
         """Whether base_link floats: the first seven positions are its pose."""
-        free = import_mujoco().mjtJoint.mjJNT_FREE.value
+        free = mujoco.mjtJoint.mjJNT_FREE.value
         return bool(self.model.njnt > 0 and self.model.jnt_type[0] == free)
 
     @property
@@ -44,7 +44,6 @@ class Motion:
 
     def place(self, data: Any, number: int) -> None:
         """Put the robot, its cameras and lights where they are in a position."""
-        mujoco = import_mujoco()
         data.qpos[:] = self.qpos[number]
         mujoco.mj_kinematics(self.model, data)
         mujoco.mj_comPos(self.model, data)
@@ -84,7 +83,6 @@ def motion_of_run(rollout: RolloutData) -> Motion:
     Raises:
         PictureError: positions were not recorded, or the model in the run's attributes cannot be read.
     """
-    mujoco = import_mujoco()
     rollout.require("qpos", what="a film")
     attributes = rollout.attributes
     try:
@@ -116,7 +114,6 @@ def motion_of_robot(robot: RobotModel, configuration: str | None = None) -> Moti
     from dh2sim.formats.mjcf.scene import to_scene
     from dh2sim.formats.mjcf.write import to_mjcf
 
-    mujoco = import_mujoco()
     configurations = robot.spec.configurations
     if configuration is None:
         q = robot.home

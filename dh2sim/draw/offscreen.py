@@ -1,160 +1,131 @@
-"""Something to draw with where there is no screen: OpenGL by way of EGL or OSMesa, whichever works.
+"""MuJoCo's renderer where there is no screen: OpenGL by way of EGL or OSMesa, whichever works.
 
-MuJoCo takes its choice from MUJOCO_GL when it is imported, without trying whether it works. Here each is tried for
-real, at the first picture, whether MuJoCo is imported already or not.
+MuJoCo takes the one that MUJOCO_GL names, without trying whether it works, and PyOpenGL stays with its first choice
+for the life of a process. So each is tried in a process of its own before it is chosen.
 """
 
 from __future__ import annotations
 
 import importlib
 import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import ModuleType
+from functools import cache
 from typing import Any
+
+import mujoco
+from mujoco.rendering.classic import gl_context
 
 from dh2sim.errors import PictureError
 
-PACKAGES = "libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
-"""Debian's packages for EGL without a graphics card."""
-PACKAGES_OSMESA = "libosmesa6"
 OFF = ("disable", "disabled", "off", "false", "0")
-"""Values of MUJOCO_GL with which MuJoCo draws nothing."""
-_NAMES = {"egl": "EGL", "osmesa": "OSMesa"}
-
-_working: list[str] = []
-"""The backend that drew the last picture: it is the first to be tried again."""
-
-
-def import_mujoco() -> ModuleType:
-    """Import MuJoCo, which fails if MUJOCO_GL names what it does not know or cannot load.
-
-    Raises:
-        PictureError: it does.
-    """
-    try:
-        return importlib.import_module("mujoco")
-    except Exception as error:
-        chosen = os.environ.get("MUJOCO_GL")
-        if not chosen:
-            raise
-        raise PictureError(f"{_refused(chosen, error)}. {_advice()}") from error
+"""Values of MUJOCO_GL with which MuJoCo renders nothing."""
+NAMES = {"egl": "EGL", "osmesa": "OSMesa"}
+ADVICE = (
+    "On Debian and Ubuntu: apt install libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri (for EGL), or libosmesa6 (for "
+    "OSMesa). MUJOCO_GL=egl or MUJOCO_GL=osmesa tries one of them alone"
+)
+TRIAL = """
+import mujoco
+model = mujoco.MjModel.from_xml_string("<mujoco/>")
+with mujoco.Renderer(model, 8, 8) as renderer:
+    renderer.update_scene(mujoco.MjData(model))
+    renderer.render()
+"""
+PATIENCE = 60.0
+"""s: a driver that takes longer does not work."""
 
 
 @contextmanager
-def gl_context(model: Any, width: int, height: int) -> Iterator[Any]:
-    """Make an OpenGL context without a screen, and MuJoCo's resources for a model in it.
+def open_renderer(model: Any, width: int, height: int, *, max_geom: int = 10_000) -> Iterator[Any]:
+    """Open a ``mujoco.Renderer`` that needs no screen.
 
-    MUJOCO_GL decides if it is set: egl, osmesa, glfw (which needs a screen). Elsewhere than on Linux MuJoCo's default
-    is taken.
+    MUJOCO_GL decides if it is set: egl, osmesa, or glfw, which needs a screen. Elsewhere than on Linux
+    MuJoCo's default is taken.
 
     Args:
-        model: the compiled model; its offscreen buffer is made large enough.
+        model: ``mujoco.MjModel``; its offscreen buffer is made large enough.
         width: of the pictures, pixels.
         height: of the pictures, pixels.
-
-    Yields:
-        A ``mujoco.MjrContext``, current in this thread.
+        max_geom: the largest number of geoms in the scene.
 
     Raises:
-        PictureError: nothing works here; the text names the Debian packages.
+        PictureError: nothing can render here; the text names the Debian packages to install.
     """
-    mujoco = import_mujoco()
-    chosen = os.environ.get("MUJOCO_GL", "").strip().lower()
-    if chosen in OFF:
-        raise PictureError(f"MUJOCO_GL={chosen} switches drawing off; unset it, or set it to egl or osmesa")
+    backend = os.environ.get("MUJOCO_GL", "").strip().lower() or _working_backend()
+    if backend in OFF:
+        raise PictureError(f"MUJOCO_GL={backend} switches rendering off; unset it, or set it to egl or osmesa")
     model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
     model.vis.global_.offheight = max(height, model.vis.global_.offheight)
-    failures: list[str] = []
-    for backend in _candidates(chosen):
-        try:
-            context, resources = _open(mujoco, backend, model, width, height)
-        except Exception as error:  # whatever a driver makes of it, another may work
-            failures.append(_refused(backend, error))
-            _forget()
-            continue
-        _working[:] = [backend]
-        try:
-            yield resources
-        finally:
-            resources.free()
-            context.free()
-        return
-    raise PictureError(f"nothing can draw here without a screen: {'; '.join(failures)}. {_advice()}")
-
-
-def _candidates(chosen: str) -> list[str]:
-    if not sys.platform.startswith("linux"):
-        return ["default"]
-    if chosen:
-        return [chosen]
-    return [*_working, *(name for name in ("egl", "osmesa") if name not in _working)]
-
-
-def _open(mujoco: ModuleType, backend: str, model: Any, width: int, height: int) -> tuple[Any, Any]:
-    if backend == "default":
-        module = importlib.import_module("mujoco.rendering.classic.gl_context")
-    else:
-        module = importlib.import_module(f"mujoco.{backend if backend in _NAMES else 'glfw'}")
-    context = module.GLContext(width, height)
     try:
-        context.make_current()
-        with _told(backend):
-            resources = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, resources)
-        if resources.currentBuffer != mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value:
-            resources.free()
-            raise RuntimeError("no offscreen buffer")
-    except BaseException:
-        context.free()
-        raise
-    return context, resources
+        with _mujoco_gl(backend):
+            renderer = mujoco.Renderer(model, height, width, max_geom)
+    except Exception as error:  # a driver raises whatever it trips over
+        raise PictureError(f"{_failure(backend, str(error))}. {ADVICE}") from error
+    with renderer:
+        yield renderer
+
+
+@cache
+def _working_backend() -> str:
+    """Return the first of EGL and OSMesa that renders; elsewhere than on Linux an empty text, for MuJoCo's default.
+
+    Raises:
+        PictureError: neither does.
+    """
+    if not sys.platform.startswith("linux"):
+        return ""
+    failures = []
+    for backend in NAMES:
+        reason = _try(backend)
+        if reason is None:
+            return backend
+        failures.append(_failure(backend, reason))
+    raise PictureError(f"nothing can render here without a screen: {'; '.join(failures)}. {ADVICE}")
+
+
+def _try(backend: str) -> str | None:
+    """Render a picture in another process; return why that failed, or None."""
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", TRIAL],
+            env={**os.environ, "MUJOCO_GL": backend},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"no picture within {PATIENCE:g} s"
+    if done.returncode == 0:
+        return None
+    lines = [line for line in done.stderr.splitlines() if line.strip()]
+    return lines[-1].partition(": ")[2] if lines else f"exit status {done.returncode}"
+
+
+def _failure(backend: str, reason: str) -> str:
+    """Return one line that says that a backend does not work, and why."""
+    reason = " ".join(reason.split()).rstrip(" .()")
+    if not reason or "'NoneType' object has no attribute" in reason:  # what PyOpenGL says of missing libraries
+        reason = "its libraries cannot be loaded"
+    name = NAMES.get(backend, f"MUJOCO_GL={backend}")
+    return f"{name} does not work ({reason if len(reason) <= 120 else reason[:117] + '...'})"
 
 
 @contextmanager
-def _told(backend: str) -> Iterator[None]:
-    """Tell MuJoCo where to look OpenGL's functions up; it reads the environment."""
+def _mujoco_gl(backend: str) -> Iterator[None]:
+    """Let MuJoCo render with a backend, although it was imported with another one, or with none."""
     before = os.environ.get("MUJOCO_GL")
-    if backend in _NAMES:
+    if backend:
         os.environ["MUJOCO_GL"] = backend
     try:
+        importlib.reload(gl_context)
         yield
     finally:
         if before is None:
             os.environ.pop("MUJOCO_GL", None)
         else:
             os.environ["MUJOCO_GL"] = before
-
-
-def _forget() -> None:
-    """Unload PyOpenGL, which chooses its platform once, so that it may choose another one."""
-    for name in [name for name in sys.modules if name.partition(".")[0] == "OpenGL"]:
-        del sys.modules[name]
-    for name in ("mujoco.egl", "mujoco.egl.egl_ext", "mujoco.osmesa"):
-        sys.modules.pop(name, None)
-    if _chose_platform:
-        os.environ.pop("PYOPENGL_PLATFORM", None)
-
-
-_chose_platform = "PYOPENGL_PLATFORM" not in os.environ
-"""Whether PYOPENGL_PLATFORM was not the user's but, if it is set now, MuJoCo's."""
-
-
-def _refused(backend: str, error: Exception) -> str:
-    """Say that a backend does not work, and why, in one line."""
-    try:
-        told = " ".join(str(error).split()).rstrip(" .()")
-    except Exception:  # PyOpenGL's errors have no text if their library is missing
-        told = ""
-    if not told or "'NoneType' object has no attribute" in told:
-        told = "its libraries cannot be loaded"
-    name = _NAMES.get(backend, f"MUJOCO_GL={backend}")
-    return f"{name} does not work ({told if len(told) <= 120 else told[:117] + '...'})"
-
-
-def _advice() -> str:
-    return (
-        f"On Debian and Ubuntu: apt install {PACKAGES} (for EGL), or {PACKAGES_OSMESA} (for OSMesa). MUJOCO_GL=egl "
-        "or MUJOCO_GL=osmesa tries one of them alone"
-    )

@@ -1,7 +1,4 @@
-"""How plots look, and how they become files that are the same every time.
-
-The line above a plot.
-"""
+"""How matplotlib draws here, and how figures become files that are the same every time."""
 
 from __future__ import annotations
 
@@ -13,22 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.draw.rollout_data import RolloutData
 from dh2sim.errors import PictureError
 from dh2sim.extras import require_extra
 from dh2sim.files import atomic_file
 from dh2sim.messages import shown
-
-
-def title(rollout: RolloutData) -> str:
-    """Return robot, controller, run and rollout, and why it stopped if it did."""
-    attributes = rollout.attributes
-    parts = [str(attributes[name]) for name in ("robot", "controller") if attributes.get(name)]
-    parts.append(rollout.label)
-    if rollout.reason:
-        parts.append(f"stopped: {rollout.reason}")
-    return " · ".join(part if len(part) <= 40 else part[:39] + "…" for part in parts)
-
 
 ENDINGS = (".png", ".svg", ".pdf")
 BLUE, TEAL, PURPLE, ORANGE, RED, INK, GREY = (
@@ -77,8 +62,8 @@ SETTINGS: Mapping[str, Any] = {
 
 
 @contextmanager
-def drawing() -> Iterator[None]:
-    """Draw with these settings, and with matplotlib's defaults whatever a user's own are; put back in the end."""
+def plot_style() -> Iterator[None]:
+    """Draw with ``SETTINGS`` over matplotlib's defaults; a user's own settings are restored at the end."""
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -115,23 +100,27 @@ def legend_beside(ax: Any) -> None:
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=4, handlelength=1.4, borderaxespad=0.2)
 
 
-def require_plot_ending(out: Path) -> None:
+def require_plot(out: Path, *, what: str = "plotting") -> None:
     """Check the ending of a file's name, and that matplotlib is installed.
 
+    Args:
+        out: the file.
+        what: what is drawn, for messages.
+
     Raises:
-        PictureError: the ending is none of those allowed.
+        PictureError: the ending is none of ``ENDINGS``.
         MissingExtraError: matplotlib is not installed.
     """
     if out.suffix.lower() not in ENDINGS:
-        raise PictureError(f"{shown(out.name)} is no plot that can be written; allowed endings: .png, .svg, .pdf")
-    require_extra("plot", "matplotlib", what="plotting")
+        raise PictureError(f"cannot write {shown(out.name)} as a plot; allowed endings: {', '.join(ENDINGS)}")
+    require_extra("plot", "matplotlib", what=what)
 
 
 def save(figure: Any, out: Path, *, dpi: float) -> None:
     """Write a figure, whole or not at all.
 
     Args:
-        figure: ``matplotlib.figure.Figure``, drawn within ``drawing``.
+        figure: ``matplotlib.figure.Figure``, drawn within ``plot_style``.
         out: .png, .svg or .pdf.
         dpi: pixels an inch, of .png.
 
@@ -148,8 +137,8 @@ def save(figure: Any, out: Path, *, dpi: float) -> None:
         figure.savefig(draft, dpi=dpi, format=ending[1:], metadata=dates[ending])
 
 
-def view_range(*values: NDArray[Any], margin: float = 0.07) -> tuple[float, float]:
-    """Return the range of an axis that shows values, and is not all noise where they hardly change."""
+def value_range(*values: NDArray[Any], margin: float = 0.07) -> tuple[float, float]:
+    """Return the range of an axis that shows values; where they hardly change, it does not blow up their rounding."""
     together = np.concatenate([np.ravel(value) for value in values if np.size(value)] or [np.zeros(1)])
     together = together[np.isfinite(together)]
     low, high = (float(together.min()), float(together.max())) if len(together) else (0.0, 0.0)
@@ -160,7 +149,7 @@ def view_range(*values: NDArray[Any], margin: float = 0.07) -> tuple[float, floa
 
 
 def shade_outside(ax: Any, lower: float, upper: float, low: float, high: float) -> None:
-    """Set the range of an axis, and shade what of it is outside of limits.
+    """Set the range of the y axis, and shade what is outside of limits.
 
     Args:
         ax: the axes.

@@ -1,16 +1,6 @@
-"""Which plots there are.
+"""Plots of a rollout: joints, tool, energy and tracking.
 
-Plots of a rollout, by matplotlib; nothing here touches its global figures.
-
-When actuators were at the end of what they can do.
-
-Positions and velocities of all joints, with references, controls and limits.
-
-Where the tool is and how it is turned, over time and in space.
-
-Mechanical energy over time, and how far it drifts.
-
-How well references are followed.
+They are made by matplotlib, whose global figures are left alone.
 """
 
 from __future__ import annotations
@@ -22,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.draw.offscreen import import_mujoco
 from dh2sim.draw.plot_style import (
     BLUE,
     GREY,
@@ -31,20 +20,30 @@ from dh2sim.draw.plot_style import (
     PURPLE,
     RED,
     TEAL,
-    drawing,
     legend_below,
     legend_beside,
     make_figure,
-    require_plot_ending,
+    plot_style,
+    require_plot,
     save,
     shade_outside,
-    title,
-    view_range,
+    value_range,
 )
 from dh2sim.draw.rollout_data import RolloutData
 from dh2sim.errors import PictureError
 from dh2sim.messages import did_you_mean, listed, shown
 from dh2sim.typing import Array
+
+
+def title(rollout: RolloutData) -> str:
+    """Return robot, controller, run and rollout, and why it stopped if it did."""
+    attributes = rollout.attributes
+    parts = [str(attributes[name]) for name in ("robot", "controller") if attributes.get(name)]
+    parts.append(rollout.label)
+    if rollout.reason:
+        parts.append(f"stopped: {rollout.reason}")
+    return " · ".join(part if len(part) <= 40 else part[:39] + "…" for part in parts)
+
 
 NEAR = 1e-9
 """Share of a range within which a value is at its end."""
@@ -62,7 +61,8 @@ def saturated(rollout: RolloutData) -> NDArray[np.bool_]:
     Raises:
         PictureError: the model in the run's attributes cannot be read.
     """
-    mujoco = import_mujoco()
+    import mujoco
+
     joints = rollout.names("joint")
     found = np.zeros((int(rollout.data.sizes["interval"]), len(joints)), dtype=bool)
     if "ctrl" not in rollout.data and "torque" not in rollout.data:
@@ -144,7 +144,7 @@ def _position(ax: Any, rollout: RolloutData, joint: int) -> None:
     seen = _curve(ax, rollout, joint, "qpos", "position", BLUE)
     seen += _control(ax, rollout, joint, "position")
     limits = [float(rollout.values(f"joint_{side}")[joint]) for side in ("lower", "upper")]
-    shade_outside(ax, limits[0], limits[1], *view_range(*seen))
+    shade_outside(ax, limits[0], limits[1], *value_range(*seen))
     ax.set_ylabel(f"position, {_unit(rollout, joint)}")
 
 
@@ -152,7 +152,7 @@ def _velocity(ax: Any, rollout: RolloutData, joint: int) -> None:
     seen = _curve(ax, rollout, joint, "qvel", "velocity", TEAL)
     seen += _control(ax, rollout, joint, "velocity")
     limit = float(rollout.values("joint_velocity_limit")[joint])
-    shade_outside(ax, -limit, limit, *view_range(*seen))
+    shade_outside(ax, -limit, limit, *value_range(*seen))
     ax.set_ylabel(f"velocity, {_unit(rollout, joint)}/s")
 
 
@@ -164,7 +164,7 @@ def _force(ax: Any, rollout: RolloutData, joint: int) -> None:
         found = control(rollout, joint, "motor")
         values, label = (np.full(len(time), np.nan) if found is None else found), "control"
     ax.step(time, values, where="post", color=PURPLE, lw=1.1, label=label)
-    ax.set_ylim(*view_range(values))
+    ax.set_ylim(*value_range(values))
     ax.set_ylabel("force, N" if _unit(rollout, joint) == "m" else "torque, N·m")
 
 
@@ -227,7 +227,7 @@ def plot_tool(rollout: RolloutData, size: tuple[float, float] | None = None) -> 
     ):
         for k, (name, color) in enumerate(zip(names, (RED, TEAL, BLUE), strict=True)):
             ax.plot(time, values[:, k], color=color, label=name)
-        ax.set_ylim(*view_range(values))
+        ax.set_ylim(*value_range(values))
         ax.set_ylabel(label)
         legend_beside(ax)
     above.tick_params(labelbottom=False)
@@ -294,7 +294,7 @@ def plot_energy(rollout: RolloutData, size: tuple[float, float] | None = None) -
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.7, 1.0])
     for values, color, label in ((potential, BLUE, "potential"), (kinetic, ORANGE, "kinetic"), (total, INK, "total")):
         above.plot(time, values, color=color, label=label)
-    above.set_ylim(*view_range(energy, total))
+    above.set_ylim(*value_range(energy, total))
     above.set_ylabel("energy, J")
     legend_beside(above)
     drift = total - total[0]
@@ -354,7 +354,7 @@ def plot_tracking(rollout: RolloutData, size: tuple[float, float] | None = None)
 def _range(error: Any) -> tuple[float, float]:
     """An error may be as small as it likes: it is no noise."""
     greatest = float(np.abs(error).max())
-    low, high = view_range(error / greatest) if greatest > 0.0 else (-1e-9, 1e-9)
+    low, high = value_range(error / greatest) if greatest > 0.0 else (-1e-9, 1e-9)
     return (low * greatest, high * greatest) if greatest > 0.0 else (low, high)
 
 
@@ -367,13 +367,13 @@ KINDS: Mapping[str, Callable[[RolloutData, tuple[float, float] | None], Any]] = 
 
 
 def require_kind(what: str) -> None:
-    """Check that there is such a plot.
+    """Check the name of a kind of plot.
 
     Raises:
-        PictureError: there is not.
+        PictureError: it is none of ``KINDS``.
     """
     if what not in KINDS:
-        raise PictureError(f"there is no plot {shown(what)}.{did_you_mean(what, KINDS)} Allowed: {listed(KINDS)}")
+        raise PictureError(f"unknown plot {shown(what)}.{did_you_mean(what, KINDS)} Allowed: {listed(KINDS)}")
 
 
 def write_plot(
@@ -392,8 +392,8 @@ def write_plot(
         PictureError: there is no such plot, or what it needs was not recorded.
         OutputError: it cannot be written.
     """
-    require_plot_ending(out)
+    require_plot(out)
     require_kind(what)
-    with drawing():
+    with plot_style():
         inches = None if size is None else (size[0] / dpi, size[1] / dpi)
         save(KINDS[what](rollout, inches), out, dpi=dpi)

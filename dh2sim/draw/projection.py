@@ -1,66 +1,141 @@
-"""Where points of the scene are in the picture."""
+"""Where points of space are in a picture: central projection, as cameras see, and parallel projection."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from dh2sim.draw.offscreen import import_mujoco
 from dh2sim.typing import Array, read_only
 
+Vector = tuple[float, float, float]
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Projection:
-    """A pinhole camera: what MuJoCo draws with, for points."""
 
-    position: Array
-    """Of the camera, m, shape (3,)."""
-    rotation: Array
-    """Rows: to the right, up, forward; shape (3, 3)."""
-    scale: float
-    """Pixels that a length of 1 m at a distance of 1 m takes."""
-    centre: tuple[float, float]
-    """Pixel that the camera looks at, from top left."""
-    near: float
-    """Nearest distance that is drawn, m."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pinhole:
+    """A pinhole camera; compared by value."""
 
-    def pixels(self, points: Array) -> Array:
-        """Return pixels, x to the right and y down, shape (count, 2); NaN for what is not before the camera.
+    position: Vector
+    """m, in the world or in another frame, as all that follows."""
+    right: Vector
+    """Direction to the right in the picture, a unit vector."""
+    up: Vector
+    focal: float
+    """Focal length, pixels."""
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether all numbers, which come from a browser, make sense."""
+        finite = all(math.isfinite(value) for value in (*self.position, *self.right, *self.up, self.focal))
+        return finite and self.focal > 0.0
+
+    def resembles(self, other: Pinhole, share: float, distance: float) -> bool:
+        """Return whether another camera sees nearly the same.
 
         Args:
-            points: m, shape (count, 3).
+            other: The other camera.
+            share: Largest rotation, rad, and largest relative change of distance and focal length.
+            distance: To what is looked at, m.
         """
-        local = (points - self.position) @ self.rotation.T
-        depth = np.where(local[:, 2] > self.near, local[:, 2], np.nan)
-        x = self.centre[0] + self.scale * local[:, 0] / depth
-        y = self.centre[1] - self.scale * local[:, 1] / depth
-        return np.stack([x, y], axis=1)
+        turned = max(math.dist(self.right, other.right), math.dist(self.up, other.up))
+        moved = math.dist(self.position, other.position)
+        return turned <= share and moved <= share * distance and abs(self.focal / other.focal - 1.0) <= share
 
-    def depth(self, points: Array) -> Array:
-        """Return how far before the camera points are, m, shape (count,)."""
-        return np.asarray((points - self.position) @ self.rotation[2])
+    def in_frame(self, T_world_frame: ArrayLike) -> Pinhole:
+        """Return the same camera in a frame instead of the world; the frame's pose has shape (4, 4)."""
+        T = np.asarray(T_world_frame, dtype=np.float64)
+        R = T[:3, :3]
+        return Pinhole(
+            position=_vector((np.array(self.position) - T[:3, 3]) @ R),
+            right=_vector(np.array(self.right) @ R),
+            up=_vector(np.array(self.up) @ R),
+            focal=self.focal,
+        )
+
+    def project(self, points: ArrayLike) -> Array:
+        """Return where points are in the picture.
+
+        Args:
+            points: m, in the camera's frame of reference, shape (count, 3).
+
+        Returns:
+            Pixels right of the picture's middle, pixels above it, and depth, m, shape (count, 3). Points that are not
+            in front of the camera have a depth that is not positive, and NaN for pixels.
+        """
+        offsets = np.asarray(points, dtype=np.float64).reshape(-1, 3) - self.position
+        depth = offsets @ np.cross(self.up, self.right)
+        with np.errstate(over="ignore"):  # next to the camera
+            scale = self.focal / np.where(depth > 0.0, depth, np.nan)
+            return np.stack([scale * (offsets @ self.right), scale * (offsets @ self.up), depth], axis=1)
+
+    def pixels(self, points: ArrayLike, size: tuple[int, int]) -> Array:
+        """Return where points are in a picture of a width and height, pixels.
+
+        Args:
+            points: m, in the camera's frame of reference, shape (count, 3).
+            size: width and height.
+
+        Returns:
+            Pixels from the top left corner, x to the right and y down, shape (count, 2), and NaN for points that are
+            not in front of the camera.
+        """
+        return np.array([0.5, 0.5]) * size + np.array([1.0, -1.0]) * self.project(points)[:, :2]
+
+    def raised(self, point: Vector, pixels: float, depth: float) -> Vector:
+        """Return the point of the same depth that is seen ``pixels`` above another.
+
+        Args:
+            point: m.
+            pixels: May be negative.
+            depth: Of both points, m.
+        """
+        x, y, z = (p + pixels * depth / self.focal * u for p, u in zip(point, self.up, strict=True))
+        return x, y, z
 
 
-def scene_projection(scene: Any, width: int, height: int) -> Projection:
-    """Return the projection of a scene's camera, as ``mjr_render`` uses it.
+def scene_pinhole(scene: Any, height: int) -> Pinhole:
+    """Return the camera that MuJoCo renders a scene with; its frustum must be symmetric, as it is by default.
 
     Args:
         scene: ``mujoco.MjvScene``, updated before.
-        width: of the picture, pixels.
-        height: of the picture, pixels.
+        height: Of the picture, pixels.
     """
-    camera = import_mujoco().mjv_averageCamera(scene.camera[0], scene.camera[1])
-    forward, up = np.array(camera.forward, dtype=float), np.array(camera.up, dtype=float)
-    tall = camera.frustum_top - camera.frustum_bottom
-    scale = camera.frustum_near * height / tall
-    middle = 0.5 * (camera.frustum_top + camera.frustum_bottom) / camera.frustum_near
-    aside = camera.frustum_center / camera.frustum_near
-    return Projection(
-        position=read_only(camera.pos),
-        rotation=read_only(np.stack([np.cross(forward, up), up, forward])),
-        scale=float(scale),
-        centre=(width / 2 - scale * aside, height / 2 + scale * middle),
-        near=float(camera.frustum_near),
+    left, right = scene.camera[0], scene.camera[1]  # the eyes of a stereoscopic picture
+    forward, up = np.array(left.forward, dtype=float), np.array(left.up, dtype=float)
+    return Pinhole(
+        position=_vector(0.5 * (np.array(left.pos, dtype=float) + np.array(right.pos, dtype=float))),
+        right=_vector(np.cross(forward, up)),
+        up=_vector(up),
+        focal=float(left.frustum_near * height / (left.frustum_top - left.frustum_bottom)),
+    )
+
+
+def _vector(values: Array) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ParallelView:
+    """Parallel projection with base_link's z upright."""
+
+    right: Array
+    """What is to the right in the picture, a unit vector, shape (3,)."""
+    up: Array
+    """What is upwards in the picture, a unit vector, shape (3,)."""
+
+    def project(self, points: ArrayLike) -> Array:
+        """Project points, shape (..., 3), to the right and up, shape (..., 2), in their own unit."""
+        return np.stack([np.asarray(points) @ self.right, np.asarray(points) @ self.up], axis=-1)
+
+
+def look_from(azimuth: float, elevation: float) -> ParallelView:
+    """Return the parallel projection that looks from a direction, degrees."""
+    az, el = math.radians(azimuth), math.radians(elevation)
+    return ParallelView(
+        right=read_only([-math.sin(az), math.cos(az), 0.0]),
+        up=read_only([-math.sin(el) * math.cos(az), -math.sin(el) * math.sin(az), math.cos(el)]),
     )

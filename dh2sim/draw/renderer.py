@@ -1,4 +1,4 @@
-"""Pictures of a motion, one at a time.
+"""Pictures of a motion, one at a time, rendered by MuJoCo.
 
 The scene around the robot is made for the robot at home; here it is made large enough for a motion.
 """
@@ -11,28 +11,29 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.draw.camera import View, extreme_points, goes_along, make_camera
-from dh2sim.draw.markers import TRACE_RADIUS, add_trace, corners, draw_frames, frame_sites
+from dh2sim.draw.camera import CameraChoice, extreme_points, follows_base, make_camera
+from dh2sim.draw.markers import TRACE_RADIUS, add_trace, draw_frames, frame_sites, simplified
 from dh2sim.draw.motion import Motion
-from dh2sim.draw.offscreen import gl_context, import_mujoco
-from dh2sim.draw.projection import scene_projection
+from dh2sim.draw.offscreen import open_renderer
+from dh2sim.draw.projection import scene_pinhole
 from dh2sim.errors import PictureError
 from dh2sim.typing import Array
 
 GAP = 0.1
 """Between the lowest part of the robot and a floor that had to be lowered, as a share of the scene's extent."""
 BRIGHTEST = 1.07
-"""Light of all lamps on the floor, together."""
+"""Light that all lamps together throw on the floor."""
 PEDESTAL_COLOR = (0.62, 0.64, 0.68, 1.0)
 
 
 def widen(model: Any, points: Array, *, floor: bool = True) -> None:
-    """Lower the floor under the whole motion, and move the lights so that all of it has a shadow.
+    """Lower the floor under the whole motion, and move the lights so that all of it casts a shadow.
 
-    A run is simulated without a floor: it only shows.
+    Runs are simulated without a floor; it is only shown.
 
     Args:
         model: ``mujoco.MjModel``, changed in place.
@@ -60,7 +61,7 @@ def widen(model: Any, points: Array, *, floor: bool = True) -> None:
 
 
 def dim(model: Any, elevation: float) -> None:
-    """Take light from the lamp at the camera where it looks down so steeply that the floor would be all white.
+    """Dim the light at the camera where it looks down so steeply that the floor would be all white.
 
     Args:
         model: ``mujoco.MjModel``, changed in place.
@@ -74,16 +75,15 @@ def dim(model: Any, elevation: float) -> None:
 
 
 def complete(scene: Any, model: Any) -> None:
-    """Make the surroundings in a scene as they shall be drawn.
+    """Finish the surroundings in a scene.
 
-    The floor takes no part in the shadows' map, where a plane without end makes stains of rounding errors; a shadow
-    falls on it all the same. And a base that would hang in the air above a lowered floor gets a pedestal.
+    The floor is left out of the shadow map, in which an infinite plane makes stains by rounding; shadows fall on it
+    all the same. A base that would hang in the air above a lowered floor gets a pedestal.
 
     Args:
         scene: ``mujoco.MjvScene``, updated before.
         model: ``mujoco.MjModel``, after ``widen``.
     """
-    mujoco = import_mujoco()
     for number in range(scene.ngeom):
         if scene.geoms[number].type == mujoco.mjtGeom.mjGEOM_PLANE.value:
             scene.geoms[number].category = mujoco.mjtCatBit.mjCAT_DECOR.value
@@ -91,7 +91,7 @@ def complete(scene: Any, model: Any) -> None:
 
 
 def foot(model: Any) -> Array:
-    """Return corners around where the pedestal stands on the floor, shape (4, 3), m; (0, 3) if there is none.
+    """Return corners around the foot of the pedestal on the floor, shape (4, 3), m; (0, 3) if there is none.
 
     Args:
         model: ``mujoco.MjModel``, after ``widen``.
@@ -103,7 +103,6 @@ def foot(model: Any) -> Array:
 
 def _pedestal(model: Any) -> tuple[float, float]:
     """Radius of the pedestal, 0 if there is none, and height of the floor, m."""
-    mujoco = import_mujoco()
     floor, base = _geom(model, "floor"), mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY.value, "base_link")
     if floor < 0 or base < 0 or _floats(model) or model.geom_pos[floor, 2] >= 0.0:
         return 0.0, 0.0
@@ -115,7 +114,6 @@ def _pedestal(model: Any) -> tuple[float, float]:
 
 
 def _add_pedestal(scene: Any, model: Any) -> None:
-    mujoco = import_mujoco()
     radius, z = _pedestal(model)
     if radius == 0.0 or _geom(model, "pedestal") >= 0 or scene.ngeom >= scene.maxgeom:
         return
@@ -128,12 +126,10 @@ def _add_pedestal(scene: Any, model: Any) -> None:
 
 
 def _geom(model: Any, name: str) -> int:
-    mujoco = import_mujoco()
     return int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM.value, name))
 
 
 def _floats(model: Any) -> bool:
-    mujoco = import_mujoco()
     return bool(model.njnt > 0 and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE.value)
 
 
@@ -142,16 +138,18 @@ SMALLEST, LARGEST = 64, 8192
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Look:
-    """How pictures look."""
+class PictureOptions:
+    """Size of pictures, camera, and what is shown beside the robot."""
 
     width: int = 1280
+    """Pixels."""
     height: int = 720
-    view: View = field(default_factory=View)
+    """Pixels."""
+    camera: CameraChoice = field(default_factory=CameraChoice)
     frames: bool = False
     """Whether the DH frames are shown."""
     trace: bool = True
-    """Whether the way of the tool is shown."""
+    """Whether the path of the tool is shown."""
 
     def __post_init__(self) -> None:
         """Check the size.
@@ -161,104 +159,97 @@ class Look:
         """
         for name, value in (("width", self.width), ("height", self.height)):
             if not SMALLEST <= value <= LARGEST:
-                raise PictureError(f"the {name} of {value} pixels is not from {SMALLEST} to {LARGEST}")
+                raise PictureError(f"the {name} must be from {SMALLEST} to {LARGEST} pixels, got {value}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stage:
-    """A motion in front of a camera; made by ``stage``."""
+class MotionRenderer:
+    """A motion in front of a camera; made by ``open_motion``."""
 
     motion: Motion
-    look: Look
+    options: PictureOptions
     data: Any = field(repr=False)
-    scene: Any = field(repr=False)
+    renderer: Any = field(repr=False)
+    """``mujoco.Renderer``."""
     camera: Any = field(repr=False)
-    resources: Any = field(repr=False)
+    """``mujoco.MjvCamera``."""
     travel: Array = field(repr=False)
-    """How far the camera has gone along with the robot, m, shape (positions, 3)."""
+    """How far the camera has followed the base, m, shape (positions, 3)."""
     lookat: Array = field(repr=False)
     """Where the camera looks at first, m, shape (3,)."""
     size: float
     """Radius of a ball around the robot at home, m: the measure of everything that is drawn beside it."""
     samples: Array = field(repr=False)
-    """Numbers of the positions between which the trace is drawn, shape (count,)."""
+    """Indices of the positions between which the trace is drawn, shape (count,)."""
     trace: Array = field(repr=False)
     """Positions of the tool there, shape (count, 3), m; none where the trace is not shown."""
 
     def picture(self, number: int) -> NDArray[np.uint8]:
-        """Draw the robot in one of its positions.
+        """Render the robot in one of its positions.
 
         Args:
-            number: of the position.
+            number: index of the position.
 
         Returns:
-            Red, green, blue, from top left, shape (height, width, 3).
+            Red, green, blue, from the top left corner, shape (height, width, 3).
         """
-        mujoco = import_mujoco()
-        model = self.motion.model
+        model, options = self.motion.model, self.options
         self.motion.place(self.data, number)
         self.camera.lookat[:] = self.lookat + self.travel[number]
-        everything = mujoco.mjtCatBit.mjCAT_ALL.value
-        mujoco.mjv_updateScene(model, self.data, mujoco.MjvOption(), None, self.camera, everything, self.scene)
-        complete(self.scene, model)
+        self.renderer.update_scene(self.data, self.camera)
+        scene = self.renderer.scene
+        complete(scene, model)
         if len(self.trace):
             past = int(np.searchsorted(self.samples, number))
             here = self.data.site_xpos[_tool(model)][None, :]
-            add_trace(self.scene, np.concatenate([self.trace[:past], here]), TRACE_RADIUS * self.size)
-        area = mujoco.MjrRect(0, 0, self.look.width, self.look.height)
-        mujoco.mjr_render(area, self.scene, self.resources)
-        pixels = np.empty((self.look.height, self.look.width, 3), dtype=np.uint8)
-        mujoco.mjr_readPixels(pixels, None, area, self.resources)
-        pixels = np.ascontiguousarray(pixels[::-1])
-        if self.look.frames:
-            projection = scene_projection(self.scene, self.look.width, self.look.height)
-            pixels = draw_frames(pixels, self.data, frame_sites(model), projection, self.size)
+            add_trace(scene, np.concatenate([self.trace[:past], here]), TRACE_RADIUS * self.size)
+        pixels: NDArray[np.uint8] = self.renderer.render()
+        if options.frames:
+            pinhole = scene_pinhole(scene, options.height)
+            pixels = draw_frames(pixels, self.data, frame_sites(model), pinhole, self.size)
         return pixels
 
 
 @contextmanager
-def stage(motion: Motion, look: Look) -> Iterator[Stage]:
-    """Set everything up to draw pictures of a motion without a screen.
+def open_motion(motion: Motion, options: PictureOptions) -> Iterator[MotionRenderer]:
+    """Set everything up to render pictures of a motion without a screen.
 
     Args:
-        motion: what moves.
-        look: size, camera, and what else is shown.
+        motion: what moves; its model is changed in place.
+        options: size, camera, and what else is shown.
 
     Raises:
-        PictureError: nothing can draw here, or the model has no such camera.
+        PictureError: nothing can render here, or the model has no such camera.
     """
-    mujoco = import_mujoco()
     model, size = motion.model, float(motion.model.stat.extent)
-    along = goes_along(look.view, motion)
-    points = extreme_points(motion, along=along)
-    widen(model, points, floor=not along)
+    follows = follows_base(options.camera, motion)
+    points = extreme_points(motion, follows=follows)
+    widen(model, points, floor=not follows)
     points = np.concatenate([points, foot(model)])
-    camera = make_camera(look.view, model, points, look.width / look.height)
+    camera = make_camera(options.camera, model, points, options.width / options.height)
     dim(model, float(camera.elevation))
     data = mujoco.MjData(model)
     samples, trace = np.zeros(0), np.zeros((0, 3))
-    if look.trace and len(motion.time) > 1:
+    if options.trace and len(motion.time) > 1:
         samples = np.array(motion.sampled(), dtype=float)
         trace = np.array([_tool_position(motion, data, int(number)) for number in samples])
-        kept = corners(trace, TRACE_RADIUS / 6 * size)
+        kept = simplified(trace, TRACE_RADIUS / 6 * size)
         samples, trace = samples[kept], trace[kept]
-    scene = mujoco.MjvScene(model, model.ngeom + len(trace) + 100)
-    # a map of shadows finer than the picture would only take time
-    finest = 2 ** math.ceil(math.log2(4 * max(look.width, look.height)))
+    # a shadow map finer than the picture would only take time
+    finest = 2 ** math.ceil(math.log2(4 * max(options.width, options.height)))
     model.vis.quality.shadowsize = min(int(model.vis.quality.shadowsize), finest)
-    # a floor without end is drawn around where the camera was at the update before
-    motion.place(data, 0)
-    everything = mujoco.mjtCatBit.mjCAT_ALL.value
-    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, camera, everything, scene)
-    with gl_context(model, look.width, look.height) as resources:
-        yield Stage(
+    max_geom = model.ngeom + len(trace) + 100
+    with open_renderer(model, options.width, options.height, max_geom=max_geom) as renderer:
+        # an infinite floor is drawn around where the camera was at the update before
+        motion.place(data, 0)
+        renderer.update_scene(data, camera)
+        yield MotionRenderer(
             motion=motion,
-            look=look,
+            options=options,
             data=data,
-            scene=scene,
+            renderer=renderer,
             camera=camera,
-            resources=resources,
-            travel=motion.travel if along else np.zeros((len(motion.time), 3)),
+            travel=motion.travel if follows else np.zeros((len(motion.time), 3)),
             lookat=np.array(camera.lookat),
             size=size,
             samples=samples,

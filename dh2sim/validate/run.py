@@ -121,11 +121,11 @@ def _read(model: RobotModel, mjcf: Path, urdf: Path) -> tuple[list[Mover | Yourd
     engines: list[Mover | YourdfpyEngine] = []
     unread: list[Check] = []
     names = [joint.name for joint in model.moving_joints]
-    for name, path, make in (
-        ("mujoco-mjcf", mjcf, MujocoEngine),
-        ("mujoco-urdf", urdf, MujocoEngine),
-        ("yourdfpy", urdf, YourdfpyEngine),
-        ("pinocchio", urdf, PinocchioEngine),
+    for name, path, make, package in (
+        ("mujoco-mjcf", mjcf, MujocoEngine, "mujoco"),
+        ("mujoco-urdf", urdf, MujocoEngine, "mujoco"),
+        ("yourdfpy", urdf, YourdfpyEngine, "'dh2sim[engines]'"),
+        ("pinocchio", urdf, PinocchioEngine, "pin"),
     ):
         if not path.is_file():
             reason = f"{path}: no such file; write it with 'dh2sim export'"
@@ -136,7 +136,7 @@ def _read(model: RobotModel, mjcf: Path, urdf: Path) -> tuple[list[Mover | Yourd
             with signals_deferred(), np.errstate(all="ignore"):
                 engines.append(make(path, names, len(model.joints)))
         except ImportError as error:
-            reason = f"not installed ({error}); pip install 'dh2sim[engines]'"
+            reason = f"not installed ({error}); pip install {package}"
             unread.append(Check(engine=name, quantity=Quantity.POSE, ok=None, reason=reason))
         except EngineCapacityError as error:
             unread.append(Check(engine=name, quantity=Quantity.POSE, ok=None, reason=str(error)))

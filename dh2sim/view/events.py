@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from dh2sim.draw.projection import Pinhole
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
-from dh2sim.view.scene.pinhole import Pinhole
 from dh2sim.view.state import Ghost, LinkDrag, Matrix, Mode, Part
 
 

@@ -10,10 +10,10 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
+from dh2sim.draw.projection import Pinhole
 from dh2sim.model.robot_model import JointModel, RobotModel
 from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Units
 from dh2sim.view.scene.items import Vector
-from dh2sim.view.scene.pinhole import Pinhole
 
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 """A pose of shape (4, 4), as tuples, so that states compare by value."""

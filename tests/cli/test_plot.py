@@ -42,9 +42,9 @@ def test_a_plot_is_a_drawing_where_its_ending_says_so(run: Path, tmp_path: Path)
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--what", "tol"], f"there is no plot 'tol'. Did you mean 'tool'? Allowed: {WHAT}"),
+        (["--what", "tol"], f"unknown plot 'tol'. Did you mean 'tool'? Allowed: {WHAT}"),
         (["--rollout", "2"], "run.zarr has no rollout 2; it holds rollouts 0 to 1"),
-        (["--out", "a.mp4"], "'a.mp4' is no plot that can be written; allowed endings: .png, .svg, .pdf"),
+        (["--out", "a.mp4"], "cannot write 'a.mp4' as a plot; allowed endings: .png, .svg, .pdf"),
         (["--out", "no/a.png"], "cannot write 'no/a.png': there is no folder 'no'"),
         (
             ["--what", "tool", "--out", "a.png"],
@@ -71,8 +71,8 @@ def test_what_is_no_run_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--size", "100x100"], "Invalid value for --size: 100x100: allowed are 200 to 20000 pixels each way"),
-        (["--size", "100"], "Invalid value for --size: '100' is not of the form WIDTHxHEIGHT, such as 1280x720"),
+        (["--size", "100x100"], "Invalid value for --size: must be from 200 to 20000 pixels each way, got 100x100"),
+        (["--size", "100"], "Invalid value for --size: '100' must have the form WIDTHxHEIGHT, such as 1280x720"),
     ],
 )
 def test_sizes_that_cannot_be_are_told(run: Path, arguments: list[str], told: str) -> None:

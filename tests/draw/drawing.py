@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from dh2sim.draw.motion import Motion, motion_of_run
-from dh2sim.draw.offscreen import gl_context
-from dh2sim.draw.renderer import Stage
+from dh2sim.draw.offscreen import open_renderer
+from dh2sim.draw.renderer import MotionRenderer
 from dh2sim.draw.rollout_data import select_rollout
 from dh2sim.errors import PictureError
 from tests.draw.datasets import swinging
@@ -21,14 +21,14 @@ from tests.draw.datasets import swinging
 @functools.cache
 def _why_not() -> str:
     try:
-        with gl_context(mujoco.MjModel.from_xml_string("<mujoco/>"), 64, 64):
+        with open_renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 64, 64):
             return ""
     except PictureError as error:
         return str(error)
 
 
 def require_gl() -> None:
-    """Skip a test where nothing can draw, and say what to install."""
+    """Skip a test where nothing can render, and say what to install."""
     if _why_not():
         pytest.skip(_why_not())
 
@@ -37,16 +37,17 @@ def moving(robot: str = "rpr") -> Motion:
     return motion_of_run(select_rollout(swinging(robot), 0, "run.zarr"))
 
 
-def robot_seen(stage: Stage, number: int) -> NDArray[np.bool_]:
+def robot_seen(renderer: MotionRenderer, number: int) -> NDArray[np.bool_]:
     """Which pixels show a part of the robot, by MuJoCo's own segmentation."""
     flags = (mujoco.mjtRndFlag.mjRND_SEGMENT.value, mujoco.mjtRndFlag.mjRND_IDCOLOR.value)
     for flag in flags:
-        stage.scene.flags[flag] = 1
-    colors = stage.picture(number).astype(int)
+        renderer.renderer.scene.flags[flag] = 1
+    colors = renderer.picture(number).astype(int)
     for flag in flags:
-        stage.scene.flags[flag] = 0
-    model: Any = stage.motion.model
-    geoms = stage.scene.geoms[: stage.scene.ngeom]
+        renderer.renderer.scene.flags[flag] = 0
+    model: Any = renderer.motion.model
+    scene = renderer.renderer.scene
+    geoms = scene.geoms[: scene.ngeom]
     parts = [
         geom.segid + 1
         for geom in geoms

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from dh2sim.draw.camera import MARGIN, View, fit, goes_along, make_camera, parse_view
+from dh2sim.draw.camera import MARGIN, CameraChoice, fit, follows_base, make_camera, parse_camera
 from dh2sim.draw.motion import Motion
 from dh2sim.errors import PictureError
 from dh2sim.formats.mjcf.scene import FIELD_OF_VIEW
@@ -40,17 +40,17 @@ def test_all_points_are_in_the_picture_and_two_edges_are_touched(
 
 
 def test_a_view_is_a_name_or_a_direction() -> None:
-    assert parse_view(None) == View()
-    assert parse_view("overview") == View(name="overview")
-    assert parse_view("-60,-15") == View(azimuth=-60.0, elevation=-15.0)
-    assert parse_view("120, 10 ,2.5") == View(azimuth=120.0, elevation=10.0, distance=2.5)
+    assert parse_camera(None) == CameraChoice()
+    assert parse_camera("overview") == CameraChoice(name="overview")
+    assert parse_camera("-60,-15") == CameraChoice(azimuth=-60.0, elevation=-15.0)
+    assert parse_camera("120, 10 ,2.5") == CameraChoice(azimuth=120.0, elevation=10.0, distance=2.5)
 
 
 ALLOWED = "allowed: a camera's name, or azimuth,elevation[,distance] in degrees and m, such as 120,-20"
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("a,b", f"camera 'a,b': not all of these are numbers; {ALLOWED}"),
         ("1,2,3,4", f"camera '1,2,3,4': two or three finite numbers are needed; {ALLOWED}"),
@@ -59,28 +59,28 @@ ALLOWED = "allowed: a camera's name, or azimuth,elevation[,distance] in degrees 
         ("1,9,0", "camera '1,9,0': the distance must be above 0, and at most a million metres"),
     ],
 )
-def test_a_view_that_cannot_be_is_told(text: str, told: str) -> None:
+def test_a_direction_out_of_range_is_refused(text: str, message: str) -> None:
     with pytest.raises(PictureError) as caught:
-        parse_view(text)
-    assert str(caught.value) == told
+        parse_camera(text)
+    assert str(caught.value) == message
 
 
-def test_a_camera_that_there_is_not_is_told_with_those_that_there_are() -> None:
+def test_an_unknown_camera_is_refused_with_the_names_of_those_there_are() -> None:
     with pytest.raises(PictureError) as caught:
-        make_camera(View(name="overveiw"), moving().model, np.zeros((1, 3)), 1.0)
+        make_camera(CameraChoice(name="overveiw"), moving().model, np.zeros((1, 3)), 1.0)
     assert str(caught.value) == (
-        "there is no camera 'overveiw'. Did you mean 'overview'? Cameras: overview; or azimuth,elevation[,distance] "
+        "unknown camera 'overveiw'. Did you mean 'overview'? Cameras: overview; or azimuth,elevation[,distance] "
         "in degrees and m, such as 120,-20"
     )
 
 
 def test_a_distance_is_taken_as_it_is() -> None:
-    camera = make_camera(View(azimuth=10.0, elevation=-5.0, distance=7.5), moving().model, np.eye(3), 1.0)
+    camera = make_camera(CameraChoice(azimuth=10.0, elevation=-5.0, distance=7.5), moving().model, np.eye(3), 1.0)
     assert (camera.azimuth, camera.elevation, camera.distance) == (10.0, -5.0, 7.5)
 
 
 def test_the_camera_stays_where_the_base_stays() -> None:
     motion: Motion = moving()
     assert not motion.floats
-    assert not goes_along(View(), motion)
+    assert not follows_base(CameraChoice(), motion)
     assert (motion.travel == 0.0).all()

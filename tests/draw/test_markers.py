@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from dh2sim.draw.markers import corners, together
+from dh2sim.draw.markers import joined_label, simplified
 
 
 @pytest.mark.parametrize(
@@ -20,20 +20,20 @@ from dh2sim.draw.markers import corners, together
     ],
 )
 def test_frames_at_one_point_share_a_label(names: list[str], label: str) -> None:
-    assert together(names) == label
+    assert joined_label(names) == label
 
 
 def test_a_straight_line_needs_its_ends_only() -> None:
     points = np.outer(np.linspace(0.0, 1.0, 50) ** 2, [1.0, -2.0, 0.5])
-    assert corners(points, 1e-9) == [0, 49]
-    assert corners(np.zeros((5, 3)), 1e-9) == [0, 4]
-    assert corners(np.eye(3)[:2], 1e-9) == [0, 1]
+    assert simplified(points, 1e-9) == [0, 49]
+    assert simplified(np.zeros((5, 3)), 1e-9) == [0, 4]
+    assert simplified(np.eye(3)[:2], 1e-9) == [0, 1]
 
 
-def test_every_point_is_within_the_tolerance_of_the_line_through_the_corners() -> None:
+def test_every_point_is_within_the_tolerance_of_the_line_through_the_simplified() -> None:
     t = np.linspace(0.0, 9.0, 400)
     points = np.stack([np.sin(t), np.cos(1.7 * t), 0.2 * t], axis=1)
-    kept = corners(points, 0.01)
+    kept = simplified(points, 0.01)
     assert kept[0] == 0
     assert kept[-1] == 399
     assert 20 < len(kept) < 150
@@ -47,5 +47,5 @@ def test_every_point_is_within_the_tolerance_of_the_line_through_the_corners() -
 def test_a_way_back_along_the_same_line_is_not_left_out() -> None:
     x = np.concatenate([np.linspace(0, 1, 20), np.linspace(1, 0.2, 20)])
     points = np.stack([x, 0 * x, 0 * x], axis=1)
-    kept = corners(points, 1e-3)
+    kept = simplified(points, 1e-3)
     assert points[kept, 0].max() == 1.0

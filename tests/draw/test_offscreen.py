@@ -1,17 +1,19 @@
-"""Which of EGL and OSMesa draws; each case in a process of its own, with libraries that really are not found."""
+"""Which of EGL and OSMesa renders; each case in a process of its own, with libraries that really are not found."""
 
 from __future__ import annotations
 
 import ctypes.util
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from tests.program import Outcome, environment
 
-PROGRAM = """
-import ctypes, ctypes.util, os, sys
+WITHOUT = """
+import ctypes, ctypes.util, os
 gone = [name for name in os.environ.get("GONE", "").split(",") if name]
 load, find = ctypes.CDLL.__init__, ctypes.util.find_library
 
@@ -22,16 +24,20 @@ def init(self, name, *args, **kwargs):
 
 ctypes.CDLL.__init__ = init
 ctypes.util.find_library = lambda name: None if any(part in "lib" + name for part in gone) else find(name)
-if os.environ.get("BEFORE"):
-    import mujoco
+"""
+"""A module that every process imports at its start."""
+PROGRAM = """
+import os, sys
+import mujoco
 from dh2sim.errors import PictureError
-from dh2sim.draw import offscreen
+from dh2sim.draw.offscreen import open_renderer
 try:
-    mujoco = offscreen.import_mujoco()
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
     for _ in range(2):
-        with offscreen.gl_context(model, 2500, 64) as resources:
-            print(*offscreen._working, resources.offWidth, resources.offHeight)
+        with open_renderer(model, 2500, 64) as renderer:
+            renderer.update_scene(mujoco.MjData(model))
+            used = [name for name in ("egl", "osmesa") if f"mujoco.{name}" in sys.modules]
+            print(*used, renderer.render().shape)
     print(os.environ.get("MUJOCO_GL"))
 except PictureError as error:
     print(error, file=sys.stderr)
@@ -47,51 +53,57 @@ needs_egl = pytest.mark.skipif(ctypes.util.find_library("EGL") is None, reason="
 needs_osmesa = pytest.mark.skipif(ctypes.util.find_library("OSMesa") is None, reason="needs libosmesa6")
 
 
-def draw(**variables: str) -> Outcome:
-    before = {name: value for name, value in environment().items() if name not in ("MUJOCO_GL", "PYOPENGL_PLATFORM")}
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "sitecustomize.py").write_text(WITHOUT, encoding="utf-8")
+    return tmp_path
+
+
+def run(folder: Path, *command: str, **variables: str) -> Outcome:
+    kept = {name: value for name, value in environment().items() if name not in ("MUJOCO_GL", "PYOPENGL_PLATFORM")}
+    path = os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM], env={**before, **variables}, capture_output=True, text=True, timeout=120
+        [sys.executable, *command],
+        cwd=folder,
+        env={**kept, "PYTHONPATH": path, **variables},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
     )
     return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
 
 
 @needs_egl
-@pytest.mark.parametrize("before", ["", "1"], ids=["MuJoCo not imported yet", "MuJoCo imported already"])
-def test_egl_is_taken_where_it_works_and_the_buffer_is_as_large_as_the_picture(before: str) -> None:
-    run = draw(BEFORE=before)
-    assert (run.status, run.out.splitlines()[:2]) == (0, ["egl 2500 480"] * 2), run.err
-    assert run.out.splitlines()[2] == "None", "the environment is as it was"
+def test_egl_is_taken_where_it_works_and_the_buffer_is_as_large_as_the_picture(folder: Path) -> None:
+    done = run(folder, "-c", PROGRAM)
+    assert done.out.splitlines() == ["egl (64, 2500, 3)"] * 2 + ["None"], "the environment is as it was"
 
 
 @needs_osmesa
-@pytest.mark.parametrize("before", ["", "1"], ids=["MuJoCo not imported yet", "MuJoCo imported already"])
-def test_osmesa_is_taken_where_there_is_no_egl(before: str) -> None:
-    run = draw(BEFORE=before, GONE="libEGL")
-    assert (run.status, run.out.splitlines()) == (0, ["osmesa 2500 480"] * 2 + ["None"]), run.err
+def test_osmesa_is_taken_where_egl_does_not_work(folder: Path) -> None:
+    assert run(folder, "-c", PROGRAM, GONE="libEGL").out.splitlines() == ["osmesa (64, 2500, 3)"] * 2 + ["None"]
 
 
 @needs_osmesa
-def test_the_environment_decides_if_it_says_something() -> None:
-    run = draw(MUJOCO_GL="osmesa")
-    assert run.out.splitlines() == ["osmesa 2500 480"] * 2 + ["osmesa"]
+def test_mujoco_gl_decides(folder: Path) -> None:
+    done = run(folder, "-c", PROGRAM, MUJOCO_GL="osmesa")
+    assert done.out.splitlines() == ["osmesa (64, 2500, 3)"] * 2 + ["osmesa"]
 
 
-def test_where_nothing_draws_the_error_names_the_packages() -> None:
-    run = draw(GONE="libEGL,libOSMesa")
-    assert run.err == f"nothing can draw here without a screen: {NO_EGL}; {NO_OSMESA}{ADVICE}"
-    assert (run.status, run.out) == (0, "")
+def test_where_nothing_renders_the_error_names_the_packages(folder: Path) -> None:
+    done = run(folder, "-c", PROGRAM, GONE="libEGL,libOSMesa")
+    assert done.err == f"nothing can render here without a screen: {NO_EGL}; {NO_OSMESA}{ADVICE}"
+    assert (done.status, done.out) == (0, "")
 
 
-def test_a_choice_that_does_not_work_is_not_replaced_in_silence() -> None:
-    assert draw(GONE="libEGL", MUJOCO_GL="egl").err == f"{NO_EGL}{ADVICE}"
-    assert draw(GONE="libOSMesa", MUJOCO_GL="osmesa").err == f"{NO_OSMESA}{ADVICE}"
+@pytest.mark.parametrize(("backend", "library"), [("egl", "libEGL"), ("osmesa", "libOSMesa")])
+def test_a_choice_that_does_not_work_is_not_replaced_in_silence(folder: Path, backend: str, library: str) -> None:
+    done = run(folder, "-m", "dh2sim", "render", "rpr", GONE=library, MUJOCO_GL=backend)
+    assert (done.status, done.out) == (2, "")
+    assert done.err.startswith(f"dh2sim: MuJoCo cannot be imported with MUJOCO_GL={backend}: ")
 
 
-def test_drawing_that_is_switched_off_is_told() -> None:
-    expected = "MUJOCO_GL=off switches drawing off; unset it, or set it to egl or osmesa\n"
-    assert draw(MUJOCO_GL="off").err == expected
-
-
-def test_a_value_that_mujoco_does_not_know_is_told() -> None:
-    told = "MUJOCO_GL=foo does not work (invalid value for environment variable MUJOCO_GL: foo)"
-    assert draw(MUJOCO_GL="foo").err == told + ADVICE
+def test_rendering_that_is_switched_off_is_reported(folder: Path) -> None:
+    expected = "MUJOCO_GL=off switches rendering off; unset it, or set it to egl or osmesa\n"
+    assert run(folder, "-c", PROGRAM, MUJOCO_GL="off").err == expected

@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from PIL import Image
 
-from dh2sim.draw.plot_style import drawing, view_range
+from dh2sim.draw.plot_style import plot_style, value_range
 from dh2sim.draw.plots import (
     KINDS,
     plot_energy,
@@ -32,7 +32,7 @@ from tests.draw.datasets import stopped, swinging
 
 @pytest.fixture(autouse=True)
 def _settings() -> Iterator[None]:
-    with drawing():
+    with plot_style():
         yield
 
 
@@ -259,11 +259,11 @@ def test_plots_and_endings_that_there_are_not_are_told(tmp_path: Path) -> None:
     with pytest.raises(PictureError) as caught:
         require_kind("joint")
     assert str(caught.value) == (
-        "there is no plot 'joint'. Did you mean 'joints'? Allowed: joints, tool, energy, tracking"
+        "unknown plot 'joint'. Did you mean 'joints'? Allowed: joints, tool, energy, tracking"
     )
     with pytest.raises(PictureError) as caught:
         write_plot(tmp_path / "a.jpg", rollout(), "joints")
-    assert str(caught.value) == "'a.jpg' is no plot that can be written; allowed endings: .png, .svg, .pdf"
+    assert str(caught.value) == "cannot write 'a.jpg' as a plot; allowed endings: .png, .svg, .pdf"
     with pytest.raises(OutputError) as caught_output:
         write_plot(tmp_path / "no" / "a.png", rollout(), "energy")
     assert str(caught_output.value) == (
@@ -272,7 +272,7 @@ def test_plots_and_endings_that_there_are_not_are_told(tmp_path: Path) -> None:
 
 
 def test_an_axis_of_what_hardly_changes_does_not_show_noise() -> None:
-    low, high = view_range(0.5 + 1e-15 * np.arange(3))
+    low, high = value_range(0.5 + 1e-15 * np.arange(3))
     assert (low, high) == pytest.approx((0.5, 0.5), abs=2e-6)
     assert high - low > 1e-6
-    assert view_range(np.array([np.nan])) == view_range(np.zeros(1))
+    assert value_range(np.array([np.nan])) == value_range(np.zeros(1))

@@ -8,11 +8,14 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from dh2sim.draw.frame_figure.figure import draw_assignment, require_picture_ending
-from dh2sim.draw.frame_figure.paper import Label, drawing, place_labels, text_size
+from dh2sim.draw.frame_figure.figure import draw_assignment, require_frame_figure
+from dh2sim.draw.frame_figure.paper import text_size
 from dh2sim.draw.frame_figure.robot import ring_around
 from dh2sim.draw.frame_figure.scene import make_scene
-from dh2sim.draw.frame_figure.view import best_view, look_from
+from dh2sim.draw.frame_figure.view import best_view
+from dh2sim.draw.labels import Label, place_labels
+from dh2sim.draw.plot_style import plot_style
+from dh2sim.draw.projection import look_from
 from dh2sim.errors import OutputError, PictureError
 from dh2sim.importing.result import Imported
 from dh2sim.importing.sources import ImportOptions, import_axes, import_data
@@ -66,12 +69,12 @@ def test_users_settings_of_matplotlib_neither_matter_nor_change(tmp_path: Path) 
 
 @pytest.mark.parametrize("name", ["frames.gif", "frames"])
 def test_other_endings_are_refused(name: str, tmp_path: Path) -> None:
-    message = f"'{name}' is no picture that can be drawn; allowed endings: .svg, .png, .pdf"
+    message = f"cannot write '{name}' as a plot; allowed endings: .png, .svg, .pdf"
     with pytest.raises(PictureError) as caught:
         draw_assignment(puma(), tmp_path / name)
     assert str(caught.value) == message
     with pytest.raises(PictureError) as caught:
-        require_picture_ending(Path(name))
+        require_frame_figure(Path(name))
     assert str(caught.value) == message
     assert not list(tmp_path.iterdir())
 
@@ -178,7 +181,7 @@ def test_the_view_is_a_projection_along_one_direction_with_z_upright() -> None:
         np.testing.assert_allclose(
             [view.right @ view.right, view.up @ view.up, view.right @ view.up], [1, 1, 0], atol=1e-12
         )
-        flat = view.flat([[0, 0, 1], [0, 0, 0]])
+        flat = view.project([[0, 0, 1], [0, 0, 0]])
         assert flat[0, 1] > flat[1, 1]
         assert flat[0, 0] == pytest.approx(flat[1, 0])
 
@@ -186,12 +189,12 @@ def test_the_view_is_a_projection_along_one_direction_with_z_upright() -> None:
 def test_the_view_shows_the_puma_without_crossings_and_with_its_axes_apart() -> None:
     scene = make_scene(puma())
     view = best_view(scene)
-    directions = view.flat(np.eye(3))
+    directions = view.project(np.eye(3))
     assert np.linalg.norm(directions, axis=1).min() > 0.35
-    places = view.flat(np.array(scene.origins))
+    places = view.project(np.array(scene.origins))
     size = np.ptp(places, axis=0).max()
     assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(places, 2)) > 0.05 * size
-    lengths = {(s.letter, s.index): view.flat([s.start, s.end]) for s in scene.segments}
+    lengths = {(s.letter, s.index): view.project([s.start, s.end]) for s in scene.segments}
     a2, d4 = lengths["a", 2], lengths["d", 4]
     shares = np.linalg.solve(np.column_stack([a2[1] - a2[0], d4[0] - d4[1]]), d4[0] - a2[0])
     assert not (0 < shares[0] < 1 and 0 < shares[1] < 1), "the forearm does not hide the upper arm"
@@ -212,10 +215,17 @@ def test_the_arrow_around_a_turning_joint_is_right_handed(direction: tuple[float
 def test_labels_keep_off_each_other_and_off_what_is_drawn() -> None:
     line = np.column_stack([np.linspace(0, 200, 101), np.zeros(101)])
     labels = [
-        Label(text=f"$x_{{{k}}}$", color="k", size=10, anchor=np.array([100.0, 0.0]), towards=np.array([1.0, 0.0]))
+        Label(
+            text=f"$x_{k}$",
+            color="k",
+            size=10,
+            box=text_size(f"$x_{k}$", 10),
+            anchor=np.array([100.0, 0.0]),
+            towards=np.array([1.0, 0.0]),
+        )
         for k in range(8)
     ]
-    with drawing():
+    with plot_style():
         placed = place_labels(labels, line)
         boxes = [_box(item.centre, item.label) for item in placed]
     for (low, high), (other_low, other_high) in itertools.combinations(boxes, 2):

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dh2sim.draw.projection import Pinhole
 from dh2sim.robot.read import builtin_robots, load_robot
 from dh2sim.view.events import SelectRow, SetCamera, Show
 from dh2sim.view.initial_state import open_state
@@ -16,7 +17,6 @@ from dh2sim.view.reduce import reduce
 from dh2sim.view.scene.camera import FIELD_OF_VIEW, viewpoint_of
 from dh2sim.view.scene.items import Label, Scene, Vector
 from dh2sim.view.scene.labels import HEIGHT, spread_labels, width
-from dh2sim.view.scene.pinhole import Pinhole
 from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import Part, ViewState
 

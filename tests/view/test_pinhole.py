@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dh2sim.draw.projection import Pinhole
 from dh2sim.typing import Array
-from dh2sim.view.scene.pinhole import Pinhole, pinhole_of
+from dh2sim.view.scene.pinhole import pinhole_of
 
 
 @dataclass

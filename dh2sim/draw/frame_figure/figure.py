@@ -1,9 +1,4 @@
-"""A picture of joint axes and the frames that were assigned to them.
-
-What the signs of the picture mean.
-
-A table's rows beneath a picture of its frames.
-"""
+"""A picture of joint axes and the frames assigned to them: title, robot, legend, and the table beneath."""
 
 from __future__ import annotations
 
@@ -15,19 +10,16 @@ import numpy as np
 from dh2sim.draw.frame_figure.paper import (
     A_COLOR,
     D_COLOR,
-    INK,
-    QUIET,
     X_COLOR,
     Y_COLOR,
     Z_COLOR,
     Paper,
-    drawing,
-    require_picture_ending,
     text_size,
 )
 from dh2sim.draw.frame_figure.robot import RobotDrawing
 from dh2sim.draw.frame_figure.scene import Scene, make_scene
 from dh2sim.draw.frame_figure.view import best_view
+from dh2sim.draw.plot_style import GREY, INK, plot_style, require_plot
 from dh2sim.importing.explain import GLUE, degrees, number, pose
 from dh2sim.importing.result import Imported
 from dh2sim.robot.spec import Convention, RobotSpec, Row
@@ -41,7 +33,7 @@ _LEGEND_GAP = 14.0
 def draw_legend(paper: Paper, middle: float, y: float) -> None:
     """Draw one line of signs around a middle, at a height, pt."""
     entries = (
-        ("axis of a joint", QUIET, 0.9, (0, (9, 3, 2, 3))),
+        ("axis of a joint", GREY, 0.9, (0, (9, 3, 2, 3))),
         ("a, along x", A_COLOR, 1.5, "-"),
         ("d, along z", D_COLOR, 1.5, "-"),
     )
@@ -158,10 +150,18 @@ def _plain(text: str) -> str:
     return text.replace("-", _MINUS)
 
 
-__all__ = ["draw_assignment", "require_picture_ending"]
-
 _BORDER = 14.0
 _TITLE = 11.0
+
+
+def require_frame_figure(path: Path) -> None:
+    """Check that a picture of frames can be written to a file of this name.
+
+    Raises:
+        PictureError: The ending is none of those allowed.
+        MissingExtraError: matplotlib is not installed.
+    """
+    require_plot(path, what="a picture of frames")
 
 
 def draw_assignment(imported: Imported, path: Path) -> None:
@@ -175,13 +175,14 @@ def draw_assignment(imported: Imported, path: Path) -> None:
         path: .svg, .png or .pdf; a file that stands there is replaced.
 
     Raises:
-        PictureError: The ending is another one.
+        PictureError: The ending is none of those allowed.
+        MissingExtraError: matplotlib is not installed.
         OutputError: The file cannot be written.
         ValueError: The robot was made of a table, to which no frames were assigned.
     """
-    require_picture_ending(path)
+    require_frame_figure(path)
     scene = make_scene(imported)
-    with drawing():
+    with plot_style():
         paper = Paper()
         RobotDrawing(paper, scene, best_view(scene)).draw()
         _write_around(paper, scene)

@@ -13,19 +13,16 @@ from dh2sim.draw.frame_figure.paper import (
     A_COLOR,
     BODY,
     D_COLOR,
-    INK,
-    LEADER,
-    QUIET,
     X_COLOR,
     Y_COLOR,
     Z_COLOR,
-    Label,
     Paper,
-    PlacedLabel,
-    place_labels,
+    text_size,
 )
 from dh2sim.draw.frame_figure.scene import JointAxis, Scene
-from dh2sim.draw.frame_figure.view import View
+from dh2sim.draw.labels import Label, PlacedLabel, place_labels
+from dh2sim.draw.plot_style import GREY, INK
+from dh2sim.draw.projection import ParallelView
 from dh2sim.typing import Array
 
 _WIDTH, _HEIGHT = 380.0, 270.0
@@ -41,15 +38,17 @@ _RING = 8.0
 """Radius of the arrow that shows a turning joint, pt."""
 _STEP = 22.0
 """Between the signs of joints in line, pt."""
+_LEADER = 18.0
+"""pt: labels that are farther off get a thin line to what they name."""
 
 
 class RobotDrawing:
     """Draws a scene, base_link's origin at the origin of the paper; lengths on the paper are in pt."""
 
-    def __init__(self, paper: Paper, scene: Scene, view: View) -> None:
+    def __init__(self, paper: Paper, scene: Scene, view: ParallelView) -> None:
         """Choose the scale."""
         self._paper, self._scene, self._view = paper, scene, view
-        size = np.ptp(view.flat(scene.corners), axis=0)
+        size = np.ptp(view.project(scene.corners), axis=0)
         self._scale = float(np.min(np.array([_WIDTH, _HEIGHT]) / np.maximum(size, 1e-9)))
         self._pointers = self._pointer_scale()
         self._labels: list[tuple[int, Label]] = []
@@ -67,7 +66,7 @@ class RobotDrawing:
             self._write(placed)
 
     def _at(self, point: Array) -> Array:
-        return np.asarray(self._scale * self._view.flat(point))
+        return np.asarray(self._scale * self._view.project(point))
 
     def _pointer_scale(self) -> float:
         """Return by how much frames' axes are shortened where frames are close to each other."""
@@ -78,11 +77,20 @@ class RobotDrawing:
     def _label(
         self, rank: int, text: str, color: str, size: float, anchor: Array, towards: Array, **how: Any
     ) -> None:
-        self._labels.append((rank, Label(text=text, color=color, size=size, anchor=anchor, towards=towards, **how)))
+        label = Label(
+            text=text,
+            color=color,
+            size=size,
+            box=text_size(text, size),
+            anchor=anchor,
+            towards=towards,
+            **how,
+        )
+        self._labels.append((rank, label))
 
     def _write(self, placed: PlacedLabel) -> None:
         label = placed.label
-        if placed.distance > LEADER:
+        if placed.distance > _LEADER:
             way = placed.centre - label.anchor
             share = (placed.distance + label.clear) / float(np.linalg.norm(way))
             ends = np.array([label.anchor + 2.0 * way / np.linalg.norm(way), label.anchor + share * way])
@@ -107,7 +115,7 @@ class RobotDrawing:
     def _dashed(self, start: Array, end: Array) -> None:
         ends = np.array([self._at(start), self._at(end)])
         if np.linalg.norm(ends[1] - ends[0]) > 0.5:
-            self._paper.line(ends, QUIET, 1.2, layer=2, ls=(0, (2, 2)))
+            self._paper.line(ends, GREY, 1.2, layer=2, ls=(0, (2, 2)))
 
     def _lengths(self) -> None:
         for segment in self._scene.segments:
@@ -128,7 +136,7 @@ class RobotDrawing:
         for pointer in self._scene.pointers:
             color, length, width = _POINTERS[pointer.letter]
             start = self._at(pointer.origin)
-            way = self._pointers * length * self._view.flat(pointer.direction)
+            way = self._pointers * length * self._view.project(pointer.direction)
             layer = {"x": 7, "y": 5, "z": 6}[pointer.letter]
             if np.linalg.norm(way) > 4.0:
                 self._paper.arrow(start, start + way, color, width, layer=layer)
@@ -140,13 +148,13 @@ class RobotDrawing:
 
     def _axis(self, axis: JointAxis) -> None:
         """The line, and a sign for every joint: the first beyond one end, the others beyond the other one."""
-        flat = self._view.flat(axis.direction)
+        flat = self._view.project(axis.direction)
         along = flat / max(0.25, float(np.linalg.norm(flat)))
         start, end = self._at(axis.start), self._at(axis.end)
         many = len(axis.joints) > 1
         upper = _REACH + _STEP * max(0, len(axis.joints) - 2)
         ends = np.array([start - (_REACH if many else 0.35 * _REACH) * along, end + upper * along])
-        self._paper.line(ends, QUIET, 0.9, layer=2, ls=(0, (9, 3, 2, 3)))
+        self._paper.line(ends, GREY, 0.9, layer=2, ls=(0, (9, 3, 2, 3)))
         for k, (joint, sense) in enumerate(zip(axis.joints, axis.senses, strict=True)):
             if many and k == 0:
                 place = start - (_REACH - 11.0) * along
@@ -160,13 +168,13 @@ class RobotDrawing:
 
     def _turning(self, at: Array, direction: Array) -> None:
         """An arrow around the axis, right-handed."""
-        ring = _RING * self._view.flat(ring_around(direction, self._view.up))
+        ring = _RING * self._view.project(ring_around(direction, self._view.up))
         self._paper.line(at + ring[:-2], INK, 1.1, layer=5)
         self._paper.arrow(at + ring[-6], at + ring[-1], INK, 1.1, layer=5)
 
     def _sliding(self, at: Array, direction: Array) -> None:
         """A box with an arrow along the axis."""
-        flat = self._view.flat(direction)
+        flat = self._view.project(direction)
         along = flat / (float(np.linalg.norm(flat)) or 1.0)
         aside = 4.2 * np.array([-along[1], along[0]])
         box = np.array([at - 8.0 * along - aside, at + 8.0 * along - aside, at + 8.0 * along + aside])

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from dh2sim.draw.frame_figure.scene import SAME, Scene
+from dh2sim.draw.projection import ParallelView, look_from
 from dh2sim.typing import Array
 
 _AZIMUTHS = tuple(sign * azimuth for azimuth in (*range(20, 75, 5), *range(110, 165, 5)) for sign in (-1, 1))
@@ -24,30 +23,7 @@ _OPEN = math.radians(22)
 """Between axes in the picture."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class View:
-    """Parallel projection; base_link's z is upright."""
-
-    right: Array
-    """What is to the right in the picture, shape (3,)."""
-    up: Array
-    """What is upwards in the picture, shape (3,)."""
-
-    def flat(self, points: ArrayLike) -> Array:
-        """Project points, shape (..., 3), on the paper, shape (..., 2)."""
-        return np.stack([np.asarray(points) @ self.right, np.asarray(points) @ self.up], axis=-1)
-
-
-def look_from(azimuth: float, elevation: float) -> View:
-    """Return the view from a direction, degrees."""
-    az, el = math.radians(azimuth), math.radians(elevation)
-    return View(
-        right=np.array([-math.sin(az), math.cos(az), 0.0]),
-        up=np.array([-math.sin(el) * math.cos(az), -math.sin(el) * math.sin(az), math.cos(el)]),
-    )
-
-
-def best_view(scene: Scene) -> View:
+def best_view(scene: Scene) -> ParallelView:
     """Return the view that keeps points, lines and directions apart that are so in space."""
     places = itertools.product(_AZIMUTHS, _ELEVATIONS)
     directions = _distinct_directions(scene)
@@ -58,11 +34,11 @@ def best_view(scene: Scene) -> View:
 def _merit(scene: Scene, directions: Array, azimuth: int, elevation: int) -> float:
     view = look_from(azimuth, elevation)
     corners = scene.corners
-    size = float(np.ptp(view.flat(corners), axis=0).max()) or 1.0
+    size = float(np.ptp(view.project(corners), axis=0).max()) or 1.0
     turned = abs((azimuth - _USUAL[0] + 180) % 360 - 180)
     unusual = turned / 90 + abs(elevation - _USUAL[1]) / 60
     return (
-        _directions(view.flat(directions))
+        _directions(view.project(directions))
         + _distances(scene, view, size)
         - 0.5 * _crossings(scene, view)
         - 0.3 * unusual
@@ -89,25 +65,25 @@ def _directions(flat: Array) -> float:
     return least + min([_OPEN, *angles]) / _OPEN
 
 
-def _distances(scene: Scene, view: View, size: float) -> float:
+def _distances(scene: Scene, view: ParallelView, size: float) -> float:
     """How well points keep apart from each other, and from lengths that they do not belong to."""
-    points = view.flat(np.array(scene.origins))
+    points = view.project(np.array(scene.origins))
     enough = _ENOUGH * size
     apart = [min(enough, float(np.linalg.norm(a - b))) / enough for a, b in itertools.combinations(points, 2)] or [
         1.0
     ]
     beside = [1.0]
     for segment in scene.segments:
-        start, end = view.flat([segment.start, segment.end])
+        start, end = view.project([segment.start, segment.end])
         for origin, point in zip(scene.origins, points, strict=True):
             if min(_gap(origin, segment.start), _gap(origin, segment.end)) > SAME * size:
                 beside.append(min(enough, _to_segment(point, start, end)) / enough)
     return min(apart) + float(np.mean(apart)) + min(beside)
 
 
-def _crossings(scene: Scene, view: View) -> int:
+def _crossings(scene: Scene, view: ParallelView) -> int:
     """How many lengths cross each other in the picture."""
-    flat = [view.flat([segment.start, segment.end]) for segment in scene.segments]
+    flat = [view.project([segment.start, segment.end]) for segment in scene.segments]
     return sum(_cross(a, b) for a, b in itertools.combinations(flat, 2))
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dh2sim.draw.projection import Pinhole
 from dh2sim.kinematics.transforms import compose
 from dh2sim.model.meshes import MeshAsset
 from dh2sim.model.robot_model import RobotModel
@@ -19,7 +20,7 @@ from dh2sim.typing import Array
 from dh2sim.view.events import SetCamera
 from dh2sim.view.scene.items import Vector, vector
 from dh2sim.view.scene.link_poses import frame_origins, poses_at, robot_size
-from dh2sim.view.scene.pinhole import Pinhole, pinhole_of
+from dh2sim.view.scene.pinhole import pinhole_of
 from dh2sim.view.scene.solids import mesh_triangles
 
 if TYPE_CHECKING:

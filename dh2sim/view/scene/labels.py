@@ -8,17 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from dh2sim.typing import Array
+from dh2sim.draw.labels import vertical_shift
+from dh2sim.draw.projection import Pinhole
 from dh2sim.view.scene.items import Label
-from dh2sim.view.scene.pinhole import Pinhole
 
 HEIGHT: Final = 18.0
 """Pixels, of a label with a margin: viser's letters are 12 pixels high."""
 _LETTER_WIDTH: Final = 7.0
 _MARGIN: Final = 6.0
-_STEP: Final = 0.5 * HEIGHT
-_MAX_STEPS: Final = 12
-"""That a label is moved up or down at most, so that it stays near what it names."""
 
 
 def spread_labels(labels: Mapping[str, Label], pinhole: Pinhole, first: Iterable[str] = ()) -> dict[str, Label]:
@@ -45,7 +42,8 @@ def spread_labels(labels: Mapping[str, Label], pinhole: Pinhole, first: Iterable
         x, y, depth = (float(value) for value in seen[i])
         if not depth > 0.0:
             continue
-        shift = _shift(x, y, places[:i], 0.5 * (widths[:i] + widths[i]))
+        beside = places[:i][np.abs(places[:i, 0] - x) < 0.5 * (widths[:i] + widths[i]), 1]
+        shift = vertical_shift(y, beside, HEIGHT)
         places[i] = x, y + shift
         if shift != 0.0:
             moved[name] = replace(labels[name], position=pinhole.raised(labels[name].position, shift, depth))
@@ -55,13 +53,3 @@ def spread_labels(labels: Mapping[str, Label], pinhole: Pinhole, first: Iterable
 def width(text: str) -> float:
     """Return the approximate width of a label, pixels."""
     return _LETTER_WIDTH * len(text) + _MARGIN
-
-
-def _shift(x: float, y: float, taken: Array, apart: Array) -> float:
-    """Return by how many pixels a label must go up; ``taken`` are the places of others, shape (count, 2)."""
-    beside = taken[np.abs(taken[:, 0] - x) < apart, 1]
-    if not beside.size:
-        return 0.0
-    shifts = _STEP * np.array(sorted(range(-_MAX_STEPS, _MAX_STEPS + 1), key=lambda k: (abs(k), -k)))
-    free = (np.abs(y + shifts[:, None] - beside) >= HEIGHT).all(axis=1)
-    return float(shifts[np.argmax(free)]) if free.any() else 0.0

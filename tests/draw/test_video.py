@@ -1,4 +1,4 @@
-"""Films and stills as files: read back by other programs."""
+"""Videos and pictures as files, read back by other programs."""
 
 from __future__ import annotations
 
@@ -11,21 +11,20 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
-from dh2sim.draw.renderer import Look, stage
+from dh2sim.draw.renderer import PictureOptions, open_motion
 from dh2sim.draw.video import (
-    Tempo,
-    check_gif,
-    film_positions,
-    require_ending,
-    write_film,
+    VideoSpeed,
+    require_picture,
+    video_positions,
     write_gif,
+    write_image,
     write_mp4,
-    write_still,
+    write_video,
 )
 from dh2sim.errors import PictureError
 from tests.draw.drawing import moving, require_gl
 
-LOOK = Look(width=160, height=120)
+OPTIONS = PictureOptions(width=160, height=120)
 
 
 def decoded(path: Path) -> tuple[str, NDArray[np.uint8]]:
@@ -41,16 +40,16 @@ def test_an_mp4_is_h264_of_the_right_size_speed_and_length_and_shows_what_was_dr
     require_gl()
     out = tmp_path / "film.mp4"
     told: list[int] = []
-    motion, tempo = moving(), Tempo(fps=30.0, speed=0.25)
-    count = write_film(out, motion, LOOK, tempo, told.append)
+    motion, speed = moving(), VideoSpeed(fps=30.0, speed=0.25)
+    count = write_video(out, motion, OPTIONS, speed, told.append)
     about, pictures = decoded(out)
     assert count == len(pictures) == 15, "0.12 s at a quarter of the speed"
     assert told == [1] * 15
     for part in ("h264", "yuv420p(tv, bt709", "160x120", "30 fps"):
         assert part in about
-    with stage(motion, LOOK) as scene:
+    with open_motion(motion, OPTIONS) as renderer:
         for number in (0, 14):
-            drawn = scene.picture(film_positions(motion, tempo)[number]).astype(float)
+            drawn = renderer.picture(video_positions(motion, speed)[number]).astype(float)
             assert np.abs(pictures[number] - drawn).mean() < 4.0
     assert [path.name for path in tmp_path.iterdir()] == ["film.mp4"]
 
@@ -59,13 +58,13 @@ def test_an_mp4_is_h264_of_the_right_size_speed_and_length_and_shows_what_was_dr
 def test_a_gif_has_the_right_size_times_and_colours(tmp_path: Path) -> None:
     require_gl()
     out = tmp_path / "film.gif"
-    motion, tempo = moving(), Tempo(fps=30.0, speed=0.25)
-    assert write_film(out, motion, LOOK, tempo) == 15
-    with Image.open(out) as film, stage(motion, LOOK) as scene:
+    motion, speed = moving(), VideoSpeed(fps=30.0, speed=0.25)
+    assert write_video(out, motion, OPTIONS, speed) == 15
+    with Image.open(out) as film, open_motion(motion, OPTIONS) as renderer:
         assert (film.size, film.info["loop"]) == ((160, 120), 0)
         shown = 0
         for _ in ImageSequence.Iterator(film):
-            drawn = scene.picture(film_positions(motion, tempo)[round(shown * 30 / 1000)]).astype(float)
+            drawn = renderer.picture(video_positions(motion, speed)[round(shown * 30 / 1000)]).astype(float)
             assert np.abs(np.asarray(film.convert("RGB")) - drawn).mean() < 6.0
             shown += film.info["duration"]
         assert shown == 500, "thirtieths of a second do not add up to something else"
@@ -79,7 +78,7 @@ def test_pictures_of_a_gif_that_are_alike_take_next_to_no_room(tmp_path: Path) -
         pictures = [picture.copy() for _ in range(count)]
         for k, copy in enumerate(pictures):
             copy[10:14, 5 * k : 5 * k + 4] = 0
-        write_gif(tmp_path / "a.gif", pictures, pictures[:1], fps=10.0)
+        write_gif(tmp_path / "a.gif", pictures, pictures[:1], width=120, height=100, fps=10.0, count=count)
         sizes.append((tmp_path / "a.gif").stat().st_size)
     assert sizes[1] < 1.6 * sizes[0]
 
@@ -88,7 +87,7 @@ def test_rare_colours_are_kept_in_a_gif(tmp_path: Path) -> None:
     grey = np.linspace(0, 255, 200 * 300).reshape(200, 300)
     picture = np.stack([grey, grey, grey], axis=2).astype(np.uint8)
     picture[50, 60:80] = (224, 36, 30)
-    write_gif(tmp_path / "a.gif", [picture], [picture], fps=10.0)
+    write_gif(tmp_path / "a.gif", [picture], [picture], width=300, height=200, fps=10.0, count=1)
     with Image.open(tmp_path / "a.gif") as read:
         assert np.abs(np.asarray(read.convert("RGB"))[50, 70].astype(int) - (224, 36, 30)).max() < 12
 
@@ -96,61 +95,57 @@ def test_rare_colours_are_kept_in_a_gif(tmp_path: Path) -> None:
 def test_a_still_is_the_picture_that_was_drawn(tmp_path: Path) -> None:
     require_gl()
     motion = moving()
-    write_still(tmp_path / "a.png", motion, LOOK, 5)
-    with Image.open(tmp_path / "a.png") as read, stage(motion, LOOK) as scene:
-        assert np.array_equal(np.asarray(read), scene.picture(5))
+    write_image(tmp_path / "a.png", motion, OPTIONS, 5)
+    with Image.open(tmp_path / "a.png") as read, open_motion(motion, OPTIONS) as renderer:
+        assert np.array_equal(np.asarray(read), renderer.picture(5))
 
 
 def test_pictures_follow_real_time() -> None:
     motion = moving()
     # a record every 4 ms: 250 a second
-    assert film_positions(motion, Tempo(fps=125.0, speed=0.5)) == list(range(31))
-    assert film_positions(motion, Tempo(fps=125.0, speed=1.5)) == list(range(0, 31, 3))
-    assert film_positions(motion, Tempo(fps=125.0, speed=0.25))[::2] == list(range(31))
-    assert film_positions(motion, Tempo(fps=1.0)) == [0]
+    assert video_positions(motion, VideoSpeed(fps=125.0, speed=0.5)) == list(range(31))
+    assert video_positions(motion, VideoSpeed(fps=125.0, speed=1.5)) == list(range(0, 31, 3))
+    assert video_positions(motion, VideoSpeed(fps=125.0, speed=0.25))[::2] == list(range(31))
+    assert video_positions(motion, VideoSpeed(fps=1.0)) == [0]
 
 
 @pytest.mark.parametrize(
-    ("tempo", "told"),
+    ("speed", "message"),
     [
-        ({"fps": 0.0}, "0 pictures a second are not from 1 to 240"),
-        ({"fps": float("nan")}, "nan pictures a second are not from 1 to 240"),
-        ({"fps": 30.0, "speed": 0.0}, "the speed 0 is not from 1e-6 to 1e6"),
+        ({"fps": 0.0}, "the rate must be from 1 to 240 pictures per second, got 0"),
+        ({"fps": float("nan")}, "the rate must be from 1 to 240 pictures per second, got nan"),
+        ({"fps": 30.0, "speed": 0.0}, "the speed must be from 1e-6 to 1e6, got 0"),
     ],
 )
-def test_a_tempo_that_cannot_be_is_told(tempo: dict[str, float], told: str) -> None:
+def test_rates_and_speeds_out_of_range_are_refused(speed: dict[str, float], message: str) -> None:
     with pytest.raises(PictureError) as caught:
-        Tempo(**tempo)
-    assert str(caught.value) == told
+        VideoSpeed(**speed)
+    assert str(caught.value) == message
 
 
-def test_endings_that_are_not_known_are_told() -> None:
-    require_ending(Path("RUN.MP4"))
+def test_unknown_endings_are_refused() -> None:
+    require_picture(Path("RUN.MP4"))
     for name in ("run.avi", "run"):
         with pytest.raises(PictureError) as caught:
-            require_ending(Path(name))
-        assert str(caught.value) == (f"'{name}' is no picture that can be written; allowed endings: .mp4, .gif, .png")
+            require_picture(Path(name))
+        assert str(caught.value) == f"cannot write '{name}' as a picture; allowed endings: .mp4, .gif, .png"
 
 
-def test_an_mp4_of_odd_size_is_refused_with_one_that_would_do(tmp_path: Path) -> None:
+def test_an_mp4_of_odd_size_is_refused_with_an_even_one(tmp_path: Path) -> None:
     with pytest.raises(PictureError) as caught:
         write_mp4(tmp_path / "a.mp4", [], width=161, height=120, fps=30.0)
-    assert str(caught.value) == "an .mp4 needs an even width and height, got 161x120; --size 162x120 would do"
+    assert str(caught.value) == "an .mp4 needs an even width and height, got 161x120; use 162x120"
 
 
-def test_a_gif_that_is_too_fast_or_too_long_is_refused() -> None:
+def test_a_gif_that_is_too_fast_is_refused(tmp_path: Path) -> None:
     with pytest.raises(PictureError) as caught:
-        check_gif(10, width=10, height=10, fps=60.0)
-    assert str(caught.value) == "a .gif shows at most 50 pictures a second, got 60; lower --fps or write .mp4"
-    with pytest.raises(PictureError) as caught:
-        check_gif(1000, width=1280, height=720, fps=25.0)
-    assert str(caught.value) == (
-        "1000 pictures of 1280x720 are too much for a .gif; write .mp4, or lower --size or --fps"
-    )
+        write_video(tmp_path / "a.gif", moving(), OPTIONS, VideoSpeed(fps=60.0))
+    assert str(caught.value) == "a .gif shows at most 50 pictures per second, got 60; lower the rate or write .mp4"
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("ending", ["mp4", "gif"])
-def test_an_interrupted_film_leaves_nothing_but_what_was_there_before(tmp_path: Path, ending: str) -> None:
+def test_an_interrupted_video_leaves_nothing_but_what_was_there_before(tmp_path: Path, ending: str) -> None:
     require_gl()
     out = tmp_path / f"film.{ending}"
     out.write_bytes(b"older")
@@ -159,6 +154,6 @@ def test_an_interrupted_film_leaves_nothing_but_what_was_there_before(tmp_path: 
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_film(out, moving(), LOOK, Tempo(fps=25.0), interrupt)
+        write_video(out, moving(), OPTIONS, VideoSpeed(fps=25.0), interrupt)
     assert [path.name for path in tmp_path.iterdir()] == [out.name]
     assert out.read_bytes() == b"older"
