@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draw the pictures of docs/conventions.md into docs/images: ``python scripts/draw_conventions.py [FOLDER]``.
 
-Needs matplotlib, which dh2sim itself does not. One version of matplotlib draws the same bytes every time.
+Needs the extra `plot`. One version of matplotlib draws the same bytes every time.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
-from numpy.typing import ArrayLike
 
+from dh2sim.draw.plot_style import GREY, INK
+from dh2sim.draw.projection import look_from
 from dh2sim.kinematics.transforms import joint_part, link_part
 from dh2sim.typing import Array
 
@@ -26,8 +27,6 @@ X_COLOR: Final = "#c0392b"
 Z_COLOR: Final = "#1f5fbf"
 LENGTH_COLOR: Final = "#1e7d4f"
 ANGLE_COLOR: Final = "#a35200"
-QUIET: Final = "#8a8f98"
-INK: Final = "#22262b"
 
 Offset = tuple[float, float]
 """Where a word goes from its point, in points of the type."""
@@ -39,20 +38,15 @@ class Scene:
     def __init__(self, axes: Any, *, azimuth: float, elevation: float) -> None:
         """Look at the origin from an azimuth and an elevation, degrees."""
         self.axes = axes
-        az, el = np.radians([azimuth, elevation])
-        self.right = np.array([-np.sin(az), np.cos(az), 0])
-        self.up = np.array([-np.sin(el) * np.cos(az), -np.sin(el) * np.sin(az), np.cos(el)])
+        view = look_from(azimuth, elevation)
+        self.right, self.up, self.flat = view.right, view.up, view.project
         axes.set_aspect("equal")
         axes.set_axis_off()
-
-    def flat(self, points: ArrayLike) -> Array:
-        """Project points, shape (..., 3), on the paper, shape (..., 2)."""
-        return np.stack([np.asarray(points) @ self.right, np.asarray(points) @ self.up], axis=-1)
 
     def line(self, start: Array, end: Array, **style: Any) -> None:
         """Draw a line behind everything else."""
         points = self.flat([start, end])
-        self.axes.plot(points[:, 0], points[:, 1], **{"color": QUIET, "lw": 1.2, "zorder": 1, **style})
+        self.axes.plot(points[:, 0], points[:, 1], **{"color": GREY, "lw": 1.2, "zorder": 1, **style})
 
     def arrow(self, start: Array, end: Array, color: str, *, style: str = "-|>", lw: float = 2.4) -> None:
         """Draw a straight arrow; a width of zero leaves its tip alone."""
@@ -91,7 +85,7 @@ class Scene:
     def axis_of_joint(self, start: Array, end: Array, index: str, offset: Offset) -> None:
         """Draw the line that a joint moves about or along, its name at its end."""
         self.line(start, end, ls=(0, (8, 3, 2, 3)))
-        self.word(end, f"axis of joint ${index}$", QUIET, offset, 11)
+        self.word(end, f"axis of joint ${index}$", GREY, offset, 11)
 
 
 def draw_frame(
@@ -134,7 +128,7 @@ def standard(axes: Any) -> None:
     scene.axis_of_joint(foot - 0.6 * up, corner + 1.3 * up, "i", (0, 10))
     scene.axis_of_joint(tip - 1.3 * z_new, tip + 2.6 * z_new, "i+1", (20, 10))
     scene.line(corner, tip, color=INK, lw=1.6)
-    scene.word(0.3 * corner + 0.7 * tip, "common normal", QUIET, (6, -19), 10)
+    scene.word(0.3 * corner + 0.7 * tip, "common normal", GREY, (6, -19), 10)
 
     scene.line(corner, corner + 1.3 * x_old, ls="--", color=X_COLOR)
     scene.arc(corner, 0.95 * x_old, up, theta)
@@ -147,7 +141,7 @@ def standard(axes: Any) -> None:
 
     scene.dimension(foot, corner, -0.8 * joint_part(np.radians(30), 0)[:3, 0], "$d_i$", (-14, 0))
     scene.dimension(corner, tip, 0.42 * up, "$a_i$", (0, 12))
-    scene.dot(corner, QUIET)
+    scene.dot(corner, GREY)
 
     draw_frame(scene, start, "i-1", (6, -12), (20, 0), (-19, 11))
     draw_frame(scene, end, "i", (14, 4), (14, -4), (-2, -15))
@@ -166,7 +160,7 @@ def modified(axes: Any) -> None:
     scene.axis_of_joint(foot - 0.8 * z_old, foot + 2.2 * z_old, "i-1", (0, 10))
     scene.axis_of_joint(corner - 0.9 * z_new, tip + 2.0 * z_new, "i", (30, 10))
     scene.line(foot, corner, color=INK, lw=1.6)
-    scene.word(0.4 * foot + 0.6 * corner, "common normal", QUIET, (2, 18), 10)
+    scene.word(0.4 * foot + 0.6 * corner, "common normal", GREY, (2, 18), 10)
 
     scene.line(corner, corner + 1.4 * z_old, ls="--", color=Z_COLOR)
     scene.arc(corner, 1.2 * z_old, x_old, alpha)
@@ -179,7 +173,7 @@ def modified(axes: Any) -> None:
 
     scene.dimension(foot, corner, -0.5 * z_old, "$a_{i-1}$", (0, -13))
     scene.dimension(corner, tip, 0.45 * x_old, "$d_i$", (12, -6))
-    scene.dot(corner, QUIET)
+    scene.dot(corner, GREY)
 
     draw_frame(scene, start, "i-1", (0, 14), (-20, 0), (-20, -4))
     draw_frame(scene, end, "i", (-10, 6), (14, -4), (-14, -6))

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Draw the README's picture of a rollout: the Stanford arm with its frames and its tool's path, beside its joints.
+"""Draw the README's picture of a rollout: the Stanford arm with its frames and the path of its tool, and its joints.
 
     python scripts/draw_rollout.py [ROBOT] [--out docs/images/rollout.png]
 
-Simulates one rollout with the program itself and needs EGL or OSMesa to draw, like 'dh2sim render'.
+Simulates one rollout with the program itself. Needs the extras `plot` and `video`, and EGL or OSMesa.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ HEIGHT = 760
 ARM, JOINTS = 720, 960
 """Widths, pixels."""
 ROLLOUT = 7
-"""One that shows much of the arm."""
+"""One in which much of the arm is seen."""
 
 
 def dh2sim(*arguments: str | int | Path) -> None:

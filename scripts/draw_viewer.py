@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Take docs/images/viewer.png: the viewer in a real browser, a row of the table explained in the scene.
+"""Take docs/images/viewer.png: the viewer in a real browser, with a row of the table explained in the scene.
 
 Needs the extra `test`, and Chromium.
 """
@@ -21,7 +21,7 @@ SOFTWARE = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enab
 
 
 def main() -> None:
-    """Open the page, choose a row, wait until all is drawn, and take the picture."""
+    """Open the page, choose a row, wait until everything is drawn, and take the picture."""
     browser_path = shutil.which("chromium") or shutil.which("google-chrome")
     viewer = Viewer(open_state(load_robot("stanford"), folder_of("stanford")), host=HOST, port=free_port(HOST, 8450))
     try:

@@ -3,20 +3,19 @@
 
     python scripts/render_robots.py [ROBOT...] [--out docs/images/robots.png] [--size 640x560]
 
-Needs EGL or OSMesa to draw without a screen (MUJOCO_GL=egl, the default here, or osmesa).
+Needs the extra `video`, and EGL or OSMesa to render without a screen.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
-
-os.environ.setdefault("MUJOCO_GL", "egl")
 
 import mujoco
 import numpy as np
 from PIL import Image
+
+from dh2sim.draw.offscreen import open_renderer
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -27,7 +26,7 @@ def render(robot: str, width: int, height: int) -> np.ndarray:
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
     mujoco.mj_forward(model, data)
-    with mujoco.Renderer(model, height, width) as renderer:
+    with open_renderer(model, width, height) as renderer:
         renderer.update_scene(data, camera="overview")
         return np.array(renderer.render())
 

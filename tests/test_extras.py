@@ -127,6 +127,7 @@ def test_a_run_is_simulated_before_nothing_that_is_missing(folder: Path) -> None
     assert not (folder / "late.zarr").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [
@@ -149,6 +150,7 @@ def test_the_core_works_without_any_extra(folder: Path, tmp_path: Path, command:
     assert (done.status, done.err) == (0, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".stl", ".obj", ".ply", ".glb"])
 def test_the_core_reads_meshes(tmp_path: Path, suffix: str) -> None:
     import trimesh

@@ -109,7 +109,7 @@ def fit(points: Array, azimuth: float, elevation: float, aspect: float) -> tuple
     Args:
         points: shape (count, 3), m.
         azimuth: of the direction in which the camera looks, degrees.
-        elevation: likewise.
+        elevation: of that direction, degrees.
         aspect: width over height.
     """
     a, e = math.radians(azimuth), math.radians(elevation)

@@ -1,4 +1,4 @@
-"""What a film shows: a compiled model, and the positions that it goes through."""
+"""What a video shows: a compiled model and the positions that it goes through."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from dh2sim.model.robot_model import RobotModel
 
 MOST_POSES = 600
-"""Poses in which the extent of a motion is measured, and points of the tool's trace."""
+"""Largest number of poses in which the extent of a motion is measured, and of points of the tool's path."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Motion:
-    """A model in its scene and a row of its positions."""
+    """A model in its scene and a sequence of its positions."""
 
     model: Any = field(repr=False)
     """``mujoco.MjModel``."""
@@ -39,7 +39,7 @@ class Motion:
 
     @property
     def travel(self) -> Array:
-        """How far base_link has gone from where it was at first, m, shape (count, 3)."""
+        """Displacement of base_link from its first position, m, shape (count, 3)."""
         return self.qpos[:, :3] - self.qpos[0, :3] if self.floats else np.zeros((len(self.qpos), 3))
 
     def place(self, data: Any, number: int) -> None:
@@ -50,7 +50,7 @@ class Motion:
         mujoco.mj_camlight(self.model, data)
 
     def nearest(self, time: float) -> int:
-        """Return the number of the position nearest to an instant, s."""
+        """Return the index of the position nearest in time, s."""
         after = int(np.searchsorted(self.time, time))
         if after == 0:
             return 0
@@ -59,20 +59,20 @@ class Motion:
         return after
 
     def number_at(self, time: float | None) -> int:
-        """Return the number of the position at an instant, s; None: the last.
+        """Return the index of the position at a time, s; None: the last.
 
         Raises:
-            PictureError: there is none at that time.
+            PictureError: the motion does not include that time.
         """
         if time is None:
             return len(self.time) - 1
         first, last = float(self.time[0]), float(self.time[-1])
         if not first <= time <= last * (1.0 + 1e-9):
-            raise PictureError(f"there is nothing at {time:g} s: the motion goes from {first:g} to {last:g} s")
+            raise PictureError(f"the motion lasts from {first:g} to {last:g} s, got {time:g} s")
         return self.nearest(time)
 
     def sampled(self) -> list[int]:
-        """Return numbers of at most ``MOST_POSES`` positions, evenly spread, the first and the last among them."""
+        """Return indices of at most ``MOST_POSES`` positions, evenly spread from the first to the last."""
         last = len(self.time) - 1
         return sorted({round(k) for k in np.linspace(0, last, min(last + 1, MOST_POSES))})
 
@@ -83,18 +83,16 @@ def motion_of_run(rollout: RolloutData) -> Motion:
     Raises:
         PictureError: positions were not recorded, or the model in the run's attributes cannot be read.
     """
-    rollout.require("qpos", what="a film")
+    rollout.require("qpos", what="a video")
     attributes = rollout.attributes
     try:
         robot, mjcf, scene = (str(attributes[name]) for name in ("robot", "mjcf", "scene"))
         model = mujoco.MjModel.from_xml_string(scene, {f"{robot}.xml": mjcf.encode()})
     except KeyError as error:
-        raise PictureError(
-            f"{rollout.run}: the attribute {error} is missing, and so there is no model to show"
-        ) from None
+        raise PictureError(f"{rollout.run}: the attribute {error} is missing, so there is no model to show") from None
     except ValueError as error:
-        told = " ".join(str(error).split())
-        raise PictureError(f"{rollout.run}: MuJoCo refuses the model in the run's attributes: {told}") from error
+        reason = " ".join(str(error).split())
+        raise PictureError(f"{rollout.run}: MuJoCo refuses the model in the run's attributes: {reason}") from error
     parts = [rollout.values(name) for name in ("base_pose", "qpos") if name in rollout.data]
     qpos = np.concatenate(parts, axis=1)
     if qpos.shape[1] != model.nq:

@@ -63,7 +63,7 @@ def open_renderer(model: Any, width: int, height: int, *, max_geom: int = 10_000
         with _mujoco_gl(backend):
             renderer = mujoco.Renderer(model, height, width, max_geom)
     except Exception as error:  # a driver raises whatever it trips over
-        raise PictureError(f"{_failure(backend, str(error))}. {ADVICE}") from error
+        raise PictureError(f"{_backend_failure(backend, str(error))}. {ADVICE}") from error
     with renderer:
         yield renderer
 
@@ -82,7 +82,7 @@ def _working_backend() -> str:
         reason = _try(backend)
         if reason is None:
             return backend
-        failures.append(_failure(backend, reason))
+        failures.append(_backend_failure(backend, reason))
     raise PictureError(f"nothing can render here without a screen: {'; '.join(failures)}. {ADVICE}")
 
 
@@ -106,7 +106,7 @@ def _try(backend: str) -> str | None:
     return lines[-1].partition(": ")[2] if lines else f"exit status {done.returncode}"
 
 
-def _failure(backend: str, reason: str) -> str:
+def _backend_failure(backend: str, reason: str) -> str:
     """Return one line that says that a backend does not work, and why."""
     reason = " ".join(reason.split()).rstrip(" .()")
     if not reason or "'NoneType' object has no attribute" in reason:  # what PyOpenGL says of missing libraries

@@ -70,8 +70,8 @@ def saturated(rollout: RolloutData) -> NDArray[np.bool_]:
     try:
         model = mujoco.MjModel.from_xml_string(str(rollout.attributes.get("mjcf", "")))
     except ValueError as error:
-        told = " ".join(str(error).split())
-        raise PictureError(f"{rollout.run}: MuJoCo refuses the model in the run's attributes: {told}") from error
+        reason = " ".join(str(error).split())
+        raise PictureError(f"{rollout.run}: MuJoCo refuses the model in the run's attributes: {reason}") from error
     for number in range(model.nu):
         actuator, joint = model.actuator(number).name, model.joint(int(model.actuator_trnid[number, 0])).name
         if joint not in joints:
@@ -92,7 +92,7 @@ def _at_end(values: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[n
 
 
 ROWS = 8
-"""Joints below each other; more stand beside them."""
+"""Joints in a column; more go into further columns."""
 
 
 def plot_joints(rollout: RolloutData, size: tuple[float, float] | None = None) -> Any:
@@ -389,7 +389,7 @@ def write_plot(
         dpi: pixels an inch.
 
     Raises:
-        PictureError: there is no such plot, or what it needs was not recorded.
+        PictureError: the kind of plot is unknown, or what it needs was not recorded.
         OutputError: it cannot be written.
     """
     require_plot(out)

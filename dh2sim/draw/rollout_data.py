@@ -1,4 +1,4 @@
-"""One rollout of a run: its numbers up to where it stopped, and what is missing, in words."""
+"""One rollout of a run, up to where it stopped."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 RECORDED_BY = {"qpos_ref": "reference", "qvel_ref": "reference"}
-"""Which name in ``--record`` a variable belongs to, where it is not its own."""
+"""The name to record a variable by, where it is not its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,7 +29,7 @@ class RolloutData:
     number: int
     """Of the rollout."""
     data: Dataset = field(repr=False)
-    """Without the dimension ``rollout``, and without the records after it stopped."""
+    """Without the dimension ``rollout`` and the records after the rollout stopped."""
     reason: str
     """Why it stopped early, a name of ``STATUS``; empty if it did not."""
     stop_step: int
@@ -58,10 +58,10 @@ class RolloutData:
 
         Args:
             names: of the variables.
-            what: needs them, for the message.
+            what: what needs them, for the message.
 
         Raises:
-            PictureError: one was not; the text says what to do.
+            PictureError: one was not; the text says how to record it.
         """
         missing = [name for name in names if name not in self.data]
         if missing:
@@ -69,8 +69,8 @@ class RolloutData:
             recorded += [str(name) for name in self.data.data_vars if "interval" in self.data[name].dims]
             wanted = ",".join(dict.fromkeys(RECORDED_BY.get(name, name) for name in missing))
             raise PictureError(
-                f"{self.run}: {what} needs {' and '.join(missing)}, which the run does not hold; record again with "
-                f"--record {wanted} (recorded: {', '.join(recorded) or 'nothing'})"
+                f"{self.run}: {what} needs {' and '.join(missing)}, which the run does not contain; record again "
+                f"with {wanted} (recorded: {', '.join(recorded) or 'nothing'})"
             )
 
 
@@ -83,7 +83,7 @@ def open_rollout(path: Path, number: int) -> RolloutData:
 
     Raises:
         RunError: there is no run, or it is damaged.
-        PictureError: there is no such rollout, or it has not been run.
+        PictureError: the run has no such rollout, or it has not been run.
     """
     from dh2sim.simulate.store.reader import open_dataset, reading
 
@@ -103,7 +103,7 @@ def select_rollout(run: Dataset, number: int, name: str) -> RolloutData:
         name: of the run, for messages.
 
     Raises:
-        PictureError: there is no such rollout, or it has not been run.
+        PictureError: the run has no such rollout, or it has not been run.
     """
     _check_number(run, number, name)
     return _rollout_data(run.isel(rollout=number).load(), number, name)
@@ -113,15 +113,14 @@ def _check_number(run: Dataset, number: int, name: str) -> None:
     count = int(run.sizes["rollout"])
     if not 0 <= number < count:
         allowed = "rollout 0 only" if count == 1 else f"rollouts 0 to {count - 1}"
-        raise PictureError(f"{name} has no rollout {number}; it holds {allowed}")
+        raise PictureError(f"{name} has no rollout {number}; it contains {allowed}")
 
 
 def _rollout_data(data: Dataset, number: int, name: str) -> RolloutData:
     status = int(data["status"]) if "status" in data else FINISHED
     if status == NOT_RUN:
         raise PictureError(
-            f"{name}: rollout {number} has not been run yet; carry on with 'dh2sim rollout', with the options of the "
-            "run and --resume, or choose another with --rollout"
+            f"{name}: rollout {number} has not been run yet; resume the run, or choose another rollout"
         )
     if status == FINISHED:
         return RolloutData(run=name, number=number, data=data, reason="", stop_step=-1)
@@ -140,7 +139,7 @@ def _rollout_data(data: Dataset, number: int, name: str) -> RolloutData:
 
 
 def _records(data: Dataset) -> int:
-    """Number of states before the first that holds a NaN."""
+    """Return the number of states before the first with a NaN."""
     count = int(data.sizes["step"])
     for variable in data.data_vars.values():
         if variable.dims[:1] == ("step",):

@@ -43,12 +43,12 @@ def test_a_plot_is_a_drawing_where_its_ending_says_so(run: Path, tmp_path: Path)
     ("arguments", "told"),
     [
         (["--what", "tol"], f"unknown plot 'tol'. Did you mean 'tool'? Allowed: {WHAT}"),
-        (["--rollout", "2"], "run.zarr has no rollout 2; it holds rollouts 0 to 1"),
+        (["--rollout", "2"], "run.zarr has no rollout 2; it contains rollouts 0 to 1"),
         (["--out", "a.mp4"], "cannot write 'a.mp4' as a plot; allowed endings: .png, .svg, .pdf"),
         (["--out", "no/a.png"], "cannot write 'no/a.png': there is no folder 'no'"),
         (
             ["--what", "tool", "--out", "a.png"],
-            "run.zarr: this plot needs tool_pose, which the run does not hold; record again with --record tool_pose "
+            "run.zarr: this plot needs tool_pose, which the run does not contain; record again with tool_pose "
             "(recorded: qpos, qvel, qpos_ref, qvel_ref, ctrl, torque)",
         ),
     ],

@@ -84,13 +84,13 @@ def test_a_rollout_that_stopped_early_says_where_its_film_ends(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--rollout", "3"], "run.zarr has no rollout 3; it holds rollouts 0 to 2"),
+        (["--rollout", "3"], "run.zarr has no rollout 3; it contains rollouts 0 to 2"),
         (["--out", "a.avi"], "cannot write 'a.avi' as a picture; allowed endings: .mp4, .gif, .png"),
         (["--out", "no/a.mp4"], "cannot write 'no/a.mp4': there is no folder 'no'"),
         (["--size", "97x64"], "an .mp4 needs an even width and height, got 97x64; use 98x64"),
         (["--size", "10x64"], "the width must be from 64 to 8192 pixels, got 10"),
         (["--fps", "0"], "the rate must be from 1 to 240 pictures per second, got 0"),
-        (["--out", "a.png", "--time", "3"], "there is nothing at 3 s: the motion goes from 0 to 0.2 s"),
+        (["--out", "a.png", "--time", "3"], "the motion lasts from 0 to 0.2 s, got 3 s"),
         (
             ["--camera", "side"],
             "unknown camera 'side'. Cameras: overview; or azimuth,elevation[,distance] in degrees and m, such as "

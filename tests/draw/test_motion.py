@@ -52,26 +52,25 @@ def test_a_rollout_that_was_not_run_is_told() -> None:
     with pytest.raises(PictureError) as caught:
         rollout(run, 1)
     assert str(caught.value) == (
-        "run.zarr: rollout 1 has not been run yet; carry on with 'dh2sim rollout', with the options of the run and "
-        "--resume, or choose another with --rollout"
+        "run.zarr: rollout 1 has not been run yet; resume the run, or choose another rollout"
     )
 
 
 @pytest.mark.parametrize("number", [-1, 2])
-def test_a_rollout_that_there_is_not_is_told(number: int) -> None:
+def test_a_rollout_out_of_range_is_refused(number: int) -> None:
     with pytest.raises(PictureError) as caught:
         rollout(swinging(), number)
-    assert str(caught.value) == f"run.zarr has no rollout {number}; it holds rollouts 0 to 1"
+    assert str(caught.value) == f"run.zarr has no rollout {number}; it contains rollouts 0 to 1"
     with pytest.raises(PictureError) as caught:
         rollout(swinging().isel(rollout=[0]), number)
-    assert str(caught.value) == f"run.zarr has no rollout {number}; it holds rollout 0 only"
+    assert str(caught.value) == f"run.zarr has no rollout {number}; it contains rollout 0 only"
 
 
 def test_a_run_without_positions_says_how_to_record_them() -> None:
     with pytest.raises(PictureError) as caught:
         motion_of_run(rollout(swinging(without=("qpos", "qpos_ref", "energy"))))
     assert str(caught.value) == (
-        "run.zarr: a film needs qpos, which the run does not hold; record again with --record qpos (recorded: qvel, "
+        "run.zarr: a video needs qpos, which the run does not contain; record again with qpos (recorded: qvel, "
         "tool_pose, ctrl, torque)"
     )
 
@@ -81,7 +80,7 @@ def test_attributes_that_hold_no_model_are_told() -> None:
     del run.attrs["scene"]
     with pytest.raises(PictureError) as caught:
         motion_of_run(rollout(run))
-    assert str(caught.value) == "run.zarr: the attribute 'scene' is missing, and so there is no model to show"
+    assert str(caught.value) == "run.zarr: the attribute 'scene' is missing, so there is no model to show"
     run.attrs["scene"] = "<mujoco"
     with pytest.raises(PictureError, match=r"^run\.zarr: MuJoCo refuses the model in the run's attributes: XML "):
         motion_of_run(rollout(run))
@@ -113,7 +112,7 @@ def test_the_position_nearest_in_time_is_taken() -> None:
     assert [motion.number_at(time) for time in (None, 0.0, 0.14, 0.3)] == [3, 0, 1, 3]
     with pytest.raises(PictureError) as caught:
         motion.number_at(0.4)
-    assert str(caught.value) == "there is nothing at 0.4 s: the motion goes from 0 to 0.3 s"
+    assert str(caught.value) == "the motion lasts from 0 to 0.3 s, got 0.4 s"
 
 
 def test_poses_of_a_long_motion_are_sampled_from_its_first_to_its_last() -> None:

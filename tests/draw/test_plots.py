@@ -193,22 +193,22 @@ def test_saturation_is_marked_where_it_is() -> None:
 @pytest.mark.parametrize(
     ("what", "gone", "told"),
     [
-        ("joints", ("qpos", "qvel"), "needs qpos, which the run does not hold; record again with --record qpos "),
+        ("joints", ("qpos", "qvel"), "needs qpos, which the run does not contain; record again with qpos "),
         (
             "tool",
             ("tool_pose",),
-            "needs tool_pose, which the run does not hold; record again with --record tool_pose ",
+            "needs tool_pose, which the run does not contain; record again with tool_pose ",
         ),
-        ("energy", ("energy",), "needs energy, which the run does not hold; record again with --record energy "),
+        ("energy", ("energy",), "needs energy, which the run does not contain; record again with energy "),
         (
             "tracking",
             ("qpos_ref",),
-            "needs qpos_ref, which the run does not hold; record again with --record reference ",
+            "needs qpos_ref, which the run does not contain; record again with reference ",
         ),
         (
             "tracking",
             ("qpos", "qpos_ref"),
-            "needs qpos and qpos_ref, which the run does not hold; record again with --record qpos,reference ",
+            "needs qpos and qpos_ref, which the run does not contain; record again with qpos,reference ",
         ),
     ],
 )

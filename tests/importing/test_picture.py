@@ -162,15 +162,15 @@ def test_joints_in_line_that_turn_against_each_other_are_distinguished() -> None
     assert (axis.joints, axis.senses) == ((1, 2), (1, -1))
 
 
-def test_sliding_joints_that_would_hide_a_length_are_drawn_out_within_their_limits() -> None:
+def test_sliding_joints_that_would_hide_a_length_are_extended_within_their_limits() -> None:
     ways = Limits(position=(0.0, 0.05)), Limits(position=(-0.3, -0.1)), Limits(position=(-0.2, 0.0))
     lone = made_of((TURN, (0, 0, 0), UP), (SLIDE, (0, 0, 0), X), (TURN, (0, 0, 0), UP), tip=(0.4, 0, 0))
-    assert make_scene(lone).drawn_out == ((2, 0.1),)
-    assert make_scene(gantry(*ways)).drawn_out == ()
+    assert make_scene(lone).extended == ((2, 0.1),)
+    assert make_scene(gantry(*ways)).extended == ()
     for limits, drawn in zip(ways, (0.05, -0.1, -0.1), strict=True):
         axes = (TURN, (0, 0, 0), UP), (SLIDE, (0, 0, 0), X), (TURN, (0, 0, 0), UP)
         scene = make_scene(made_of(*axes, tip=(0.4, 0, 0), limits=(Limits(), limits, Limits())))
-        assert scene.drawn_out == ((2, drawn),)
+        assert scene.extended == ((2, drawn),)
         slid = [s for s in scene.segments if s.letter == "d" and s.index == 2]
         assert [float(np.linalg.norm(s.end - s.start)) for s in slid] == pytest.approx([abs(drawn)])
 

@@ -126,7 +126,7 @@ def test_a_rollout_of_another_robot_is_refused() -> None:
 
 
 def test_a_rollout_without_positions_is_refused() -> None:
-    with pytest.raises(PictureError, match="a page needs qpos, which the run does not hold"):
+    with pytest.raises(PictureError, match="a page needs qpos, which the run does not contain"):
         list(rollout_keyframes(build_model(robot("rpr")), rollout(swinging("rpr", without=("qpos",)))))
 
 

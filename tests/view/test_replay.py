@@ -122,15 +122,13 @@ def test_a_rollout_that_stopped_early_ends_where_it_stopped(tmp_path: Path) -> N
 def test_without_positions_there_is_nothing_to_show(tmp_path: Path, model: RobotModel) -> None:
     out = tmp_path / "run.zarr"
     rollout(model, out=out, rollouts=1, steps=4, record=("ctrl",))
-    message = (
-        "run.zarr: a replay needs qpos, which the run does not hold; record again with --record qpos (recorded: ctrl)"
-    )
+    message = "run.zarr: a replay needs qpos, which the run does not contain; record again with qpos (recorded: ctrl)"
     with pytest.raises(PictureError, match=f"^{re.escape(message)}$"):
         open_replay(out, model).times(0)
 
 
 def test_a_rollout_that_is_not_there_is_named(path: Path, model: RobotModel) -> None:
-    with pytest.raises(PictureError, match=r"^run\.zarr has no rollout 3; it holds rollouts 0 to 2$"):
+    with pytest.raises(PictureError, match=r"^run\.zarr has no rollout 3; it contains rollouts 0 to 2$"):
         open_replay(path, model).q_at(3, 0.0)
 
 
@@ -144,7 +142,7 @@ def test_rollouts_that_have_not_been_run_are_left_out(tmp_path: Path, model: Rob
         replay = open_replay(out, model)
         assert replay.rollouts == (1,)
         assert replay.duration(1) == pytest.approx(4 * STEP)
-        with pytest.raises(PictureError, match=r"^run\.zarr: rollout 0 has not been run yet; carry on with "):
+        with pytest.raises(PictureError, match=r"^run\.zarr: rollout 0 has not been run yet; resume the run"):
             replay.times(0)
 
 

@@ -26,12 +26,12 @@ from dh2sim.robot.spec import Convention, RobotSpec, Row
 
 _LEGEND_SIZE = 8.0
 _MARK = 22.0
-"""Width of a sign, pt."""
+"""Width of a symbol, pt."""
 _LEGEND_GAP = 14.0
 
 
 def draw_legend(paper: Paper, middle: float, y: float) -> None:
-    """Draw one line of signs around a middle, at a height, pt."""
+    """Draw the legend in one line around a middle, at a height, pt."""
     entries = (
         ("axis of a joint", GREY, 0.9, (0, (9, 3, 2, 3))),
         ("a, along x", A_COLOR, 1.5, "-"),
@@ -65,7 +65,7 @@ _LONGEST = 22
 
 
 class RowsTable:
-    """The rows as text in columns, and what is left to base and tool."""
+    """The rows as text in columns, and the remainder in base and tool."""
 
     def __init__(self, spec: RobotSpec) -> None:
         """Make the texts."""
@@ -146,7 +146,7 @@ def _signed(text: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return numbers with the minus sign of print."""
+    """Return text with typographic minus signs."""
     return text.replace("-", _MINUS)
 
 
@@ -167,12 +167,12 @@ def require_frame_figure(path: Path) -> None:
 def draw_assignment(imported: Imported, path: Path) -> None:
     """Draw a robot's joint axes, its frames 0 … n and the lengths between them, with its table beneath.
 
-    The joints are at zero, but for sliding ones that would hide a length there. Parallel projection, from where most
-    is seen. The same robot gives the same bytes.
+    The joints are at zero, but for prismatic ones whose length would be hidden there. Parallel projection, from where
+    most is seen. The same robot gives the same bytes.
 
     Args:
         imported: A robot made of a chain.
-        path: .svg, .png or .pdf; a file that stands there is replaced.
+        path: .svg, .png or .pdf; an existing file is replaced.
 
     Raises:
         PictureError: The ending is none of those allowed.
@@ -190,7 +190,7 @@ def draw_assignment(imported: Imported, path: Path) -> None:
 
 
 def _write_around(paper: Paper, scene: Scene) -> None:
-    """Put the title above the robot, and signs and table below it."""
+    """Put the title above the robot, legend and table below it."""
     (left, bottom), (right, top) = paper.bounds
     middle = 0.5 * (left + right)
     table, title = RowsTable(scene.spec), _title(scene)
@@ -201,6 +201,6 @@ def _write_around(paper: Paper, scene: Scene) -> None:
 
 def _title(scene: Scene) -> str:
     where = "joint coordinates zero"
-    if scene.drawn_out:
-        where += ", but " + ", ".join(f"$q_{{{joint}}}$ = {number(value)} m" for joint, value in scene.drawn_out)
+    if scene.extended:
+        where += ", but " + ", ".join(f"$q_{{{joint}}}$ = {number(value)} m" for joint, value in scene.extended)
     return f"{scene.spec.name}: {scene.spec.convention.value} frames at {where}"

@@ -20,7 +20,7 @@ D_COLOR: Final = "#a35200"
 BODY: Final = "#d9dde3"
 _DPI: Final = 200
 _SPACING: Final = 2.5
-"""Between the points that stand for a line, pt."""
+"""Between the points that represent a line, pt."""
 
 
 class Paper:

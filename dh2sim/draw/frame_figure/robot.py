@@ -28,18 +28,18 @@ from dh2sim.typing import Array
 _WIDTH, _HEIGHT = 380.0, 270.0
 """Of the robot at most, pt."""
 _REACH = 76.0
-"""How far an axis goes on beyond the robot, pt."""
+"""How far an axis extends beyond the robot, pt."""
 _POINTERS = {"x": (X_COLOR, 40.0, 1.9), "y": (Y_COLOR, 27.0, 1.3), "z": (Z_COLOR, 47.0, 1.9)}
 """Colour, length where it is not foreshortened, and width of frames' axes, pt."""
 _COLORS = {"a": A_COLOR, "d": D_COLOR}
 _SHORT = 1.5
-"""pt: lengths below this cannot be seen, and get no label."""
+"""Lengths below this are too short to be seen, and get no label, pt."""
 _RING = 8.0
-"""Radius of the arrow that shows a turning joint, pt."""
+"""Radius of the arrow that shows a revolute joint, pt."""
 _STEP = 22.0
-"""Between the signs of joints in line, pt."""
+"""Between the symbols of joints in line, pt."""
 _LEADER = 18.0
-"""pt: labels that are farther off get a thin line to what they name."""
+"""Labels farther off than this get a thin line to what they name, pt."""
 
 
 class RobotDrawing:
@@ -98,7 +98,7 @@ class RobotDrawing:
         self._paper.text(placed.centre, label.text, label.color, label.size, align="center")
 
     def _base(self) -> None:
-        """The ground below base_link, and the way from there to frame 0."""
+        """Draw the ground below base_link, and a dashed line to frame 0."""
         x, y = self._at(np.zeros(3)).tolist()
         self._paper.line(np.array([[x - 17.0, y], [x + 17.0, y]]), INK, 1.3, layer=3)
         for tick in np.linspace(x - 17.0, x + 11.0, 6).tolist():
@@ -147,7 +147,7 @@ class RobotDrawing:
             self._paper.dot(self._at(origin), INK, 4.6, layer=8)
 
     def _axis(self, axis: JointAxis) -> None:
-        """The line, and a sign for every joint: the first beyond one end, the others beyond the other one."""
+        """Draw the line, and a symbol for every joint: the first beyond one end, the others beyond the other."""
         flat = self._view.project(axis.direction)
         along = flat / max(0.25, float(np.linalg.norm(flat)))
         start, end = self._at(axis.start), self._at(axis.end)
@@ -161,19 +161,19 @@ class RobotDrawing:
             else:
                 place = end + (_REACH - 11.0 + _STEP * (k - many)) * along
             turns = self._scene.spec.rows[joint - 1].type.turns
-            sign: Callable[[Array, Array], None] = self._turning if turns else self._sliding
-            sign(place, sense * axis.direction)
+            symbol: Callable[[Array, Array], None] = self._revolute if turns else self._prismatic
+            symbol(place, sense * axis.direction)
             aside = np.array([along[1], -along[0]])
             self._label(1, f"joint {joint}", INK, 8.5, place, aside, either=True, clear=7.0)
 
-    def _turning(self, at: Array, direction: Array) -> None:
-        """An arrow around the axis, right-handed."""
+    def _revolute(self, at: Array, direction: Array) -> None:
+        """Draw an arrow around the axis, right-handed."""
         ring = _RING * self._view.project(ring_around(direction, self._view.up))
         self._paper.line(at + ring[:-2], INK, 1.1, layer=5)
         self._paper.arrow(at + ring[-6], at + ring[-1], INK, 1.1, layer=5)
 
-    def _sliding(self, at: Array, direction: Array) -> None:
-        """A box with an arrow along the axis."""
+    def _prismatic(self, at: Array, direction: Array) -> None:
+        """Draw a box with an arrow along the axis."""
         flat = self._view.project(direction)
         along = flat / (float(np.linalg.norm(flat)) or 1.0)
         aside = 4.2 * np.array([-along[1], along[0]])

@@ -12,9 +12,9 @@ from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 
 SAME = 1e-6
-"""Of the reach: points closer than this are one. Of directions: rad."""
-_DRAWN_OUT = 0.25
-"""Of the reach: how far a sliding joint that would hide a length is drawn out."""
+"""Points closer than this share of the reach are one; so are directions closer than this, rad."""
+_EXTENSION = 0.25
+"""Of the reach: how far a prismatic joint is extended whose length would be hidden."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,10 +32,10 @@ class Segment:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointAxis:
-    """A line that one joint moves about or along, or several in line."""
+    """A line that one joint, or several in line, move about or along."""
 
     joints: tuple[int, ...]
-    """Counted from 1, in the order in which they stand along the line."""
+    """Counted from 1, in their order along the line."""
     senses: tuple[int, ...]
     """1 where a joint's z points along ``direction``, else -1."""
     start: Array
@@ -67,13 +67,13 @@ class Scene:
     axes: tuple[JointAxis, ...]
     pointers: tuple[Pointer, ...]
     origins: tuple[Array, ...]
-    """Where frames stand; frames in one place are told once."""
+    """Origins of frames, each place once, m."""
     tip: Array
     """m, shape (3,)."""
     last_origin: Array
     """Of frame n, m, shape (3,)."""
-    drawn_out: tuple[tuple[int, float], ...]
-    """Sliding joints that are not at zero, and their coordinates, m."""
+    extended: tuple[tuple[int, float], ...]
+    """Prismatic joints that are not at zero, and their coordinates, m."""
 
     @property
     def corners(self) -> Array:
@@ -83,7 +83,7 @@ class Scene:
 
 
 def make_scene(imported: Imported) -> Scene:
-    """Collect what is drawn, at joint coordinates zero; sliding joints that would hide a length are drawn out.
+    """Collect what is drawn, at joint coordinates zero; prismatic joints whose length would be hidden are extended.
 
     Raises:
         ValueError: The robot was made of a table, to which no frames were assigned.
@@ -101,7 +101,7 @@ def make_scene(imported: Imported) -> Scene:
         origins=tuple(_distinct([T[:3, 3] for T in placed.frames], least)),
         tip=placed.T_base_tip[:3, 3],
         last_origin=placed.frames[-1][:3, 3],
-        drawn_out=tuple((i, float(value)) for i, value in enumerate(q, start=1) if value != 0.0),
+        extended=tuple((i, float(value)) for i, value in enumerate(q, start=1) if value != 0.0),
     )
 
 
@@ -110,8 +110,8 @@ def _coordinates(spec: RobotSpec, reach: float) -> Array:
     for i, row in enumerate(spec.rows):
         if not row.type.turns and abs(row.d) <= SAME * reach:
             lower, upper = row.limits.position or (-np.inf, np.inf)
-            wish = min(max(_DRAWN_OUT * reach, lower), upper)
-            q[i] = float(f"{wish if wish > 0.0 else max(-_DRAWN_OUT * reach, lower):.2g}")
+            shown = min(max(_EXTENSION * reach, lower), upper)
+            q[i] = float(f"{shown if shown > 0.0 else max(-_EXTENSION * reach, lower):.2g}")
     return q
 
 
@@ -160,7 +160,7 @@ def _axes(placed: PlacedFrames, segments: Sequence[Segment], least: float) -> It
 
 
 def _middle(placed: PlacedFrames, joint: int, point: Array, direction: Array) -> float:
-    """Where along a line a joint stands: in the middle of its d, rounded so that noise does not decide."""
+    """Return where a joint is along a line: in the middle of its d, rounded so that noise does not decide."""
     own = placed.axis(joint)
     ends = own.point, placed.foot(joint) if joint < placed.n else own.foot_of(placed.frames[joint][:3, 3])
     return round(float(sum((end - point) @ direction for end in ends)) / placed.reach, 5)

@@ -1,4 +1,4 @@
-"""From where a robot is looked at, so that nothing hides what it is about."""
+"""The direction from which a robot's frames and lengths are seen best."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from dh2sim.typing import Array
 _AZIMUTHS = tuple(sign * azimuth for azimuth in (*range(20, 75, 5), *range(110, 165, 5)) for sign in (-1, 1))
 _ELEVATIONS = tuple(range(14, 40, 4))
 _USUAL = (-55, 22)
-"""Azimuth and elevation that are taken unless others show more, degrees."""
+"""Azimuth and elevation, degrees, unless others show more."""
 _ENOUGH = 0.06
-"""Of the picture's size: points that far from each other are well apart."""
+"""Share of the picture's size at which points are well apart."""
 _LONG = 0.55
-"""Of its length: what is left of an axis in the picture."""
+"""Share of its length with which an axis is well seen."""
 _OPEN = math.radians(22)
-"""Between axes in the picture."""
+"""Angle between axes in the picture at which they are well apart."""
 
 
 def best_view(scene: Scene) -> ParallelView:
-    """Return the view that keeps points, lines and directions apart that are so in space."""
+    """Return the view in which points, lines and directions that differ are farthest apart."""
     places = itertools.product(_AZIMUTHS, _ELEVATIONS)
     directions = _distinct_directions(scene)
     azimuth, elevation = max(places, key=lambda place: round(_merit(scene, directions, *place), 6))
@@ -55,7 +55,7 @@ def _distinct_directions(scene: Scene) -> Array:
 
 
 def _directions(flat: Array) -> float:
-    """How well directions can be seen, and told from each other; shape (number, 2)."""
+    """Rate how well projected directions, shape (number, 2), are seen and distinguished."""
     lengths = np.linalg.norm(flat, axis=1)
     least = min(_LONG, float(lengths.min())) / _LONG
     angles = [
@@ -66,7 +66,7 @@ def _directions(flat: Array) -> float:
 
 
 def _distances(scene: Scene, view: ParallelView, size: float) -> float:
-    """How well points keep apart from each other, and from lengths that they do not belong to."""
+    """Rate how far points are from each other, and from lengths that they do not belong to."""
     points = view.project(np.array(scene.origins))
     enough = _ENOUGH * size
     apart = [min(enough, float(np.linalg.norm(a - b))) / enough for a, b in itertools.combinations(points, 2)] or [
@@ -82,13 +82,13 @@ def _distances(scene: Scene, view: ParallelView, size: float) -> float:
 
 
 def _crossings(scene: Scene, view: ParallelView) -> int:
-    """How many lengths cross each other in the picture."""
+    """Return how many lengths cross each other in the picture."""
     flat = [view.project([segment.start, segment.end]) for segment in scene.segments]
     return sum(_cross(a, b) for a, b in itertools.combinations(flat, 2))
 
 
 def _cross(a: Array, b: Array) -> bool:
-    """Whether the inner parts of two segments meet on the paper, each of shape (2, 2)."""
+    """Return whether the interiors of two segments, each of shape (2, 2), meet on the paper."""
     (p, q), (r, s) = a, b
     sides = [_side(p, q, r), _side(p, q, s), _side(r, s, p), _side(r, s, q)]
     least = 1e-9 * (_gap(p, q) + _gap(r, s)) ** 2
