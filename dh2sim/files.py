@@ -6,6 +6,7 @@ several that belong together, and ``write_file`` bytes that must survive a power
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 import shutil
@@ -197,6 +198,8 @@ def sync(path: Path) -> None:
 def make_folders(folder: Path) -> list[Path]:
     """Make a folder and its parents; return those that were missing, outermost first."""
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    if folder.exists() and not folder.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
     folder.mkdir(parents=True, exist_ok=True)
     return missing[::-1]
 

@@ -19,7 +19,7 @@ from dh2sim import build_model, load_robot
 from dh2sim.simulate.dataset_layout import STATUS, Layout
 from dh2sim.simulate.options import DEFAULT_RECORD, RECORDABLE, RolloutOptions
 from dh2sim.simulate.prepare import prepare
-from dh2sim.simulate.store.skeleton import make_skeleton
+from dh2sim.simulate.store.metadata import make_metadata
 from tests.program import contents, dh2sim
 
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "dataset.md").read_text(encoding="utf-8")
@@ -109,7 +109,7 @@ def test_every_run_that_is_described_can_be_stored_and_opened_without_a_warning(
     layouts: list[Layout], tmp_path: Path
 ) -> None:
     for number, layout in enumerate(layouts):
-        for name, data in make_skeleton(layout).items():
+        for name, data in make_metadata(layout).items():
             file = tmp_path / f"{number}.zarr" / name
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_bytes(data)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from types import FrameType
 
     from dh2sim.simulate.block import Job
-    from dh2sim.simulate.description import RunSummary
+    from dh2sim.simulate.description import RunDescription
     from dh2sim.simulate.run import Progress
 
 
@@ -90,7 +90,7 @@ def rollout(
       dh2sim render run.zarr
     """
     model = build_all([robot])[0]
-    from dh2sim.simulate.description import summarize
+    from dh2sim.simulate.description import describe
     from dh2sim.simulate.options import RolloutOptions
     from dh2sim.simulate.prepare import prepare
     from dh2sim.simulate.run import fill, open_run
@@ -116,7 +116,7 @@ def rollout(
         progress_bar("simulating", "rollouts", rollouts, quiet=quiet) as advance,
     ):
         progress = fill(writer, job, threads=threads, advance=advance, stopping=lambda: patience.arrived is not None)
-    summary = summarize(out)
+    summary = describe(out)
     if not quiet:
         _tell(job, summary, progress, out)
     if progress.finished:
@@ -178,7 +178,7 @@ def _patient(quiet: bool) -> Iterator[_Patience]:
             signal.signal(kind, signal.SIG_DFL if handler is None else handler)
 
 
-def _tell(job: Job, summary: RunSummary, progress: Progress, out: Path) -> None:
+def _tell(job: Job, summary: RunDescription, progress: Progress, out: Path) -> None:
     options = job.options
     print(
         f"{summary.robot}: {summary.rollouts:,} rollouts of {summary.steps:,} steps ({summary.duration:g} s), "

@@ -105,10 +105,10 @@ def _raise_last(errors: list[Dh2simError]) -> None:
 def _convert(paths: list[Path], to: str, out: Path | None, *, overwrite: bool, quiet: bool) -> None:
     from dh2sim.simulate.convert.hdf5 import to_hdf5
     from dh2sim.simulate.convert.parquet import to_parquet
-    from dh2sim.simulate.description import summarize
+    from dh2sim.simulate.description import describe
 
     convert = {"parquet": to_parquet, "hdf5": to_hdf5}[to]
-    for summary in [summarize(path) for path in paths]:
+    for summary in [describe(path) for path in paths]:
         path = Path(summary.path)
         target = _beside(path, FORMATS[to]) if out is None else out
         with progress_bar("converting", "rollouts", summary.rollouts, quiet=quiet) as advance:
@@ -133,9 +133,8 @@ def _print(description: RunDescription) -> None:
     from rich.text import Text
 
     console = make_console()
-    summary = description.summary
-    verdict = ("complete", "bold green") if summary.complete else ("not complete", "bold yellow")
-    console.print(Text.assemble((summary.path, "bold"), "  ", verdict), soft_wrap=True)
+    verdict = ("complete", "bold green") if description.complete else ("not complete", "bold yellow")
+    console.print(Text.assemble((description.path, "bold"), "  ", verdict), soft_wrap=True)
     for title, lines in _sections(description):
         for number, line in enumerate(lines):
             wrapped = textwrap.wrap(
@@ -150,29 +149,28 @@ def _print(description: RunDescription) -> None:
 
 
 def _sections(description: RunDescription) -> Iterator[tuple[str, list[str]]]:
-    summary = description.summary
-    yield "robot", [summary.robot]
-    yield "controller", [summary.controller]
+    yield "robot", [description.robot]
+    yield "controller", [description.controller]
     changes = ", ".join(f"{name} ±{100 * share:g} %" for name, share in description.randomize.items())
     yield "randomised", [changes or "nothing"]
     yield "rollouts", [_counts(description), *_early_stops(description), *_clipped(description)]
-    every = "every one" if summary.every == 1 else f"one in {summary.every}"
+    every = "every one" if description.every == 1 else f"one in {description.every}"
     yield (
         "steps",
-        [f"{summary.steps:,} of {summary.timestep:g} s = {summary.duration:g} s, {every} recorded"],
+        [f"{description.steps:,} of {description.timestep:g} s = {description.duration:g} s, {every} recorded"],
     )
     yield "integrator", [description.integrator]
-    yield "start", [f"{description.start}, seed {summary.seed}"]
+    yield "start", [f"{description.start}, seed {description.seed}"]
     yield "recorded", list(_recorded(description))
     yield "size", [_sizes(description)]
-    if summary.steps_per_second is not None:
-        yield "speed", [f"{summary.steps_per_second:,.0f} steps/s over {summary.seconds:,.3g} s"]
+    if description.steps_per_second is not None:
+        yield "speed", [f"{description.steps_per_second:,.0f} steps/s over {description.seconds:,.3g} s"]
     packages = {"dh2sim": "dh2sim", "mujoco": "MuJoCo", "numpy": "NumPy", "python": "Python"}
-    versions = ", ".join(f"{packages.get(name, name)} {version}" for name, version in summary.versions.items())
-    yield "made", [_moment(summary.created), f"with {versions}"]
+    versions = ", ".join(f"{packages.get(name, name)} {version}" for name, version in description.versions.items())
+    yield "made", [_moment(description.created), f"with {versions}"]
     if description.command:
         yield "command", [description.command]
-    if not summary.complete:
+    if not description.complete:
         again = description.resume_command
         yield "carry on", [again or "with the same call and resume=True; it was made by the library"]
 
@@ -185,37 +183,36 @@ def _moment(created: str) -> str:
 
 
 def _counts(description: RunDescription) -> str:
-    summary = description.summary
-    parts = [f"{summary.finished:,} finished"]
-    if summary.unstable:
-        parts.append(f"{summary.unstable:,} stopped early")
-    if summary.not_run:
-        parts.append(f"{summary.not_run:,} not yet run")
-    return f"{summary.rollouts:,}: {', '.join(parts)}"
+    parts = [f"{description.finished:,} finished"]
+    if description.unstable:
+        parts.append(f"{description.unstable:,} stopped early")
+    if description.not_run:
+        parts.append(f"{description.not_run:,} not yet run")
+    return f"{description.rollouts:,}: {', '.join(parts)}"
 
 
 def _clipped(description: RunDescription) -> list[str]:
-    count = description.summary.saturated
+    count = description.saturated
     return [f"controls clipped in {count:,}"] if count else []
 
 
 def _early_stops(description: RunDescription) -> Iterator[str]:
     """Why rollouts stopped early, and where the first of them did."""
-    summary = description.summary
     if not description.stopped:
         return
-    reasons = ", ".join(f"{name} {count:,}" for name, count in summary.reasons.items())
+    reasons = ", ".join(f"{name} {count:,}" for name, count in description.reasons.items())
     yield f"stopped early: {reasons}"
     for each in description.stopped[:SHOWN]:
-        yield f"  rollout {each.rollout}: {each.reason} in step {each.step:,} ({each.step * summary.timestep:.4g} s)"
+        time = each.step * description.timestep
+        yield f"  rollout {each.rollout}: {each.reason} in step {each.step:,} ({time:.4g} s)"
     if len(description.stopped) > SHOWN:
         yield f"  and {len(description.stopped) - SHOWN:,} more (--json names all)"
 
 
 def _recorded(description: RunDescription) -> Iterator[str]:
     rows = [
-        (each.name, " x ".join(f"{size:,}" for size in each.shape), ", ".join(each.dimensions))
-        for each in description.recorded
+        (name, " x ".join(f"{size:,}" for size in each.shape), ", ".join(each.dimensions))
+        for name, each in description.recorded.items()
     ]
     widths = [max(len(row[i]) for row in rows) for i in range(2)]
     for name, shape, dimensions in rows:
@@ -223,7 +220,7 @@ def _recorded(description: RunDescription) -> Iterator[str]:
 
 
 def _sizes(description: RunDescription) -> str:
-    disk, memory = description.summary.bytes_on_disk, description.bytes_in_memory
+    disk, memory = description.bytes_on_disk, description.bytes_in_memory
     if not memory:
         return f"{size_text(disk)} on disk"
     return f"{size_text(disk)} on disk for {size_text(memory)} of numbers ({100 * disk / memory:.0f} %)"

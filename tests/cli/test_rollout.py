@@ -98,7 +98,7 @@ def test_quiet_prints_nothing(folder: Path) -> None:
     assert dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *QUICK, "--quiet") == Outcome(status=0, out="", err="")
     assert dh2sim("rollout", "rich.yaml", "--out", "other.zarr", *QUICK, "-q") == Outcome(status=0, out="", err="")
     assert told(dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *QUICK, "-q")) == [
-        "'run.zarr' exists already; --resume carries on with it, --overwrite replaces it"
+        "'run.zarr' already exists; resume it, overwrite it, or choose another folder"
     ]
 
 
@@ -191,10 +191,10 @@ def test_a_share_that_cannot_be_read_is_wrong_usage(share: str, problem: str, fo
 @pytest.mark.parametrize(
     ("out", "words"),
     [
-        ("rich.yaml", "'rich.yaml' is not a run of dh2sim; remove it yourself or choose another --out"),
+        ("rich.yaml", "'rich.yaml' is not a run of dh2sim; remove it yourself, or choose another folder"),
         ("rich.yaml/run.zarr", "cannot write to 'rich.yaml/run.zarr': Not a directory; nothing was changed"),
-        (".", "'.' is not a run of dh2sim; remove it yourself or choose another --out"),
-        ("", "'.' is not a run of dh2sim; remove it yourself or choose another --out"),
+        (".", "'.' is not a run of dh2sim; remove it yourself, or choose another folder"),
+        ("", "'.' is not a run of dh2sim; remove it yourself, or choose another folder"),
         ("x" * 300, f"cannot write to '{'x' * 300}': File name too long; nothing was changed"),
     ],
     ids=["a file", "in a file", "this folder", "nothing", "too long"],

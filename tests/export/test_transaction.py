@@ -17,7 +17,7 @@ def test_a_file_where_a_folder_is_needed_is_reported(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_bytes(b"mine")
     assert dh2sim("export", robot, "--out", blocked) == Outcome(
-        status=2, out="", err=f"dh2sim: cannot write to '{blocked}': File exists; nothing was changed\n"
+        status=2, out="", err=f"dh2sim: cannot write to '{blocked}': Not a directory; nothing was changed\n"
     )
     assert dh2sim("export", robot, "--out", blocked / "deeper") == Outcome(
         status=2,
@@ -29,7 +29,8 @@ def test_a_file_where_a_folder_is_needed_is_reported(tmp_path: Path) -> None:
     assert dh2sim("export", robot, "--out", tmp_path / "made") == Outcome(
         status=2,
         out="",
-        err=f"dh2sim: cannot write '{tmp_path / 'made' / 'small'}': File exists; the existing files are unchanged\n",
+        err=f"dh2sim: cannot write '{tmp_path / 'made' / 'small'}': Not a directory; "
+        "the existing files are unchanged\n",
     )
     assert contents(tmp_path / "made") == {"small": b"mine"}
 

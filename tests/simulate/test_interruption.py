@@ -18,7 +18,7 @@ import xarray
 from dh2sim.cli.common import BAD_INPUT, INTERRUPTED
 from dh2sim.model.build import build_model
 from dh2sim.robot.read import load_robot
-from dh2sim.simulate.description import summarize
+from dh2sim.simulate.description import describe
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.run import fill
@@ -73,7 +73,7 @@ def _start(run: Path, *more: str) -> subprocess.Popen[str]:
 
 
 def _blocks(run: Path) -> int:
-    return len(list((run / "blocks" / "checksum").glob("c.*")))
+    return len(list((run / "blocks" / "record").glob("c.*")))
 
 
 def _wait_for_another_block(run: Path, before: int) -> None:
@@ -84,8 +84,8 @@ def _wait_for_another_block(run: Path, before: int) -> None:
 
 
 def _chunks(run: Path) -> dict[str, bytes]:
-    """Every chunk but for the time that blocks took."""
-    files = {name: data for name, data in contents(run).items() if not name.startswith("blocks/seconds/c")}
+    """Every chunk of the dataset."""
+    files = {name: data for name, data in contents(run).items() if not name.startswith("blocks/")}
     return {name: data for name, data in files.items() if not name.endswith("zarr.json")}
 
 
@@ -111,7 +111,7 @@ def test_a_command_that_is_killed_again_and_again_ends_as_if_it_had_not_been(run
         process.kill()
         process.communicate()
         assert process.returncode == -signal.SIGKILL
-    assert summarize(run).not_run > 0
+    assert describe(run).not_run > 0
     _finish(run, "--threads", "1")
     _assert_same(run, undisturbed)
 
@@ -123,7 +123,7 @@ def test_an_interrupt_finishes_the_block_at_hand_and_tells_how_to_carry_on(run: 
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=WAIT)
     assert process.returncode == INTERRUPTED
-    safe = ROLLOUTS - summarize(run).not_run
+    safe = ROLLOUTS - describe(run).not_run
     assert 0 < safe < ROLLOUTS
     assert safe % BLOCK == 0
     assert err == (
@@ -160,29 +160,45 @@ def test_a_finished_run_is_left_alone(run: Path, undisturbed: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_run_that_was_damaged_by_hand_is_mended(run: Path, undisturbed: Path) -> None:
+def test_blocks_that_were_damaged_by_hand_are_computed_again(run: Path, undisturbed: Path) -> None:
     _finish(run)
     (run / "qpos" / "c.4.0.0").unlink()
-    (run / "joint" / "zarr.json").write_text("{")
-    (run / "zarr.json").write_text("")
     chunk = run / "ctrl" / "c.7.0.0"
     chunk.write_bytes(bytes(byte ^ 1 if at == 40 else byte for at, byte in enumerate(chunk.read_bytes())))
     told = dh2sim("runs", run)
     assert (told.status, told.out) == (BAD_INPUT, "")
     assert told.err == (
-        f"dh2sim: '{run}' is damaged; `dh2sim rollout` with the options it was made with and --resume mends it\n"
+        f"dh2sim: '{run}' is damaged; resume it with the same options to compute the damaged blocks again\n"
     )
     assert f"simulated {2 * BLOCK} in " in _finish(run).out
     _assert_same(run, undisturbed)
 
 
+def test_a_run_whose_metadata_were_damaged_by_hand_is_computed_again_elsewhere(
+    run: Path, undisturbed: Path, tmp_path: Path
+) -> None:
+    _finish(run)
+    (run / "zarr.json").write_text("")
+    told = f"'{run / 'zarr.json'}' is missing or damaged, and the run cannot be used without it; "
+    for arguments in (["runs", str(run)], _command(run, "--resume")):
+        outcome = dh2sim(*arguments)
+        assert (outcome.status, outcome.out) == (BAD_INPUT, "")
+        assert (
+            outcome.err
+            == f"dh2sim: {told}resume with the same options in a new folder, which computes the same bits\n"
+        )
+    assert dh2sim(*_command(run, "--resume", "--out", str(tmp_path / "new.zarr"))).status == 0
+    new, old = open_dataset(tmp_path / "new.zarr"), open_dataset(undisturbed)
+    assert new.load().drop_attrs().identical(old.load().drop_attrs())
+
+
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (("--seed", "1"), "seed is 0 there and 1 here"),
-        (("--controller", "hold"), "controller is 'pd' there and 'hold' here"),
-        (("--timestep", "0.001"), "timestep is 0.002 there and 0.001 here"),
-        (("--randomize", "mass=0.1"), "randomize is nothing there and mass=0.1 here"),
+        (("--seed", "1"), "seed was 0 and is now 1"),
+        (("--controller", "hold"), "controller was 'pd' and is now 'hold'"),
+        (("--timestep", "0.001"), "timestep was 0.002 and is now 0.001"),
+        (("--randomize", "mass=0.1"), "randomize was none and is now mass=0.1"),
     ],
 )
 def test_other_settings_are_refused(run: Path, options: Sequence[str], told: str) -> None:
@@ -191,7 +207,7 @@ def test_other_settings_are_refused(run: Path, options: Sequence[str], told: str
     assert (outcome.status, outcome.out, outcome.err) == (
         BAD_INPUT,
         "",
-        f"dh2sim: '{run}' was made with other settings: {told}. Give the same options, or write to another --out\n",
+        f"dh2sim: '{run}' was made with other settings: {told}. Use the same options, or choose another folder\n",
     )
     assert contents(run) == before
 
@@ -201,8 +217,8 @@ def test_another_robot_under_the_same_name_is_refused(run: Path) -> None:
     outcome = dh2sim(*_command(run, "--resume"))
     assert outcome.status == BAD_INPUT
     assert re.fullmatch(
-        rf"dh2sim: '{run}' was made with other settings: the robot file is another one \(SHA-256 "
-        r"[0-9a-f]{12}… there and [0-9a-f]{12}… here\)\. Give the same options, or write to another --out\n",
+        rf"dh2sim: '{run}' was made with other settings: the robot file has changed \(SHA-256 "
+        r"[0-9a-f]{12}…, now [0-9a-f]{12}…\)\. Use the same options, or choose another folder\n",
         outcome.err,
     )
 
@@ -212,11 +228,11 @@ def test_an_existing_run_is_overwritten_only_if_that_is_said(run: Path) -> None:
     refused = dh2sim(*_command(run))
     assert (refused.status, refused.err) == (
         BAD_INPUT,
-        f"dh2sim: '{run}' exists already; --resume carries on with it, --overwrite replaces it\n",
+        f"dh2sim: '{run}' already exists; resume it, overwrite it, or choose another folder\n",
     )
     assert contents(run) == before
     assert dh2sim(*_command(run, "--overwrite")).status == 0
-    assert summarize(run).complete
+    assert describe(run).complete
 
 
 def test_two_commands_do_not_write_to_one_run(run: Path) -> None:
@@ -263,7 +279,7 @@ def test_on_a_full_disk_a_run_stops_and_carries_on_when_there_is_room(
     assert done.stdout == "status 2\n", done.stderr
     told = re.fullmatch(
         r"dh2sim: cannot write to 'run\.zarr': No space left on device; (\d+) of 60 rollouts are safe\. "
-        r"Make room, then carry on with --resume\n",
+        r"Make room, then resume\n",
         done.stderr,
     )
     assert told is not None, done.stderr

@@ -100,10 +100,10 @@ def test_a_run_is_not_overwritten_unless_asked_to(tmp_path: Path) -> None:
     before = contents(path)
     with pytest.raises(RunExistsError) as exists:
         rollout("planar_2r", rollouts=2, steps=4, out=path)
-    assert str(exists.value) == f"'{path}' exists already; --resume carries on with it, --overwrite replaces it"
+    assert str(exists.value) == f"'{path}' already exists; resume it, overwrite it, or choose another folder"
     with pytest.raises(RunDiffersError) as differs:
         rollout("planar_2r", rollouts=2, steps=6, out=path, resume=True)
-    assert "steps is 4 there and 6 here" in str(differs.value)
+    assert "steps was 4 and is now 6" in str(differs.value)
     assert contents(path) == before
     assert rollout("planar_2r", rollouts=2, steps=6, out=path, overwrite=True).sizes["step"] == 7
 

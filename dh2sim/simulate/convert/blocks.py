@@ -1,4 +1,4 @@
-"""A run read block by block, so that memory is bounded by a block."""
+"""What conversions share: the run block by block, so that memory is bounded by a block, and the files they write."""
 
 from __future__ import annotations
 
@@ -10,70 +10,57 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from dh2sim.errors import OutputError, RunDamagedError
 from dh2sim.files import atomic_files
-from dh2sim.simulate.store.blocks import Blocks
-from dh2sim.simulate.store.reader import damaged, open_dataset, read_attributes, read_seal, reading
+from dh2sim.simulate.store.reader import StoredRun, damaged_run, open_dataset, open_run, reading
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class StoredRun:
-    """A run on disk."""
+class RunBlocks:
+    """The dataset of a run, to be read block by block."""
 
     dataset: xr.Dataset = field(repr=False)
-    """The whole of it; coordinates are loaded, variables are not."""
-    block: int
-    """Rollouts in a block."""
-    committed: tuple[bool, ...]
-    """Whether each block is there."""
-    path: Path
+    """All of it; coordinates are loaded, variables are not."""
+    run: StoredRun
 
-    def blocks(self) -> Iterator[tuple[range, xr.Dataset]]:
+    def __iter__(self) -> Iterator[tuple[range, xr.Dataset]]:
         """Yield ranges of rollouts with their part of the dataset, loaded; blank where a block is not committed.
 
         Raises:
-            RunDamagedError: a chunk is damaged.
+            RunDamagedError: A chunk is damaged.
         """
-        total = self.dataset.sizes["rollout"]
-        for number, committed in enumerate(self.committed):
-            rollouts = range(number * self.block, min((number + 1) * self.block, total))
-            part = self.dataset.isel(rollout=slice(rollouts.start, rollouts.stop))
-            if committed:
-                with reading(self.path):
+        for block in range(self.run.manifest.blocks):
+            rollouts = self.run.manifest.part(block)
+            part = self.dataset.isel(rollout=rollouts)
+            if self.run.committed(block) is not None:
+                with reading(self.run.path):
                     part = part.load()
             else:
                 part = _blank(part)
-            yield rollouts, part
+            yield range(rollouts.start, rollouts.stop), part
 
 
-def open_run(path: Path) -> StoredRun:
+def open_blocks(path: Path) -> RunBlocks:
     """Open a run.
 
     Raises:
-        RunError: there is no run, or it is damaged.
+        RunError: There is no run, or it is damaged.
     """
-    attributes = read_attributes(path)
-    stored = Blocks(path=path, seal=read_seal(path, attributes))
     dataset = open_dataset(path)
     with reading(path):
         dataset = dataset.assign_coords({name: labels.load() for name, labels in dataset.coords.items()})
     if not all(labels.is_unique for labels in dataset.indexes.values()):
-        raise RunDamagedError(damaged(path))
-    return StoredRun(
-        dataset=dataset,
-        block=stored.seal.block,
-        committed=tuple(stored.committed(block) for block in range(stored.seal.blocks)),
-        path=path,
-    )
+        raise RunDamagedError(damaged_run(path))
+    return RunBlocks(dataset=dataset, run=open_run(path))
 
 
 def _blank(part: xr.Dataset) -> xr.Dataset:
-    """Return a part of a run as it is before it is run."""
-    import numpy as np
-
+    """Return a part of a run as it is before it is simulated."""
     return part.assign(
         {
             name: (variable.dims, np.full(variable.shape, variable.encoding["fill_value"], dtype=variable.dtype))
@@ -83,17 +70,17 @@ def _blank(part: xr.Dataset) -> xr.Dataset:
 
 
 def attribute_text(value: object) -> str:
-    """Return an attribute as text: text as it is, anything else as JSON."""
+    """Return an attribute as text: a string as it is, anything else as JSON."""
     return value if isinstance(value, str) else json.dumps(plain(value), ensure_ascii=False)
 
 
 def plain(value: Any) -> Any:
-    """Return NumPy's arrays and numbers as Python's lists and numbers, of which JSON is made."""
+    """Return NumPy's arrays and numbers as Python's lists and numbers."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def untold(_rollouts: int) -> None:
-    """Tell nobody of progress."""
+def no_progress(_rollouts: int) -> None:
+    """Ignore progress."""
 
 
 @contextmanager

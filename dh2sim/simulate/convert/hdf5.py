@@ -20,7 +20,7 @@ import numpy as np
 
 from dh2sim.extras import require_extra
 from dh2sim.files import signals_deferred
-from dh2sim.simulate.convert.blocks import StoredRun, attribute_text, open_run, output_files, plain, untold
+from dh2sim.simulate.convert.blocks import RunBlocks, attribute_text, no_progress, open_blocks, output_files, plain
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -101,7 +101,7 @@ def to_hdf5(
     out: Path,
     *,
     overwrite: bool = False,
-    advance: Callable[[int], None] = untold,
+    advance: Callable[[int], None] = no_progress,
 ) -> tuple[Path, ...]:
     """Write a run as an HDF5 file.
 
@@ -119,11 +119,11 @@ def to_hdf5(
             cannot be written.
     """
     require_extra("data", "xarray", "h5netcdf", "h5py", what="HDF5")
-    run = open_run(path)
+    run = open_blocks(path)
     with output_files([out], run=path, overwrite=overwrite) as [staged], _opened(staged) as (file, sink):
         with signals_deferred():  # HDF5 calls Python for every write, and is lost if that raises
             _define(file, run)
-        for rollouts, block in run.blocks():
+        for rollouts, block in run:
             for name in block.data_vars:
                 with signals_deferred():
                     file.variables[str(name)][rollouts.start : rollouts.stop] = block[name].values
@@ -170,7 +170,7 @@ def chunk_shape(shape: tuple[int, ...], itemsize: int, block: int) -> tuple[int,
     return (rollouts, *shape[1:])
 
 
-def _define(file: h5netcdf.File, run: StoredRun) -> None:
+def _define(file: h5netcdf.File, run: RunBlocks) -> None:
     """Write everything but the variables' numbers."""
     dataset = run.dataset
     file.dimensions = {str(name): size for name, size in dataset.sizes.items()}
@@ -181,7 +181,7 @@ def _define(file: h5netcdf.File, run: StoredRun) -> None:
     for name, variable in dataset.data_vars.items():
         stored: dict[str, Any] = {}
         if variable.size:
-            chunks = chunk_shape(variable.shape, variable.dtype.itemsize, run.block)
+            chunks = chunk_shape(variable.shape, variable.dtype.itemsize, run.run.manifest.block)
             stored = {"chunks": chunks, "compression": "gzip", "compression_opts": LEVEL, "shuffle": True}
         made = file.create_variable(str(name), tuple(map(str, variable.dims)), variable.dtype, **stored)
         for key, value in _attributes(variable).items():

@@ -18,7 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dh2sim.extras import require_extra
-from dh2sim.simulate.convert.blocks import attribute_text, open_run, output_files, plain, refuse_folder, untold
+from dh2sim.simulate.convert.blocks import (
+    attribute_text,
+    no_progress,
+    open_blocks,
+    output_files,
+    plain,
+    refuse_folder,
+)
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -46,7 +53,7 @@ def to_parquet(
     out: Path,
     *,
     overwrite: bool = False,
-    advance: Callable[[int], None] = untold,
+    advance: Callable[[int], None] = no_progress,
 ) -> tuple[Path, ...]:
     """Write a run as Parquet tables.
 
@@ -69,7 +76,7 @@ def to_parquet(
     from dh2sim.simulate.convert.tables import make_tables
 
     refuse_folder(out)
-    run = open_run(path)
+    run = open_blocks(path)
     tables = make_tables(run.dataset)
     metadata = _metadata(run.dataset)
     paths = parquet_files(out)
@@ -79,7 +86,7 @@ def to_parquet(
             file = stack.enter_context(open(temporary, "wb"))
             schema = table.schema().with_metadata(metadata)
             writers.append(stack.enter_context(pq.ParquetWriter(file, schema, **_options(schema))))
-        for rollouts, block in run.blocks():
+        for rollouts, block in run:
             for table, writer in zip(tables, writers, strict=True):
                 for batch in _batches(table, block, len(rollouts)):
                     writer.write_batch(batch)

@@ -1,1 +1,1 @@
-"""Runs on disk: committed block by block, verified, resumed."""
+"""Runs on disk: written block by block, each committed by one record, and resumed."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from zarr.codecs import BloscCodec, Crc32cCodec
 
 CODECS: Final = (BloscCodec(cname="lz4", clevel=3, shuffle="shuffle"), Crc32cCodec())
-"""What zarr is told of the chunks of variables; ``encode`` writes just that."""
+"""The codecs of variables in zarr's terms; ``encode`` writes the same bytes."""
 LARGEST_CHUNK: Final = 2**31 - 2**16
 """Bytes that Blosc can compress at once, rounded down."""
 CHECKSUM_BYTES: Final = 4
@@ -21,46 +22,57 @@ _BLOSC: Final = Blosc(cname="lz4", clevel=3, shuffle=Blosc.SHUFFLE)
 _PIECE: Final = 4 * 2**20
 
 
-def encode(values: NDArray[Any], *, dtype: np.dtype[Any], length: int, fill: float | int) -> tuple[bytes, bytes]:
-    """Return a chunk's compressed bytes and the checksum that follows them.
+def encode(values: NDArray[Any], *, dtype: np.dtype[Any], length: int, fill: float | int) -> tuple[bytes, int]:
+    """Return the compressed bytes of a chunk and their CRC-32C, which follows them in the file.
 
-    Call it from a thread that is not the main one: there Blosc uses one thread, whose output is always the same.
+    Call it from a thread other than the main one: there Blosc uses one thread, and its output is always the same.
 
     Args:
-        values: rollouts of a block, the first axis at most ``length`` long.
-        dtype: type in the file; little-endian there.
-        length: rollouts in a chunk; the chunk of a smaller last block is filled up.
-        fill: what to fill it up with.
+        values: Rollouts of a block; at most ``length`` along the first axis.
+        dtype: Type in the file, where it is little-endian.
+        length: Rollouts in a chunk; the chunk of a smaller last block is padded.
+        fill: The padding.
     """
     whole = np.ascontiguousarray(values, dtype=dtype.newbyteorder("<"))
     if len(whole) < length:
         rest = np.full((length - len(whole), *whole.shape[1:]), fill, dtype=whole.dtype)
         whole = np.concatenate([whole, rest])
     data: bytes = _BLOSC.encode(whole)
-    return data, checksum_bytes(google_crc32c.value(data))
+    return data, google_crc32c.value(data)
 
 
-def plain(values: NDArray[Any]) -> bytes:
-    """Return a chunk that is not compressed: little-endian numbers and their checksum."""
-    data = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<")).tobytes()
+def checksum_bytes(checksum: int) -> bytes:
+    """Return a CRC-32C as zarr's codec of that name appends it."""
+    return checksum.to_bytes(CHECKSUM_BYTES, "little")
+
+
+def encode_text(text: str) -> bytes:
+    """Return the chunk of one text: zarr's codecs vlen-utf8 and crc32c."""
+    data = text.encode()
+    data = struct.pack("<II", 1, len(data)) + data
     return data + checksum_bytes(google_crc32c.value(data))
 
 
-def read_plain(path: Path, dtype: str, count: int) -> NDArray[Any] | None:
-    """Return what ``plain`` made a file of, or None if that is not what stands there."""
+def decode_text(chunk: bytes) -> str | None:
+    """Return the text of a chunk, or None if it is not what ``encode_text`` returned."""
+    data, checksum = chunk[:-CHECKSUM_BYTES], chunk[-CHECKSUM_BYTES:]
+    if checksum != checksum_bytes(google_crc32c.value(data)) or data[:8] != struct.pack("<II", 1, len(data) - 8):
+        return None
+    return data[8:].decode()
+
+
+def stored_checksum(path: Path) -> int | None:
+    """Return the checksum at the end of a chunk file, unverified; None if the file is missing or too short."""
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            file.seek(-CHECKSUM_BYTES, os.SEEK_END)
+            return int.from_bytes(file.read(CHECKSUM_BYTES), "little")
     except OSError:
         return None
-    kind = np.dtype(dtype).newbyteorder("<")
-    numbers, tail = data[:-CHECKSUM_BYTES], data[-CHECKSUM_BYTES:]
-    if len(numbers) != count * kind.itemsize or tail != checksum_bytes(google_crc32c.value(numbers)):
-        return None
-    return np.frombuffer(numbers, dtype=kind)
 
 
-def sound_checksum(path: Path) -> int | None:
-    """Return the checksum that ends a chunk file, or None if the file is missing or the checksum does not hold."""
+def verified_checksum(path: Path) -> int | None:
+    """Return the checksum at the end of a chunk file; None if the file is missing or differs from its checksum."""
     try:
         with path.open("rb") as file:
             left = os.fstat(file.fileno()).st_size - CHECKSUM_BYTES
@@ -74,18 +86,3 @@ def sound_checksum(path: Path) -> int | None:
             return checksum if file.read() == checksum_bytes(checksum) else None
     except OSError:
         return None
-
-
-def last_checksum(path: Path) -> int | None:
-    """Return the checksum that ends a chunk file, unchecked; None if the file is missing or too short."""
-    try:
-        with path.open("rb") as file:
-            file.seek(-CHECKSUM_BYTES, os.SEEK_END)
-            return int.from_bytes(file.read(CHECKSUM_BYTES), "little")
-    except OSError:
-        return None
-
-
-def checksum_bytes(checksum: int) -> bytes:
-    """Return a CRC-32C as the zarr codec of that name writes it."""
-    return checksum.to_bytes(CHECKSUM_BYTES, "little")

@@ -1,104 +1,172 @@
-"""Opening a run's dataset, finished or not."""
+"""Reading a run, finished or not: its dataset, and which of its blocks are committed."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dh2sim.errors import RunDamagedError, RunError
 from dh2sim.extras import require_extra
-from dh2sim.simulate.store.place import is_run
-from dh2sim.simulate.store.recover import check_format
-from dh2sim.simulate.store.seal import BLOCKS, CHECKSUM, Seal, seals, stored_attributes
+from dh2sim.simulate.store.codec import decode_text, stored_checksum, verified_checksum
+from dh2sim.simulate.store.manifest import (
+    BLOCKS,
+    METADATA,
+    RECORD,
+    BlockRecord,
+    Manifest,
+    damaged_metadata,
+    read_manifest,
+    read_node,
+)
 
 if TYPE_CHECKING:
     import xarray
 
 
-def open_dataset(path: str | PathLike[str]) -> xarray.Dataset:
-    """Open a run's dataset; numbers are read when they are looked at.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoredRun:
+    """A run on disk: its manifest, and the files of its blocks."""
 
-    Of rollouts that are not run yet ``status`` is -1 and numbers are NaN. Wrap what looks at numbers in ``reading``.
+    path: Path
+    manifest: Manifest
+
+    def chunk(self, variable: str, block: int) -> Path:
+        """Return the file of a variable's chunk."""
+        return self.path / variable / self.manifest.variables[variable].chunk_name(block)
+
+    def record_file(self, block: int) -> Path:
+        """Return the file of the record that commits a block."""
+        return self.path / BLOCKS / RECORD / f"c.{block}"
+
+    def record(self, block: int) -> BlockRecord | None:
+        """Return the record of a block, or None if there is no valid one."""
+        try:
+            text = decode_text(self.record_file(block).read_bytes())
+        except OSError:
+            return None
+        record = None if text is None else BlockRecord.from_text(text)
+        if record is None or (record.block, record.run) != (block, self.manifest.digest):
+            return None
+        return record
+
+    def committed(self, block: int) -> BlockRecord | None:
+        """Return the record of a block if its chunks are there, else None; they are not read."""
+        return self._matching(block, stored_checksum)
+
+    def verified(self, block: int) -> BlockRecord | None:
+        """Return the record of a block if its chunks are what was written, else None; reads all of them."""
+        return self._matching(block, verified_checksum)
+
+    def _matching(self, block: int, checksum_of: Callable[[Path], int | None]) -> BlockRecord | None:
+        record = self.record(block)
+        if record is None or any(
+            checksum_of(self.chunk(name, block)) != checksum for name, checksum in record.checksums.items()
+        ):
+            return None
+        return record
+
+    def check_coordinates(self) -> None:
+        """Check that the coordinates are what was written.
+
+        Raises:
+            RunDamagedError: A file is missing or damaged.
+        """
+        for name, coordinate in self.manifest.coordinates.items():
+            file = self.path / name / coordinate.chunk_name(0)
+            if not coordinate.empty and verified_checksum(file) is None:
+                raise damaged_metadata(file)
+
+    def check_array_metadata(self) -> None:
+        """Check that the metadata in the folder of every array are those in the root.
+
+        Raises:
+            RunDamagedError: A file is missing or damaged.
+        """
+        for name, expected in self.manifest.nodes.items():
+            file = self.path / name / METADATA
+            if read_node(file) != expected:
+                raise damaged_metadata(file)
+
+    def check_chunks(self) -> None:
+        """Check that no chunk of a committed block is missing, without opening any; zarr would read it as blank.
+
+        Raises:
+            RunDamagedError: A chunk or a folder is missing.
+        """
+        with reading(self.path):
+            records = os.listdir(self.path / BLOCKS / RECORD)
+            blocks = [int(name.removeprefix("c.")) for name in records if name.startswith("c.")]
+            for name, variable in self.manifest.variables.items():
+                existing = set(os.listdir(self.path / name))
+                if not variable.empty and any(variable.chunk_name(block) not in existing for block in blocks):
+                    raise RunDamagedError(damaged_run(self.path))
+
+    def values(self, variable: str) -> NDArray[Any]:
+        """Read a whole variable, without xarray.
+
+        Raises:
+            RunDamagedError: A chunk is damaged.
+        """
+        import zarr
+
+        with reading(self.path):
+            group = zarr.open_group(self.path, mode="r")  # its consolidated metadata are those of the manifest
+            return np.asarray(group[variable][...])  # type: ignore[index]
+
+
+def open_run(path: Path) -> StoredRun:
+    """Open a run for reading.
 
     Raises:
-        RunError: there is no run.
-        RunDamagedError: its metadata or coordinates are damaged, or committed chunks are missing.
+        RunError: There is no run.
+        RunDamagedError: Its metadata are damaged.
+    """
+    return StoredRun(path=path, manifest=read_manifest(path))
+
+
+def open_dataset(path: str | PathLike[str]) -> xarray.Dataset:
+    """Open the dataset of a run; numbers are read when they are used.
+
+    Rollouts that are not simulated yet have the ``status`` -1, and NaN for numbers. Use numbers inside ``reading``.
+
+    Raises:
+        RunError: There is no run.
+        RunDamagedError: Metadata or coordinates are damaged, or committed chunks are missing.
         MissingExtraError: xarray is not installed.
     """
     require_extra("data", "xarray", what="a run as an xarray dataset")
     import xarray
 
-    path = Path(path)
-    attributes = read_attributes(path)
-    with reading(path):
-        dataset = xarray.open_dataset(path, engine="zarr", chunks=None)
-        missing = _lacks_chunks(path, read_seal(path, attributes), dataset)
-    if missing:  # zarr would fill them with blanks
-        raise RunDamagedError(damaged(path))
-    return dataset
+    run = open_run(Path(path))
+    run.check_coordinates()
+    run.check_chunks()
+    with reading(run.path):
+        return xarray.open_dataset(run.path, engine="zarr", chunks=None)
 
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Turn what zarr raises of a damaged chunk into an error for users; put nothing but reading into it.
+    """Turn what zarr raises for a damaged chunk into an error for users; only read in this block.
 
     Raises:
-        RunDamagedError: something that is read is damaged.
+        RunDamagedError: A chunk is damaged.
     """
     try:
         yield
+    except RunError:
+        raise
     except (OSError, ValueError, RuntimeError, KeyError, TypeError) as error:
-        raise RunDamagedError(damaged(path)) from error
+        raise RunDamagedError(damaged_run(path)) from error
 
 
-def damaged(path: Path) -> str:
-    """Return the words for a run that cannot be read."""
-    return f"'{path}' is damaged; `dh2sim rollout` with the options it was made with and --resume mends it"
-
-
-def read_attributes(path: Path) -> dict[str, Any]:
-    """Return a run's attributes.
-
-    Raises:
-        RunError: there is no run, or its layout is of another version.
-        RunDamagedError: they cannot be read.
-    """
-    if not path.exists():
-        raise RunError(f"there is no '{path}'")
-    if not is_run(path):
-        raise RunError(f"'{path}' is not a run of dh2sim")
-    attributes = stored_attributes(path)
-    if attributes is None or "dh2sim_run" not in attributes:
-        raise RunDamagedError(damaged(path))
-    check_format(path, attributes["dh2sim_run"])
-    return attributes
-
-
-def read_seal(path: Path, attributes: dict[str, Any]) -> Seal:
-    """Return what a run's blocks are made of.
-
-    Raises:
-        RunDamagedError: neither copy fits the attributes.
-    """
-    for seal in seals(path):
-        if seal.fits(attributes):
-            return seal
-    raise RunDamagedError(damaged(path))
-
-
-def _lacks_chunks(path: Path, seal: Seal, dataset: xarray.Dataset) -> bool:
-    """Tell whether chunks of coordinates or of committed blocks are missing, without opening any."""
-    if any(
-        coordinate.size and not (path / str(name) / "c.0").is_file() for name, coordinate in dataset.coords.items()
-    ):
-        return True
-    records = [name.split(".")[1] for name in os.listdir(path / BLOCKS / CHECKSUM) if name.startswith("c.")]
-    for name, stored in seal.variables.items():
-        there = set(os.listdir(path / name))
-        if not stored.empty and any(stored.chunk_key.format(block) not in there for block in records):
-            return True
-    return False
+def damaged_run(path: Path) -> str:
+    """Return the message for a run with damaged chunks."""
+    return f"'{path}' is damaged; resume it with the same options to compute the damaged blocks again"

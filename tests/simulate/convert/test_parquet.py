@@ -170,7 +170,7 @@ def test_rollouts_not_yet_run_are_null_and_say_so(unfinished: Path, tmp_path: Pa
 
 def test_a_block_that_was_never_committed_is_not_read(run: Path, arrays: Arrays, tmp_path: Path) -> None:
     torn = write_run(tmp_path / "torn.zarr", make_layout(), arrays)
-    (torn / "blocks" / "checksum" / "c.1.0").unlink()
+    (torn / "blocks" / "record" / "c.1").unlink()
     (torn / "qpos" / "c.1.0.0").write_bytes(b"torn")
     _, _, rollouts = _tables(torn, tmp_path)
     assert [row["status"] for row in rollouts[BLOCK : 2 * BLOCK]] == ["not_run"] * BLOCK

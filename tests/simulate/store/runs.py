@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import replace
@@ -147,8 +148,12 @@ def copy(run: Path, path: Path) -> Path:
 
 
 def lasting(run: Path) -> dict[str, bytes]:
-    """Files of a run but for the time that its blocks took."""
-    return {name: data for name, data in contents(run).items() if not name.startswith("blocks/seconds/c")}
+    """Files of a run, and its records without the time that the blocks took."""
+    files = contents(run)
+    for name, data in files.items():
+        if name.startswith("blocks/record/c."):
+            files[name] = re.sub(rb'"seconds": [^,]*', b"", data[8:-4])
+    return files
 
 
 def with_setting(of: Layout, **settings: Any) -> Layout:

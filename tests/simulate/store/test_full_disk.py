@@ -86,8 +86,7 @@ def _undisturbed(folder: Path) -> dict[str, bytes]:
 def test_a_block_that_is_too_large_for_a_file_leaves_nothing_and_can_be_written_later(tmp_path: Path) -> None:
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[1] == resource.RLIM_INFINITY
     assert _run(sys.executable, "-c", WRITE + LIMITED, tmp_path) == [
-        "cannot write to 'run.zarr': File too large; 2 of 8 rollouts are safe. "
-        "Make room, then carry on with --resume",
+        "cannot write to 'run.zarr': File too large; 2 of 8 rollouts are safe. Make room, then resume",
         "(0, 1, 3) True",
         "(0, 1, 3)",
     ]
@@ -110,11 +109,10 @@ def test_a_full_disk_loses_nothing_that_was_committed(tmp_path: Path) -> None:
     assert out == [
         "cannot write to 'run.zarr': No space left on device; nothing was changed",
         "['filler']",
-        "cannot write to 'run.zarr': No space left on device; 2 of 8 rollouts are safe. "
-        "Make room, then carry on with --resume",
+        "cannot write to 'run.zarr': No space left on device; 2 of 8 rollouts are safe. Make room, then resume",
         "(1, 2, 3)",
         "cannot write to 'run.zarr': Read-only file system; 4 of 8 rollouts are safe. "
-        "Mend that, then carry on with --resume",
+        "Resume when it can be written to",
         "(1, 2)",
     ]
     assert lasting(tmp_path / "copied.zarr") == _undisturbed(tmp_path)

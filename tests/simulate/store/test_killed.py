@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim.simulate.description import summarize
+from dh2sim.simulate.description import describe
 from dh2sim.simulate.store.reader import open_dataset
 from tests.simulate.store.runs import lasting, layout, make, resume, whole
 from tests.simulate.store.workers import workers
@@ -21,7 +21,7 @@ BEFORE_A_BLOCK, AFTER_A_BLOCK = 5, 10
 
 def _wait_for_a_block(path: Path) -> None:
     """Wait until another block is committed, or none is left to be."""
-    records = path / "blocks" / "checksum"
+    records = path / "blocks" / "record"
     before, waiting = None, time.monotonic() + 20
     while time.monotonic() < waiting:
         number = len(list(records.glob("c.*"))) if records.exists() else 0
@@ -54,7 +54,7 @@ def test_a_run_whose_writer_is_killed_again_and_again_becomes_what_it_would_have
             killed += start.kill(worker) == -signal.SIGKILL  # or it was done already
             if path.exists():
                 assert _as_read(path, numbers) >= seen
-                seen = summarize(path).blocks_done
+                seen = describe(path).blocks_done
     assert killed >= 3
     pending = resume(path, of)
     assert len(pending) == ROLLOUTS - seen

@@ -30,7 +30,7 @@ def test_a_run_that_exists_is_not_touched(tmp_path: Path) -> None:
     before = contents(tmp_path)
     with pytest.raises(RunExistsError) as caught:
         RunWriter.create(path, layout(settings={"seed": 1}))
-    assert str(caught.value) == f"'{path}' exists already; --resume carries on with it, --overwrite replaces it"
+    assert str(caught.value) == f"'{path}' already exists; resume it, overwrite it, or choose another folder"
     assert contents(tmp_path) == before
 
 
@@ -68,11 +68,11 @@ def test_what_is_no_run_is_never_replaced(tmp_path: Path, make_it: Callable[[Pat
     path = tmp_path / "run.zarr"
     make_it(path)
     before = contents(tmp_path)
-    told = f"'{path}' is not a run of dh2sim; remove it yourself or choose another --out"
+    told = f"'{path}' is not a run of dh2sim"
     for overwrite in (False, True):
         with pytest.raises(RunExistsError) as caught:
             RunWriter.create(path, layout(), overwrite=overwrite)
-        assert str(caught.value) == told
+        assert str(caught.value) == f"{told}; remove it yourself, or choose another folder"
     with pytest.raises(RunError) as refused:
         RunWriter.resume(path, layout())
     assert str(refused.value) == told

@@ -22,38 +22,38 @@ def _refusal(path: Path, of: Layout) -> str:
 @pytest.mark.parametrize(
     ("other", "told"),
     [
-        ({"settings": {"seed": 1}}, "seed is 0 there and 1 here"),
+        ({"settings": {"seed": 1}}, "seed was 0 and is now 1"),
         (
             {"settings": {"seed": 1, "controller": "pd:kp=10", "controller_digest": "a" * 64}},
-            "seed is 0 there and 1 here; controller is 'hold' there and 'pd:kp=10' here",
+            "seed was 0 and is now 1; controller was 'hold' and is now 'pd:kp=10'",
         ),
         (
             {"settings": {"controller_digest": "a" * 64}},
-            "what the controller reads, or its code, is another than it was",
+            "the controller's code or a file that it reads has changed",
         ),
-        ({"settings": {"start": "q.csv", "start_digest": "a" * 64}}, "start is 'home' there and 'q.csv' here"),
-        ({"settings": {"start_digest": "a" * 64}}, "the states to start from are others than they were"),
+        ({"settings": {"start": "q.csv", "start_digest": "a" * 64}}, "start was 'home' and is now 'q.csv'"),
+        ({"settings": {"start_digest": "a" * 64}}, "the initial states have changed"),
         (
             {"settings": {"randomize": {"mass": 0.1, "gain": 0.2}}},
-            "randomize is nothing there and mass=0.1,gain=0.2 here",
+            "randomize was none and is now mass=0.1,gain=0.2",
         ),
-        ({"settings": {"record": ["qpos", "qvel"]}}, "record is qpos,ctrl there and qpos,qvel here"),
-        ({"settings": {"velocity_limits": [1.0, 3.0]}}, "velocity limit is 1.0,2.0 there and 1.0,3.0 here"),
-        ({"timestep": 0.001, "mjcf": "<mujoco>1</mujoco>"}, "timestep is 0.002 there and 0.001 here"),
-        ({"integrator": "RK4", "mjcf": "<mujoco>1</mujoco>"}, "integrator is 'Euler' there and 'RK4' here"),
-        ({"mjcf": "<mujoco>1</mujoco>"}, "the model is another one"),
+        ({"settings": {"record": ["qpos", "qvel"]}}, "record was qpos,ctrl and is now qpos,qvel"),
+        ({"settings": {"velocity_limits": [1.0, 3.0]}}, "velocity limit was 1.0,2.0 and is now 1.0,3.0"),
+        ({"timestep": 0.001, "mjcf": "<mujoco>1</mujoco>"}, "timestep was 0.002 and is now 0.001"),
+        ({"integrator": "RK4", "mjcf": "<mujoco>1</mujoco>"}, "integrator was 'Euler' and is now 'RK4'"),
+        ({"mjcf": "<mujoco>1</mujoco>"}, "the model has changed"),
         (
             {"robot_file_sha256": "6" * 64, "mjcf": "<mujoco>1</mujoco>", "settings": {"home": [0.0, 0.0]}},
-            "the robot file is another one (SHA-256 555555555555… there and 666666666666… here)",
+            "the robot file has changed (SHA-256 555555555555…, now 666666666666…)",
         ),
         (
             {"robot_file_sha256": ""},
-            "the robot file is another one (SHA-256 555555555555… there and of none here)",
+            "the robot file has changed (SHA-256 555555555555…, now none)",
         ),
-        ({"robot": "puma560", "robot_file_sha256": "6" * 64}, "robot is 'small' there and 'puma560' here"),
+        ({"robot": "puma560", "robot_file_sha256": "6" * 64}, "robot was 'small' and is now 'puma560'"),
         (
             {"versions": {"dh2sim": "0.2.0", "mujoco": "3.18.0", "numpy": "2.4.0", "python": "3.11.0"}},
-            "dh2sim is 0.1.0 there and 0.2.0 here; MuJoCo is 3.17.0 there and 3.18.0 here",
+            "dh2sim was 0.1.0 and is now 0.2.0; MuJoCo was 3.17.0 and is now 3.18.0",
         ),
     ],
 )
@@ -63,7 +63,7 @@ def test_a_run_of_other_settings_is_not_resumed_and_every_difference_named(
     path = make(tmp_path / "run.zarr", layout())
     before = contents(path)
     assert _refusal(path, layout(**other)) == (
-        f"'{path}' was made with other settings: {told}. Give the same options, or write to another --out"
+        f"'{path}' was made with other settings: {told}. Use the same options, or choose another folder"
     )
     assert contents(path) == before
 
@@ -71,8 +71,8 @@ def test_a_run_of_other_settings_is_not_resumed_and_every_difference_named(
 def test_a_run_of_another_number_of_rollouts_is_not_resumed(tmp_path: Path) -> None:
     path = make(tmp_path / "run.zarr", layout(rollouts=7))
     assert _refusal(path, layout(rollouts=8)) == (
-        f"'{path}' was made with other settings: rollouts is 7 there and 8 here. "
-        "Give the same options, or write to another --out"
+        f"'{path}' was made with other settings: rollouts was 7 and is now 8. "
+        "Use the same options, or choose another folder"
     )
 
 
@@ -80,9 +80,9 @@ def test_a_run_of_other_variables_is_not_resumed(tmp_path: Path) -> None:
     path = make(tmp_path / "run.zarr", layout())
     fewer = replace(layout(), variables=layout().variables[3:])
     assert _refusal(path, fewer) == (
-        f"'{path}' was made with other settings: it holds qpos, ctrl, tool_pose, contacts, status, stop_step, "
-        "saturation there and would hold contacts, status, stop_step, saturation here. "
-        "Give the same options, or write to another --out"
+        f"'{path}' was made with other settings: the variables were qpos, ctrl, tool_pose, contacts, status, "
+        "stop_step, saturation and are now contacts, status, stop_step, saturation. "
+        "Use the same options, or choose another folder"
     )
 
 

@@ -3,21 +3,20 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from dh2sim.errors import RunDamagedError, RunError
-from dh2sim.simulate.description import summarize
+from dh2sim.simulate.description import describe
 from dh2sim.simulate.store.writer import RunWriter
 from tests.program import contents
-from tests.simulate.store.runs import block_of, layout, make, whole
+from tests.simulate.store.runs import layout, make, whole
 
 
-def test_a_finished_run_is_summed_up(tmp_path: Path) -> None:
+def test_a_finished_run_is_described(tmp_path: Path) -> None:
     of = layout(rollouts=7, block=3, steps=4)
     path = make(tmp_path / "run.zarr", of)
     saturated = int((whole(of)["saturation"] > 0).any(axis=1).sum())
-    assert summarize(str(path)).to_json() == {
+    assert describe(str(path)).to_json() == {
         "path": str(path),
         "robot": "small",
         "controller": "hold",
@@ -41,12 +40,28 @@ def test_a_finished_run_is_summed_up(tmp_path: Path) -> None:
         "created": "2026-11-22T10:00:00+00:00",
         "versions": {"dh2sim": "0.1.0", "mujoco": "3.17.0", "numpy": "2.4.0", "python": "3.11.0"},
         "complete": True,
+        "integrator": "Euler",
+        "start": "home",
+        "randomize": {},
+        "recorded": {
+            "qpos": {"units": "rad or m", "dimensions": ["rollout", "step", "joint"], "shape": [7, 5, 2]},
+            "ctrl": {"units": "N*m or N", "dimensions": ["rollout", "interval", "actuator"], "shape": [7, 4, 2]},
+            "tool_pose": {"units": "m, 1", "dimensions": ["rollout", "step", "pose"], "shape": [7, 5, 7]},
+            "contacts": {"units": "1", "dimensions": ["rollout", "interval"], "shape": [7, 4]},
+            "status": {"units": "", "dimensions": ["rollout"], "shape": [7]},
+            "stop_step": {"units": "1", "dimensions": ["rollout"], "shape": [7]},
+            "saturation": {"units": "1", "dimensions": ["rollout", "actuator"], "shape": [7, 2]},
+        },
+        "stopped": [{"rollout": 4, "reason": "bad_qacc", "step": 3}],
+        "bytes_in_memory": sum(values.nbytes for values in whole(of).values()),
+        "command": "dh2sim rollout small",
+        "resume_command": None,
     }
 
 
-def test_a_run_that_has_not_begun_is_summed_up(tmp_path: Path) -> None:
+def test_a_run_that_has_not_begun_is_described(tmp_path: Path) -> None:
     RunWriter.create(tmp_path / "run.zarr", layout()).close()
-    summary = summarize(tmp_path / "run.zarr")
+    summary = describe(tmp_path / "run.zarr")
     assert (summary.finished, summary.unstable, summary.not_run, summary.blocks_done) == (0, 0, 7, 0)
     assert (summary.seconds, summary.steps_per_second, summary.complete) == (0, None, False)
     assert json.loads(json.dumps(summary.to_json())) == summary.to_json()
@@ -55,35 +70,32 @@ def test_a_run_that_has_not_begun_is_summed_up(tmp_path: Path) -> None:
 def test_rollouts_of_a_block_that_is_not_committed_count_as_not_run(tmp_path: Path) -> None:
     of = layout()
     path = make(tmp_path / "run.zarr", of)
-    (path / "qpos" / "c.0.0.0").unlink()
-    (path / "blocks" / "checksum" / "c.2.0").unlink()
-    summary = summarize(path)
+    for block in (0, 2):
+        (path / "blocks" / "record" / f"c.{block}").unlink()
+    summary = describe(path)
     assert (summary.finished, summary.unstable, summary.not_run) == (2, 1, 4)
     assert (summary.blocks_done, summary.blocks, summary.seconds) == (1, 3, 0.25)
 
 
-def test_time_that_nobody_knows_does_not_count(tmp_path: Path) -> None:
-    of = layout()
-    with RunWriter.create(tmp_path / "run.zarr", of) as writer:
-        for block, seconds in enumerate((0.5, np.nan, 0.5)):
-            writer.write(block, block_of(of, block), seconds)
-    summary = summarize(tmp_path / "run.zarr")
-    assert summary.seconds == 1.0
-    assert summary.steps_per_second == 4 * 8 / 1.0
+def test_a_chunk_that_is_missing_is_an_error(tmp_path: Path) -> None:
+    path = make(tmp_path / "run.zarr", layout())
+    (path / "qpos" / "c.0.0.0").unlink()
+    with pytest.raises(RunDamagedError, match="is damaged; resume it"):
+        describe(path)
 
 
-def test_a_damaged_status_is_told_of(tmp_path: Path) -> None:
+def test_a_damaged_status_is_an_error(tmp_path: Path) -> None:
     path = make(tmp_path / "run.zarr", layout())
     chunk = path / "status" / "c.1"
     chunk.write_bytes(b"\0" + chunk.read_bytes()[1:])
     with pytest.raises(RunDamagedError) as caught:
-        summarize(path)
+        describe(path)
     assert str(caught.value) == (
-        f"'{path}' is damaged; `dh2sim rollout` with the options it was made with and --resume mends it"
+        f"'{path}' is damaged; resume it with the same options to compute the damaged blocks again"
     )
 
 
-def test_what_is_no_run_is_not_summed_up(tmp_path: Path) -> None:
+def test_what_is_no_run_is_not_described(tmp_path: Path) -> None:
     with pytest.raises(RunError) as caught:
-        summarize(tmp_path)
+        describe(tmp_path)
     assert str(caught.value) == f"'{tmp_path}' is not a run of dh2sim"
