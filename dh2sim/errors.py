@@ -12,32 +12,40 @@ class Dh2simError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True, order=True)
 class Problem:
-    """One thing that is wrong in a robot file, and where."""
+    """One thing that is wrong in a robot, and where."""
 
-    file: str
-    """Name of the file as the user gave it."""
-    line: int
-    """Line, counted from 1."""
-    column: int
-    """Column, counted from 1."""
+    file: str = ""
+    """Name of the file as the user gave it; empty for a robot made in code."""
+    line: int = 0
+    """Line in the file, counted from 1."""
+    column: int = 0
+    """Column in the file, counted from 1."""
     path: str
-    """Path of the key, such as ``joints[2].limits.position``; empty for the whole file."""
+    """Path of the key, such as ``joints[2].limits.position``; empty for the whole robot."""
     message: str
     """What was found and what is allowed."""
 
     def __str__(self) -> str:
-        """Return ``file:line:column: path: message``."""
-        where = f"{self.file}:{self.line}:{self.column}: "
-        return f"{where}{self.path}: {self.message}" if self.path else f"{where}{self.message}"
+        """Return ``file:line:column: path: message``, as far as there is such a place."""
+        place = f"{self.file}:{self.line}:{self.column}: " if self.file else ""
+        return f"{place}{self.path}: {self.message}" if self.path else f"{place}{self.message}"
 
 
-class RobotFileError(Dh2simError):
-    """A robot file is wrong; ``problems`` holds everything that is, in the order of the file."""
+class RobotError(Dh2simError, ValueError):
+    """A robot is wrong; ``problems`` holds everything that is."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
-        """Keep the problems sorted by place; the text has a line for each."""
-        self.problems = tuple(sorted(problems))
+        """Keep the problems; the text has a line for each."""
+        self.problems = tuple(problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class RobotFileError(RobotError):
+    """A robot file is wrong; ``problems`` are in the order of the file."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        """Keep the problems sorted by place."""
+        super().__init__(sorted(problems))
 
 
 class ImportedFileError(RobotFileError):

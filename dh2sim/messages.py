@@ -1,24 +1,39 @@
-"""What was chosen, changed or left out, in sentences; things of one kind share a sentence.
-
-Words that error messages share: what was found, and what may have been meant.
-"""
+"""Words that messages share: values and places, lists of names, guesses at what was meant, notes on a file."""
 
 from __future__ import annotations
 
 import difflib
 import functools
 import itertools
+import re
 from collections.abc import Iterable
 from enum import StrEnum
-from typing import Final, TypeVar
+from typing import Final, TypeAlias, TypeVar
 
 from dh2sim.errors import Dh2simError
+
+Loc: TypeAlias = tuple[str | int, ...]
+"""Keys and indices from the top of a file, such as ``("joints", 2, "a")``."""
 
 _LONGEST_SHOWN: Final = 60
 _LONGEST_GUESSED: Final = 60
 _MOST_GUESSED: Final = 100
 """Names that a guess is made among: the first of a long list."""
 _MOST_LISTED: Final = 40
+_PLAIN_KEY: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+
+
+def path_of(loc: Loc) -> str:
+    """Return the path of a place, such as ``joints[2].limits.position``."""
+    path = ""
+    for part in loc:
+        if isinstance(part, int):
+            path += f"[{part}]"
+        elif not _PLAIN_KEY.fullmatch(part) or len(part) > 100:
+            path += f"[{shown(part)}]"
+        else:
+            path += f".{part}" if path else part
+    return path
 
 
 def shown(value: object) -> str:
@@ -39,7 +54,7 @@ def shown(value: object) -> str:
         case list():
             return "a list"
         case _:
-            return str(value)
+            return f"a {type(value).__name__}"
 
 
 def listed(names: Iterable[str], between: str = ", ") -> str:

@@ -27,8 +27,8 @@ from dh2sim.kinematics.frame_assignment.rounding import simple_angles, simple_le
 from dh2sim.kinematics.transforms import invert, pose_from_rpy, rotate_tensor, rpy_from_rotation
 from dh2sim.messages import shown
 from dh2sim.model.mass import is_possible
+from dh2sim.robot.fields import LONGEST_NAME, is_reserved, name_problem
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.schema import LONGEST_NAME, is_reserved, name_problem
 from dh2sim.robot.spec import ActuatorSpec, BaseSpec, Convention, Limits, LinkSpec, MeshSpec, Pose, RobotSpec, Row
 from dh2sim.robot.write import robot_file_text
 from dh2sim.typing import Array, read_only

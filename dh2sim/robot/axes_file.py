@@ -1,204 +1,137 @@
-"""Axes files to AxesSpecs.
+"""Axes files: joint axes of a serial robot, to which frames are yet to be assigned."""
 
-What an axes file says, validated and in SI units: joint axes to which frames are yet to be assigned.
-
-The axes file as it is written, in its own units, as pydantic models.
-
-Checks between parts of an axes file; each works on what is well-formed and leaves the rest alone.
-"""
-
-from __future__ import annotations
-
-import dataclasses
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, Final
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
-from pydantic_core import PydanticCustomError
 
 from dh2sim.errors import ImportedFileError
-from dh2sim.messages import closest
-from dh2sim.robot.checks import RowView, check_actuators, check_configurations, check_names, check_type, row_views
-from dh2sim.robot.expressions import evaluate_parameters
-from dh2sim.robot.read import read_model, to_spec
-from dh2sim.robot.schema import (
-    PROBLEM,
-    ActuatorEntry,
-    Angles,
-    Context,
-    DynamicsEntry,
-    JointEntry,
-    LimitsEntry,
+from dh2sim.messages import Loc, closest
+from dh2sim.robot.checks import check_actuators, check_configurations, check_names, check_type, trees
+from dh2sim.robot.fields import (
+    WRONG,
+    Choice,
+    Configurations,
+    Internal,
     Name,
-    Number,
+    Numbers,
     Parameters,
-    RobotEntry,
+    Part,
+    Parts,
+    Scope,
     Text,
-    UnitsEntry,
-    Vector,
-    one_of,
+    Tree,
+    UnitsLike,
 )
+from dh2sim.robot.read import check_file, file_scope, units_of
 from dh2sim.robot.spec import (
+    CONVENTIONS,
+    JOINT_LETTERS,
+    LENGTHS,
     ActuatorSpec,
     Convention,
     Dynamics,
     JointType,
     Limits,
     Pose,
-    RobotSpec,
     SourceFile,
     Units,
+    filled_in,
+    joint_vectors,
 )
-from dh2sim.robot.yaml_tree import Node, Report, compose, decode
+from dh2sim.robot.yaml_tree import Report, compose, decode
 from dh2sim.typing import Array, read_only
+
+
+@dataclass(frozen=True, slots=True)
+class Direction(Numbers):
+    """A vector of any length but 0, which becomes a unit vector."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return the vector as given."""
+        vector = Numbers.check(self, value, loc, scope)
+        if vector is WRONG or any(vector):  # NaN counts as something: it has been reported
+            return vector
+        return scope.wrong(loc, "the direction is of length 0; any other vector along the axis is allowed")
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Array:  # noqa: ARG002
+        """Return it with length 1; scaled first, so that no square is too large or too small."""
+        vector = np.array(value) / np.abs(value).max()
+        return read_only(vector / np.linalg.norm(vector))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AxisJoint:
     """A joint, and its axis in base_link at joint coordinates zero."""
 
-    name: str
-    type: JointType
-    """Revolute, continuous or prismatic; never fixed."""
-    direction: Array
+    name: Annotated[str, Name("Default joint_<i>, counted from 1.")]
+    type: Annotated[
+        JointType,
+        Choice("How the joint moves.", JointType, without=("fixed",), short=JOINT_LETTERS, required=True),
+    ]
+    point: Annotated[Array | None, Numbers("A point of the axis; a prismatic joint needs none.", LENGTHS)] = None
+    """m, shape (3,); None only for a prismatic joint, whose axis may be put anywhere."""
+    direction: Annotated[Array, Direction("Along the axis, of any length.", required=True)]
     """Unit vector, shape (3,): the positive coordinate turns about it, or slides along it."""
-    point: Array | None = None
-    """A point of the axis, m, shape (3,); None only for a prismatic joint, whose axis may be put anywhere."""
-    limits: Limits = field(default_factory=Limits)
-    dynamics: Dynamics = field(default_factory=Dynamics)
-    actuator: ActuatorSpec = field(default_factory=ActuatorSpec)
+    limits: Annotated[Limits, Part("", Limits, list_is="position")] = field(default_factory=Limits)
+    dynamics: Annotated[Dynamics, Part("", Dynamics)] = field(default_factory=Dynamics)
+    actuator: Annotated[ActuatorSpec, Part("", ActuatorSpec)] = field(default_factory=ActuatorSpec)
+
+
+@dataclass(frozen=True, slots=True)
+class Axis(Part):
+    """An entry of the axes."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return its tree; a turning joint has a point that its axis goes through."""
+        tree = Part.check(self, value, loc, scope)
+        if tree is WRONG or not isinstance(value, dict) or "point" in tree:
+            return tree
+        kind = tree.get("type")
+        if isinstance(kind, JointType) and kind.turns and all(closest(key, self.keys) != "point" for key in value):
+            message = f"missing key 'point': a {kind} joint needs a point of its axis; only a prismatic one does not"
+            scope.report(loc, message)
+        return tree
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AxesSpec:
     """A serial robot as an axes file describes it; every number is finite and in SI units."""
 
-    name: str
-    joints: tuple[AxisJoint, ...]
+    name: Annotated[str, Name("Name of the robot.", required=True)]
+    description: Annotated[str, Text("What the robot is.")] = ""
+    source: Annotated[str, Text("Where the numbers come from.")] = ""
+    convention: Annotated[
+        Convention | None,
+        Choice("Of the table that is asked for.", Convention, without=("hayati",), other_names=CONVENTIONS),
+    ] = None
+    units: Annotated[Units, Part("Units of this file.", Units)] = field(default_factory=Units)
+    """Of the file; everything else here is in SI units."""
+    parameters: Annotated[Mapping[str, float], Parameters("Named constants for expressions.")] = field(
+        default_factory=lambda: MappingProxyType({})
+    )
+    joints: Annotated[
+        tuple[AxisJoint, ...], Parts("The joint axes, base first.", Axis("", AxisJoint), required=True, key="axes")
+    ]
     """Base first; at least one."""
-    description: str = ""
-    source: str = ""
-    """Where the numbers come from, in the author's words."""
-    convention: Convention | None = None
-    """Of the table that is asked for, standard or modified; None where the file names none."""
-    tool: Pose = field(default_factory=Pose)
+    tool: Annotated[Pose, Part("Its position is by default a point of the last axis.", Pose)] = field(
+        default_factory=Pose
+    )
     """Pose of tool0 in base_link at joint coordinates zero."""
-    gravity: Array = field(default_factory=lambda: read_only([0, 0, -9.81]))
-    """m/s² in base_link, shape (3,)."""
-    configurations: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
-    """Named joint vectors, each of shape (number of joints,)."""
-    source_file: SourceFile | None = None
+    gravity: Annotated[Array, Numbers("m/s² in base_link.")] = field(default_factory=lambda: read_only([0, 0, -9.81]))
+    configurations: Annotated[Mapping[str, Array], Configurations("Named joint vectors.")] = field(
+        default_factory=lambda: MappingProxyType({})
+    )
+    """Each of shape (number of joints,)."""
+    source_file: Annotated[SourceFile | None, Internal("", SourceFile)] = None
     """None for axes made in code."""
 
 
-class AxisType(StrEnum):
-    """How a joint moves about or along its axis."""
-
-    REVOLUTE = JointType.REVOLUTE.value
-    CONTINUOUS = JointType.CONTINUOUS.value
-    PRISMATIC = JointType.PRISMATIC.value
-
-
-class TableConvention(StrEnum):
-    """Conventions of which a table can be asked for."""
-
-    STANDARD = Convention.STANDARD.value
-    MODIFIED = Convention.MODIFIED.value
-
-
-def _points_somewhere(direction: tuple[float, float, float]) -> tuple[float, float, float]:
-    if not any(direction):  # NaN counts as something: it has been reported
-        message = "the direction is of length 0; any other vector along the axis is allowed"
-        raise PydanticCustomError(PROBLEM, "{message}", {"message": message})
-    return direction
-
-
-Direction: TypeAlias = Annotated[Vector, AfterValidator(_points_somewhere)]
-
-
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-
-class AxisEntry(_Model):
-    """A joint axis, in base_link at joint coordinates zero."""
-
-    name: Name | None = Field(default=None, description="Default joint_<i>, counted from 1.")
-    type: Annotated[AxisType, one_of(AxisType)] = Field(description="How the joint moves.")
-    point: Vector | None = Field(
-        default=None, description="A point of the axis, in the file's length unit; a prismatic joint needs none."
-    )
-    direction: Direction = Field(
-        description="Along the axis, of any length: the coordinate turns about it, or slides along it."
-    )
-    limits: LimitsEntry = Field(default_factory=LimitsEntry, description="Limits, in the file's units.")
-    dynamics: DynamicsEntry = Field(default_factory=DynamicsEntry, description="Joint dynamics, SI.")
-    actuator: ActuatorEntry = Field(default_factory=ActuatorEntry, description="Overrides the file's actuators.")
-
-
-class ToolEntry(_Model):
-    """Pose of tool0 in base_link at joint coordinates zero."""
-
-    xyz: Vector | None = Field(
-        default=None,
-        description="Position, in the file's length unit; default the last axis's point, or 0, 0, 0 if it has none.",
-    )
-    rpy: Angles = Field(default=(0.0, 0.0, 0.0), description="Roll, pitch, yaw, in the file's angle unit.")
-
-
-class AxesEntry(_Model):
-    """A serial robot described by its joint axes; numbers may be expressions, as in a robot file."""
-
-    name: Name = Field(description="Name of the robot.")
-    description: Text = Field(default="", description="What the robot is.")
-    source: Text = Field(default="", description="Where the numbers come from.")
-    convention: Annotated[TableConvention, one_of(TableConvention)] | None = Field(
-        default=None, description="Of the table that is to be made; default standard."
-    )
-    units: UnitsEntry = Field(default_factory=UnitsEntry, description="Units of this file; default rad and m.")
-    parameters: Parameters = Field(
-        default_factory=dict, description="Named constants for expressions, in the file's units."
-    )
-    axes: list[AxisEntry] = Field(min_length=1, description="The joint axes, base first.")
-    tool: ToolEntry = Field(default_factory=ToolEntry, description="tool0 in base_link at joint coordinates zero.")
-    gravity: Vector = Field(default=(0.0, 0.0, -9.81), description="m/s² in base_link.")
-    configurations: dict[str, list[Number]] = Field(
-        default={}, description="Named joint vectors, a number for each axis, in the file's units."
-    )
-    actuators: ActuatorEntry = Field(default_factory=ActuatorEntry, description="What drives every joint.")
-
-
-def check_axes(root: Node, names: Mapping[str, float], report: Report) -> None:
-    """Note in ``report`` what does not go together; ``names`` are the evaluated parameters."""
-    axes = [_never_fixed(axis) for axis in row_views(root, names, "axes")]
-    check_names(axes, report)
-    for axis in axes:
-        check_type(axis, report)
-        _check_point(axis, report)
-    check_configurations(root, axes, names, report, each="axis")
-    check_actuators(root, axes, report)
-
-
-def _never_fixed(axis: RowView) -> RowView:
-    """Return a view whose type is unknown where it is one that only a row of a table can have."""
-    return dataclasses.replace(axis, type=None) if axis.type is JointType.FIXED else axis
-
-
-def _check_point(axis: RowView, report: Report) -> None:
-    """A turning joint has a point that its axis goes through; a misspelt one has been told."""
-    keys = axis.node.value
-    if axis.type is None or not axis.type.turns or not isinstance(keys, dict) or axis.node.wrong:
-        return
-    allowed = AxisEntry.model_fields
-    if "point" not in keys and all(key in allowed or closest(key, allowed) != "point" for key in keys):
-        message = f"missing key 'point': a {axis.type} joint needs a point of its axis; only a prismatic one does not"
-        report.add(axis.node.line, axis.node.column, axis.loc, message)
+_AXES: Final = Part("", AxesSpec, more={"actuators": Part("What drives every joint.", ActuatorSpec)})
 
 
 class _AxesReport(Report):
@@ -222,80 +155,33 @@ def read_axes(data: bytes, *, file: str, directory: Path) -> AxesSpec:
     report = _AxesReport(file)
     text = decode(data, report)
     root = compose(text, report, needs="axes need at least name and axes")
-    parameters = evaluate_parameters(root, report)
-    entry = read_model(AxesEntry, root, Context(parameters=parameters, directory=directory), report)
-    check_axes(root, parameters, report)
-    if entry is None or report.problems:
+    scope = file_scope(root, report, directory)
+    tree = check_file(_AXES, root, scope)
+    if tree is not WRONG:
+        _check(tree, scope)
+    if report.problems:
         raise report.error()
-    source = SourceFile(name=Path(file).name, path=file, text=text, sha256=hashlib.sha256(data).hexdigest())
-    return _to_axes(entry, _without_table(entry, root, source))
-
-
-def _without_table(entry: AxesEntry, root: Node, source: SourceFile) -> RobotSpec:
-    """Return a robot of rows without numbers: it has all that an axes file shares with a robot file, in SI units."""
-    rows = [
-        JointEntry.model_construct(
-            name=axis.name,
-            type=JointType(axis.type),
-            limits=axis.limits,
-            dynamics=axis.dynamics,
-            actuator=axis.actuator,
-        )
-        for axis in entry.axes
-    ]
-    robot = RobotEntry.model_construct(
-        name=entry.name,
-        description=entry.description,
-        source=entry.source,
-        convention=Convention(entry.convention or Convention.STANDARD),
-        units=entry.units,
-        parameters=entry.parameters,
-        gravity=entry.gravity,
-        joints=rows,
-        configurations=entry.configurations,
-        actuators=entry.actuators,
-    )
-    return to_spec(robot, root, source)
-
-
-def _to_axes(entry: AxesEntry, robot: RobotSpec) -> AxesSpec:
-    units = Units(angle=entry.units.angle, length=entry.units.length)
-    joints = tuple(
-        AxisJoint(
-            name=row.name,
-            type=row.type,
-            direction=_unit(axis.direction),
-            point=None if axis.point is None else _lengths(axis.point, units),
-            limits=row.limits,
-            dynamics=row.dynamics,
-            actuator=row.actuator,
-        )
-        for axis, row in zip(entry.axes, robot.rows, strict=True)
-    )
+    units = units_of(tree)
+    joints = filled_in(tree["axes"], tree)
+    point = joints[-1].get("point")
+    tool = {**({} if point is None else {"xyz": point}), **tree.get("tool", {})}
+    fields = _AXES.fields({**tree, "axes": joints, "tool": tool}, units)
     return AxesSpec(
-        name=robot.name,
-        joints=joints,
-        description=robot.description,
-        source=robot.source,
-        convention=None if entry.convention is None else robot.convention,
-        tool=_tool(entry, units),
-        gravity=robot.gravity,
-        configurations=robot.configurations,
-        source_file=robot.source_file,
+        **{
+            **fields,
+            "configurations": joint_vectors(tree, joints, units),
+            "source_file": SourceFile(
+                name=Path(file).name, path=file, text=text, sha256=hashlib.sha256(data).hexdigest()
+            ),
+        }
     )
 
 
-def _tool(entry: AxesEntry, units: Units) -> Pose:
-    """Return the tool's pose, its position by default a point of the last axis."""
-    xyz = entry.tool.xyz or entry.axes[-1].point or (0.0, 0.0, 0.0)
-    return Pose(xyz=_lengths(xyz, units), rpy=read_only([units.radians(angle) for angle in entry.tool.rpy]))
-
-
-def _lengths(values: Sequence[float], units: Units) -> Array:
-    return read_only([units.metres(value) for value in values])
-
-
-def _unit(direction: Sequence[float]) -> Array:
-    """Return a vector of length 1; scaled first, so that no square is too large or too small."""
-    vector = np.array(direction) / np.abs(direction).max()
-    return read_only(vector / np.linalg.norm(vector))
+def _check(tree: Tree, scope: Scope) -> None:
+    """Report what does not go together in an axes file."""
+    axes = trees(tree, "axes")
+    check_names(axes, "axes", scope)
+    for index, axis in enumerate(axes):
+        check_type(axis, ("axes", index), scope)
+    check_configurations(tree, axes, "axes", scope, each="axis")
+    check_actuators(tree, axes, "axes", scope)

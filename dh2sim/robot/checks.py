@@ -1,65 +1,22 @@
-"""Checks between parts of a robot file; each works on what is well-formed and leaves the rest alone.
+"""Checks between the values of a robot; each looks at what is right by itself and leaves the rest alone.
 
-What can be told of each row of the table, or of each axis, even where other parts of the file are wrong.
+They work on the trees that ``fields.Part.check`` returns, in whatever units, of robot files, axes files and robots
+made in code.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from enum import StrEnum
-from typing import Final, TypeVar
+from collections.abc import Sequence
+from typing import Any, Final
 
-from dh2sim.messages import listed, shown
-from dh2sim.robot.expressions import NumberError, to_number
-from dh2sim.robot.schema import is_reserved, name_problem
-from dh2sim.robot.spec import ActuatorType, Convention, JointType
-from dh2sim.robot.yaml_tree import Loc, Node, Report, path_of
+from dh2sim.messages import Loc, listed, path_of, shown
+from dh2sim.robot.fields import WRONG, Scope, Tree, is_reserved, name_problem
 
-Choice = TypeVar("Choice", bound=StrEnum)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class RowView:
-    """A row of the table, or an axis; None or NaN where the file is wrong."""
-
-    key: str
-    """Of the list that it stands in."""
-    index: int
-    """From 0."""
-    node: Node
-    name: str | None
-    """The name given, or the default one."""
-    type: JointType | None
-    position: tuple[float, float] | None
-    """Limits in the file's units; None where there are none."""
-
-    @property
-    def loc(self) -> Loc:
-        """Where the row stands."""
-        return (self.key, self.index)
-
-
-def number_at(node: Node | None, names: Mapping[str, float]) -> float:
-    """Return a number, or NaN where there is none or a wrong one."""
-    try:
-        return math.nan if node is None else to_number(node.value, names)
-    except NumberError:
-        return math.nan
-
-
-def choice_at(node: Node | None, choices: type[Choice]) -> Choice | None:
-    """Return a member of an enumeration, or None where there is none or a wrong one."""
-    value = None if node is None else node.value
-    return next((choice for choice in choices if choice.value == value), None)
-
-
-def row_views(root: Node, names: Mapping[str, float], key: str = "joints") -> list[RowView]:
-    """Return a view of every entry of the list that stands at ``key``."""
-    joints = root.at(key)
-    items = joints.value if joints is not None and isinstance(joints.value, list) else []
-    return [_view(key, index, node, names) for index, node in enumerate(items)]
+_SLACK: Final = 1e-12
+"""By which a configuration may pass a limit, of the larger of the two limits' sizes."""
+_GAINS: Final = {"kp": ("position",), "kv": ("position", "velocity")}
+"""The actuators that a gain is for."""
 
 
 def default_name(index: int) -> str:
@@ -67,149 +24,128 @@ def default_name(index: int) -> str:
     return f"joint_{index + 1}"
 
 
-def _view(key: str, index: int, node: Node, names: Mapping[str, float]) -> RowView:
-    name_node = node.at("name")
-    name: object = default_name(index) if name_node is None else name_node.value
-    limits = node.at("limits", "position")
-    lower, upper = (number_at(node.at("limits", "position", side), names) for side in (0, 1))
-    return RowView(
-        key=key,
-        index=index,
-        node=node,
-        name=name if isinstance(name, str) and name_problem(name) is None else None,
-        type=choice_at(node.at("type"), JointType),
-        position=None if limits is None else (lower, upper),
-    )
+def check(robot: Tree, scope: Scope) -> None:
+    """Report what does not go together in a robot."""
+    rows = trees(robot, "joints")
+    check_names(rows, "joints", scope)
+    for index, row in enumerate(rows):
+        check_type(row, ("joints", index), scope)
+        _check_convention(row, ("joints", index), robot, scope)
+    check_configurations(robot, rows, "joints", scope)
+    check_actuators(robot, rows, "joints", scope)
 
 
-_SLACK: Final = 1e-12
-"""By which a configuration may pass a limit, of the larger of the two limits' sizes."""
-_TAKEN_BY: Final = {
-    "kp": (ActuatorType.POSITION,),
-    "kv": (ActuatorType.POSITION, ActuatorType.VELOCITY),
-}
-"""Which actuators a gain is for."""
+def trees(tree: Any, key: str) -> list[Tree]:
+    """Return the entries of a list in a checked tree; an empty tree for one that is wrong."""
+    entries = tree.get(key, ()) if isinstance(tree, dict) else ()
+    return [entry if isinstance(entry, dict) else {} for entry in entries] if isinstance(entries, list) else []
 
 
-def check(root: Node, names: Mapping[str, float], report: Report) -> None:
-    """Note in ``report`` what does not go together; ``names`` are the evaluated parameters."""
-    rows = row_views(root, names)
-    check_names(rows, report)
-    for row in rows:
-        check_type(row, report)
-        _check_convention(row, root, report)
-    check_configurations(root, rows, names, report)
-    check_actuators(root, rows, report)
+def _name(rows: Sequence[Tree], index: int) -> Any:
+    return rows[index].get("name", default_name(index))
 
 
-def check_names(rows: Sequence[RowView], report: Report) -> None:
+def check_names(rows: Sequence[Tree], key: str, scope: Scope) -> None:
     """Joint names are unique, and none is one that the exports need."""
-    first: dict[str, RowView] = {}
-    for row in rows:
-        if row.name is None:
+    first: dict[str, int] = {}
+    for index, row in enumerate(rows):
+        name = _name(rows, index)
+        if name is WRONG:
             continue
-        given = row.node.at("name")
-        place = given or row.node
-        loc: Loc = (*row.loc, "name") if given else row.loc
-        if is_reserved(row.name):
-            message = f"{shown(row.name)} is the name of a fixed joint in the exports; choose another"
-            report.add(place.line, place.column, loc, message)
-        other = first.setdefault(row.name, row)
-        if other is not row:
-            line = (other.node.at("name") or other.node).line
-            what = "joint name" if given else "default joint name"
-            message = f"duplicate {what} {shown(row.name)}; {path_of(other.loc)} on line {line} has it already"
-            report.add(place.line, place.column, loc, message)
+        loc: Loc = (key, index, "name") if "name" in row else (key, index)
+        if is_reserved(name):
+            scope.report(loc, f"{shown(name)} is the name of a fixed joint in the exports; choose another")
+        other = first.setdefault(name, index)
+        if other != index:
+            what = "joint name" if "name" in row else "default joint name"
+            line = scope.report.line((key, other, "name"), (key, other))
+            scope.report(loc, f"duplicate {what} {shown(name)}; {path_of((key, other))}{line} has it already")
 
 
-def check_type(row: RowView, report: Report) -> None:
+def check_type(row: Tree, loc: Loc, scope: Scope) -> None:
     """A row has nothing that its type has no use for."""
-    node, here = row.node, row.loc
-    if row.type is JointType.CONTINUOUS and (entry := node.entry("limits", "position")):
+    limits = row.get("limits")
+    if row.get("type") == "continuous" and isinstance(limits, dict) and "position" in limits:
         message = "a continuous joint has no position limits; make it revolute or remove them"
-        report.add(entry.line, entry.column, (*here, "limits", "position"), message)
-    if row.type is not JointType.FIXED:
+        scope.report((*loc, "limits", "position"), message, at_key=True)
+    if row.get("type") != "fixed":
         return
     for key in ("flip", "limits", "dynamics", "actuator"):
-        entry = node.entry(key)
-        if entry is not None and (key != "flip" or entry.value.value is True):
-            message = f"a fixed row does not move: it takes no '{key}'"
-            report.add(entry.line, entry.column, (*here, key), message)
+        if key not in row or (key == "flip" and row[key] is not True):
+            continue
+        if key == "actuator" and row[key] == {"type": "none"} and not scope.in_file:
+            continue  # as a RobotSpec fills it in
+        scope.report((*loc, key), f"a fixed row does not move: it takes no '{key}'", at_key=True)
 
 
-def _check_convention(row: RowView, root: Node, report: Report) -> None:
+def _check_convention(row: Tree, loc: Loc, robot: Tree, scope: Scope) -> None:
     """A row has no parameter that its convention has no use for."""
-    node, here = row.node, row.loc
-    convention = choice_at(node.at("convention") or root.at("convention"), Convention)
-    if convention is Convention.HAYATI:
-        entry = node.entry("d") if row.type not in (None, JointType.PRISMATIC) else None
-        if entry is not None:
-            message = f"a {row.type} Hayati row takes no 'd', which nearly parallel axes leave free; "
+    convention, kind = row.get("convention", robot.get("convention")), row.get("type")
+    if convention == "hayati":
+        if "d" in row and isinstance(kind, str) and kind != "prismatic":
+            message = f"a {kind} Hayati row takes no 'd', which nearly parallel axes leave free; "
             message += "use 'a' and 'beta', or another convention for this row"
-            report.add(entry.line, entry.column, (*here, "d"), message)
-    elif convention is not None and (entry := node.entry("beta")):
+            scope.report((*loc, "d"), message, at_key=True)
+    elif isinstance(convention, str) and "beta" in row:
         message = f"a {convention} row takes no 'beta', the second twist of a row of 'convention: hayati'"
-        report.add(entry.line, entry.column, (*here, "beta"), message)
+        scope.report((*loc, "beta"), message, at_key=True)
 
 
 def check_configurations(
-    root: Node, rows: Sequence[RowView], names: Mapping[str, float], report: Report, *, each: str = "moving row"
+    robot: Tree, rows: Sequence[Tree], key: str, scope: Scope, *, each: str = "moving row"
 ) -> None:
     """Configurations have proper names, a value for each moving row, and each value within its limits."""
-    node = root.at("configurations")
-    if node is None or not isinstance(node.value, dict):
+    configurations = robot.get("configurations")
+    if not isinstance(configurations, dict):
         return
-    moving = [row for row in rows if row.type is not JointType.FIXED]
-    countable = bool(rows) and all(row.type is not None for row in rows)
-    for name, entry in node.value.items():
+    moving = [index for index, row in enumerate(rows) if row.get("type") != "fixed"]
+    countable = bool(rows) and all(isinstance(row.get("type"), str) for row in rows)
+    for name, values in configurations.items():
         if problem := name_problem(name, "the name of a configuration"):
-            report.add(entry.line, entry.column, ("configurations",), problem)
-        values = entry.value
-        loc: Loc = ("configurations", name)
-        if not countable or not isinstance(values.value, list):
+            scope.report(("configurations", str(name)), problem, at_key=True, path=("configurations",))
+        if not countable or not isinstance(values, list):
             continue
-        if len(values.value) != len(moving):
-            joints = listed(row.name or path_of(row.loc) for row in moving)
-            expected = f"expected {len(moving)} numbers, one for each {each} ({joints})"
-            message = f"{expected}, found a list of {len(values.value)}"
-            report.add(values.line, values.column, loc, message)
+        loc: Loc = ("configurations", str(name))
+        called = [path_of((key, index)) if _name(rows, index) is WRONG else _name(rows, index) for index in moving]
+        if len(values) != len(moving):
+            expected = f"expected {len(moving)} numbers, one for each {each} ({listed(called)})"
+            scope.report(loc, f"{expected}, found a list of {len(values)}")
             continue
-        for index, (value, row) in enumerate(zip(values.value, moving, strict=True)):
-            if outside := _outside(number_at(value, names), row):
-                report.add(value.line, value.column, (*loc, index), outside)
+        for place, (value, index, joint) in enumerate(zip(values, moving, called, strict=True)):
+            if value is not WRONG and (limits := _outside(value, rows[index])):
+                lower, upper = limits
+                scope.report((*loc, place), f"{value!r} is outside the limits of {joint}: {lower!r} to {upper!r}")
 
 
-def _outside(value: float, row: RowView) -> str | None:
-    """Return a complaint about a coordinate outside a row's position limits, or None."""
-    if row.position is None or row.type is JointType.CONTINUOUS:
+def _outside(value: float, row: Tree) -> tuple[float, float] | None:
+    """Return a row's position limits if a coordinate is outside of them."""
+    limits = row.get("limits")
+    position: Any = limits.get("position", WRONG) if isinstance(limits, dict) else WRONG
+    if position is WRONG or row["type"] == "continuous":
         return None
-    lower, upper = row.position
+    lower, upper = position
     slack = _SLACK * max(abs(lower), abs(upper))
-    if math.isnan(slack) or lower >= upper or not (value < lower - slack or value > upper + slack):
+    if math.isnan(slack) or not (value < lower - slack or value > upper + slack):
         return None
-    return f"{value!r} is outside the limits of {row.name or path_of(row.loc)}: {lower!r} to {upper!r}"
+    return lower, upper
 
 
-def check_actuators(root: Node, rows: Sequence[RowView], report: Report) -> None:
+def check_actuators(robot: Tree, rows: Sequence[Tree], key: str, scope: Scope) -> None:
     """An actuator has only the gains that its type uses."""
-    default = _actuator_type(root.at("actuators"), ActuatorType.POSITION)
-    _check_gains(root, ("actuators",), default, report)
-    for row in rows:
-        if row.type is not JointType.FIXED:
-            place: Loc = (*row.loc, "actuator")
-            _check_gains(root, place, _actuator_type(root.at(*place), default), report)
+    shared = robot.get("actuators")
+    default = _check_gains(shared, ("actuators",), "position", scope)
+    for index, row in enumerate(rows):
+        if row.get("type") != "fixed":
+            _check_gains(row.get("actuator"), (key, index, "actuator"), default, scope)
 
 
-def _actuator_type(node: Node | None, inherited: ActuatorType | None) -> ActuatorType | None:
-    """Return an actuator's type; None where it is wrong."""
-    if node is None or node.at("type") is None:
+def _check_gains(actuator: Any, loc: Loc, inherited: Any, scope: Scope) -> Any:
+    """Report gains that an actuator has no use for; return its type."""
+    if not isinstance(actuator, dict):
         return inherited
-    return choice_at(node.at("type"), ActuatorType)
-
-
-def _check_gains(root: Node, loc: Loc, kind: ActuatorType | None, report: Report) -> None:
-    for gain, kinds in _TAKEN_BY.items():
-        entry = root.entry(*loc, gain)
-        if entry is not None and kind is not None and kind not in kinds:
+    kind = actuator.get("type", inherited)
+    for gain, kinds in _GAINS.items():
+        if gain in actuator and isinstance(kind, str) and kind not in kinds:
             message = f"an actuator of type '{kind}' takes no {gain}; {gain} is for {' and '.join(kinds)}"
-            report.add(entry.line, entry.column, (*loc, gain), message)
+            scope.report((*loc, gain), message, at_key=True)
+    return kind

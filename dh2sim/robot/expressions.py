@@ -8,10 +8,6 @@ Python's parser or evaluator.
     factor  = ("+" | "-") factor | power
     power   = primary [ "**" factor ]
     primary = number | name | function "(" sum { "," sum } ")" | "(" sum ")"
-
-A number of a robot file: a finite number, or an arithmetic expression in a string.
-
-Named constants of a robot file, evaluated in the order in which they need each other.
 """
 
 from __future__ import annotations
@@ -19,12 +15,10 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple, TypeAlias
 
 from dh2sim.messages import did_you_mean, listed, shown
-from dh2sim.robot.yaml_tree import Entry, Node, Report
 
 MAX_LENGTH: Final = 1000
 MAX_DEPTH: Final = 50
@@ -264,12 +258,12 @@ class NumberError(ValueError):
     """A value is no finite number; the text is fit for a user."""
 
 
-def to_number(value: object, names: Mapping[str, float]) -> float:
-    """Return the number that a value of a robot file stands for.
+def to_number(value: object, names: Mapping[str, float] | None) -> float:
+    """Return the number that a value stands for.
 
     Args:
-        value: What the file holds.
-        names: Values of the parameters.
+        value: A number, or an expression in a string.
+        names: Values of the parameters; None where expressions are not allowed.
 
     Returns:
         A finite number; NaN where the expression uses a parameter that is wrong itself.
@@ -278,7 +272,7 @@ def to_number(value: object, names: Mapping[str, float]) -> float:
         NumberError: With what was found and what is allowed.
     """
     match value:
-        case str():
+        case str() if names is not None:
             try:
                 return evaluate(value, names)
             except ExpressionError as error:
@@ -292,79 +286,13 @@ def to_number(value: object, names: Mapping[str, float]) -> float:
                 return number
             raise NumberError(f"expected a finite number, found {shown(value)}")
         case _:
-            raise NumberError(f"expected a number or an expression in a string, found {shown(value)}")
+            expected = "a number" if names is None else "a number or an expression in a string"
+            raise NumberError(f"expected {expected}, found {shown(value)}")
 
 
-def evaluate_parameters(root: Node, report: Report) -> Mapping[str, float]:
-    """Return every parameter's value; NaN for one that is wrong, which is then in ``report``.
-
-    Where keys of ``parameters`` could not be read, every other name has the value NaN as well.
-    """
-    node = root.at("parameters")
-    if node is None:
-        return {}
-    if not isinstance(node.value, dict):
-        message = f"expected a mapping of names to numbers, found {shown(node.value)}"
-        if not node.wrong:
-            report.add(node.line, node.column, ("parameters",), message)
-        return defaultdict(lambda: math.nan)
-    for name, entry in node.value.items():
-        if not is_name(name):
-            report.add(entry.line, entry.column, ("parameters",), _name_message(name))
-    entries = {name: entry for name, entry in node.value.items() if is_name(name)}
-    values: dict[str, float] = defaultdict(lambda: math.nan) if node.wrong else {}
-    values.update(dict.fromkeys(entries, math.nan))
-    order, cycles = _order({name: _needs(entry, entries) for name, entry in entries.items()})
-    for name in order:
-        node = entries[name].value
-        if node.wrong:
-            continue
-        try:
-            values[name] = to_number(node.value, values)
-        except NumberError as error:
-            report.add(node.line, node.column, ("parameters", name), str(error))
-    for cycle in cycles:
-        node = entries[cycle[0]].value
-        message = f"parameters need each other in a circle: {listed([*cycle, cycle[0]], ' -> ')}"
-        report.add(node.line, node.column, ("parameters", cycle[0]), message)
-    return values
-
-
-def _name_message(name: str) -> str:
+def parameter_name_problem(name: object) -> str:
+    """Return why a parameter cannot have a name of which ``is_name`` says so."""
     taken = [*CONSTANTS, *FUNCTIONS]
     if name in taken:
         return f"a parameter cannot be named {shown(name)}; expressions know the name already"
     return f"{shown(name)} is no name for a parameter; letters, digits and '_', not starting with a digit"
-
-
-def _needs(entry: Entry, entries: Mapping[str, Entry]) -> Sequence[str]:
-    text = entry.value.value
-    return [name for name in names_in(text) if name in entries] if isinstance(text, str) else []
-
-
-def _order(needs: Mapping[str, Sequence[str]]) -> tuple[list[str], list[tuple[str, ...]]]:
-    """Return names with every name after those it needs, and the cycles that keep others out."""
-    waiting_for = {name: len(needed) for name, needed in needs.items()}
-    needed_by: dict[str, list[str]] = {name: [] for name in needs}
-    for name, needed in needs.items():
-        for other in needed:
-            needed_by[other].append(name)
-    order = [name for name, count in waiting_for.items() if count == 0]
-    for name in order:
-        for other in needed_by[name]:
-            waiting_for[other] -= 1
-            if waiting_for[other] == 0:
-                order.append(other)
-    ordered = set(order)
-    cycles: list[tuple[str, ...]] = []
-    seen: set[str] = set()
-    for start in needs:
-        trail: dict[str, int] = {}
-        name = start
-        while name not in ordered and name not in seen:
-            seen.add(name)
-            trail[name] = len(trail)
-            name = next(other for other in needs[name] if other not in ordered)
-        if name in trail:
-            cycles.append(tuple(trail)[trail[name] :])
-    return order, cycles

@@ -1,18 +1,47 @@
-"""What a robot file says, validated and in SI units (m, rad, kg, N, N·m).
+"""What a robot file says, in SI units (m, rad, kg, N, N·m): the one description of a robot's fields.
 
-Units that a robot file may be written in, and their way to SI.
+Each field is annotated with its kind (``fields``): what it means, its unit in files and what is allowed. A
+``RobotSpec`` checks itself and all its parts when it is made, from a file or in code; parts are checked as part of
+a robot.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
+from typing import Annotated, Any, Final
 
+from dh2sim.errors import Problem, RobotError
+from dh2sim.messages import Loc, path_of
+from dh2sim.robot.checks import check, default_name
+from dh2sim.robot.fields import (
+    Choice,
+    Color,
+    Configurations,
+    Dimension,
+    Flag,
+    Inertia,
+    Internal,
+    MeshFile,
+    Name,
+    Number,
+    Numbers,
+    Parameters,
+    Part,
+    Parts,
+    Range,
+    Scope,
+    Text,
+    Tree,
+    UnitsLike,
+    plain_part,
+)
 from dh2sim.typing import Array, read_only
+
+_FILLED_IN: Final[Any] = None
+"""Default of a field that the RobotSpec fills in: in its rows there is always a value."""
 
 
 class AngleUnit(StrEnum):
@@ -33,10 +62,10 @@ class LengthUnit(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Units:
-    """The units of one file."""
+    """Units of the angles and lengths in this file."""
 
-    angle: AngleUnit = AngleUnit.RAD
-    length: LengthUnit = LengthUnit.M
+    angle: Annotated[AngleUnit, Choice("Unit of angles.", AngleUnit)] = AngleUnit.RAD
+    length: Annotated[LengthUnit, Choice("Unit of lengths.", LengthUnit)] = LengthUnit.M
 
     def radians(self, angle: float) -> float:
         """Return an angle of the file in rad."""
@@ -58,6 +87,18 @@ class Units:
         """Return a joint coordinate, or its rate, in rad or m."""
         return self.radians(value) if turns else self.metres(value)
 
+    def to_si(self, value: float, dimension: Dimension | None, *, turns: bool) -> float:
+        """Return a number of the file in SI units; ``turns`` says whether a joint coordinate is an angle."""
+        match dimension:
+            case Dimension.ANGLE:
+                return self.radians(value)
+            case Dimension.LENGTH:
+                return self.metres(value)
+            case Dimension.COORDINATE:
+                return self.coordinate(value, turns=turns)
+            case None:
+                return value
+
 
 class Convention(StrEnum):
     """Where a row's link part stands beside its joint part."""
@@ -68,6 +109,22 @@ class Convention(StrEnum):
     """A_i = Tx(a) Rx(alpha) Rz(theta) Tz(d), with a and alpha of index i - 1; proximal (Craig)."""
     HAYATI = "hayati"
     """A_i = Rz(theta) Tx(a) Rx(alpha) Ry(beta), for nearly parallel axes; distal (Hayati, Mirmirani)."""
+
+
+CONVENTIONS: Final = {
+    "craig": "modified",
+    "mdh": "modified",
+    "proximal": "modified",
+    "khalil": "modified",
+    "dh": "standard",
+    "sdh": "standard",
+    "classic": "standard",
+    "classical": "standard",
+    "distal": "standard",
+    "paul": "standard",
+    "spong": "standard",
+}
+"""What the conventions are called elsewhere."""
 
 
 class JointType(StrEnum):
@@ -87,6 +144,10 @@ class JointType(StrEnum):
     def turns(self) -> bool:
         """Whether the joint coordinate is an angle."""
         return self in (JointType.REVOLUTE, JointType.CONTINUOUS)
+
+
+JOINT_LETTERS: Final = {"r": "revolute", "p": "prismatic", "f": "fixed"}
+"""Joint types as many tables abbreviate them."""
 
 
 class ActuatorType(StrEnum):
@@ -111,149 +172,265 @@ class SourceFile:
     """Hexadecimal SHA-256 of the file's bytes."""
 
 
+LENGTHS: Final = Number("", Dimension.LENGTH)
+_ANGLES: Final = Number("", Dimension.ANGLE)
+_RPY: Final = "roll, pitch, yaw"
+
+
+def _zeros() -> Array:
+    return read_only([0, 0, 0])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pose:
-    """A pose as a robot file gives it: R = Rz(yaw) Ry(pitch) Rx(roll), about fixed x, y, z as in URDF."""
+    """A pose: position, and angles about fixed x, y, z as in URDF."""
 
-    xyz: Array = field(default_factory=lambda: read_only([0, 0, 0]))
-    """Position, m, shape (3,)."""
-    rpy: Array = field(default_factory=lambda: read_only([0, 0, 0]))
-    """Roll, pitch and yaw, rad, shape (3,)."""
+    xyz: Annotated[Array, Numbers("Position, in the file's length unit.", LENGTHS)] = field(default_factory=_zeros)
+    rpy: Annotated[Array, Numbers("Roll, pitch, yaw, in the file's angle unit.", _ANGLES, of=_RPY)] = field(
+        default_factory=_zeros
+    )
+    """R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MeshSpec:
     """A mesh file that shows a link."""
 
-    file: Path
-    """Absolute path of the file; known to exist when the robot was read."""
-    scale: float = 1.0
-    """Metres per unit of the file."""
-    pose: Pose = field(default_factory=Pose)
-    """Pose of the mesh's own frame in the DH frame that carries it."""
-    location: str = ""
+    file: Annotated[Path, MeshFile("STL, OBJ, PLY or GLB file; relative to the folder of this file.", required=True)]
+    """Absolute; known to exist when the robot was made."""
+    scale: Annotated[float, Number("Metres per unit of the mesh file.", above=0)] = 1.0
+    pose: Annotated[Pose, Part("Pose of the mesh file's own frame in the DH frame.", Pose, inline=True)] = field(
+        default_factory=Pose
+    )
+    location: Annotated[str, Internal("", str)] = ""
     """``file:line:column: path`` of the entry in the robot file, to begin an error message with."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Limits:
-    """Limits of a joint; None where the file gives none."""
+    """Limits of a joint, in the file's units."""
 
-    position: tuple[float, float] | None = None
-    """Lower and upper joint coordinate, rad or m."""
-    velocity: float | None = None
-    """rad/s or m/s."""
-    effort: float | None = None
-    """N·m or N."""
+    position: Annotated[
+        tuple[float, float] | None,
+        Range(
+            "Lower and upper joint coordinate, in the file's angle or length unit.", Number("", Dimension.COORDINATE)
+        ),
+    ] = None
+    velocity: Annotated[
+        float | None, Number("In the file's angle or length unit per second.", Dimension.COORDINATE, above=0)
+    ] = None
+    effort: Annotated[float | None, Number("N·m or N.", above=0)] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Dynamics:
-    """Joint dynamics, SI."""
+    """Joint dynamics, in SI units."""
 
-    damping: float = 0.0
-    """N·m·s/rad or N·s/m."""
-    friction: float = 0.0
-    """Coulomb friction, N·m or N."""
-    armature: float = 0.0
-    """Rotor inertia seen at the joint, kg·m² or kg."""
+    damping: Annotated[float, Number("N·m·s/rad or N·s/m.", least=0)] = 0.0
+    friction: Annotated[float, Number("Coulomb friction, N·m or N.", least=0)] = 0.0
+    armature: Annotated[float, Number("Rotor inertia seen at the joint, kg·m² or kg.", least=0)] = 0.0
+
+
+_Rgba = tuple[float, float, float, float]
+_COLOR: Final = Color("Red, green, blue and optionally alpha, each 0 to 1.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinkSpec:
-    """What the file says of a link; None where it says nothing."""
+    """The link that a joint moves."""
 
-    mass: float | None = None
-    """kg."""
-    com: Array | None = None
-    """Centre of mass in DH frame i, m, shape (3,)."""
-    inertia: Array | None = None
-    """About the centre of mass, along DH frame i's axes, kg·m², shape (3, 3)."""
-    density: float | None = None
-    """kg/m³, for shapes made from the table."""
-    radius: float | None = None
-    """Of the shapes made from the table, m."""
-    color: tuple[float, float, float, float] | None = None
-    """Red, green, blue, alpha, each from 0 to 1."""
-    mesh: MeshSpec | None = None
+    mass: Annotated[float | None, Number("kg", above=0)] = None
+    com: Annotated[Array | None, Numbers("Centre of mass in DH frame i, in the file's length unit.", LENGTHS)] = None
+    inertia: Annotated[Array | None, Inertia("About com, along DH frame i's axes, kg·m².")] = None
+    density: Annotated[
+        float | None, Number("kg/m³, for shapes made from the table; used where mass is not given.", above=0)
+    ] = None
+    radius: Annotated[
+        float | None,
+        Number("Of the shapes made from the table, in the file's length unit.", Dimension.LENGTH, above=0),
+    ] = None
+    color: Annotated[_Rgba | None, _COLOR] = None
+    mesh: Annotated[MeshSpec | None, Part("Visual mesh, in DH frame i.", MeshSpec)] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ActuatorSpec:
-    """What the file says of a joint's actuator; gains are None where it says nothing."""
+    """What drives a joint in the MJCF."""
 
-    type: ActuatorType = ActuatorType.POSITION
-    kp: float | None = None
-    """Position gain, N·m/rad or N/m."""
-    kv: float | None = None
-    """Velocity gain, N·m·s/rad or N·s/m."""
+    type: Annotated[
+        ActuatorType, Choice("What the control signal is; default position.", ActuatorType, inherited=True)
+    ] = ActuatorType.POSITION
+    kp: Annotated[float | None, Number("Position gain, N·m/rad or N/m; for position.", above=0)] = None
+    kv: Annotated[float | None, Number("Velocity gain, N·m·s/rad or N·s/m; for position and velocity.", above=0)] = (
+        None
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Row:
-    """One row of the DH table: the row's transform at coordinate zero, and how it moves.
+    """A row of the DH table: its transform at coordinate zero, how it moves and what it carries."""
 
-    The joint coordinate adds to theta (revolute, continuous) or to d (prismatic); with ``flip`` it subtracts.
-    """
-
-    name: str
-    type: JointType
-    convention: Convention
-    a: float = 0.0
-    """m; of index i - 1 in a modified row."""
-    alpha: float = 0.0
-    """rad; of index i - 1 in a modified row."""
-    d: float = 0.0
-    """m."""
-    theta: float = 0.0
-    """rad."""
-    beta: float = 0.0
-    """rad; second twist of a Hayati row, about y."""
-    flip: bool = False
-    limits: Limits = field(default_factory=Limits)
-    dynamics: Dynamics = field(default_factory=Dynamics)
-    link: LinkSpec = field(default_factory=LinkSpec)
-    actuator: ActuatorSpec = field(default_factory=ActuatorSpec)
+    name: Annotated[str, Name("Default joint_<i>, counted from 1.")] = _FILLED_IN
+    type: Annotated[JointType, Choice("How the row moves.", JointType, short=JOINT_LETTERS, required=True)]
+    convention: Annotated[
+        Convention, Choice("Overrides the file's for this row.", Convention, other_names=CONVENTIONS)
+    ] = _FILLED_IN
+    a: Annotated[float, Number("a_i (modified: a_{i-1}), in the file's length unit.", Dimension.LENGTH)] = 0.0
+    alpha: Annotated[float, Number("alpha_i (modified: alpha_{i-1}), in the file's angle unit.", Dimension.ANGLE)] = (
+        0.0
+    )
+    d: Annotated[
+        float,
+        Number(
+            "d_i, in the file's length unit; a prismatic coordinate adds to it. "
+            "A Hayati row has one only if it is prismatic.",
+            Dimension.LENGTH,
+        ),
+    ] = 0.0
+    theta: Annotated[
+        float, Number("theta_i, in the file's angle unit; a revolute coordinate adds to it.", Dimension.ANGLE)
+    ] = 0.0
+    beta: Annotated[
+        float,
+        Number("beta_i, second twist, about y, in the file's angle unit; of a Hayati row alone.", Dimension.ANGLE),
+    ] = 0.0
+    flip: Annotated[bool, Flag("True: the joint coordinate subtracts instead.")] = False
+    limits: Annotated[Limits, Part("Limits, in the file's units.", Limits, list_is="position")] = field(
+        default_factory=Limits
+    )
+    dynamics: Annotated[Dynamics, Part("Joint dynamics, SI.", Dynamics)] = field(default_factory=Dynamics)
+    link: Annotated[LinkSpec, Part("The link that this joint moves.", LinkSpec)] = field(default_factory=LinkSpec)
+    actuator: Annotated[ActuatorSpec, Part("Overrides the file's actuators.", ActuatorSpec)] = field(
+        default_factory=ActuatorSpec
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BaseSpec:
-    """What the file says of the base link."""
+    """Pose of DH frame 0 in base_link, and how the base looks."""
 
-    pose: Pose = field(default_factory=Pose)
-    """Pose of DH frame 0 in base_link."""
-    mesh: MeshSpec | None = None
-    """Visual, in DH frame 0."""
-    color: tuple[float, float, float, float] | None = None
+    pose: Annotated[Pose, Part("Pose of DH frame 0 in base_link.", Pose, inline=True)] = field(default_factory=Pose)
+    color: Annotated[_Rgba | None, _COLOR] = None
+    mesh: Annotated[MeshSpec | None, Part("Visual mesh, in DH frame 0.", MeshSpec)] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotSpec:
-    """A robot as its file describes it; every number is finite and in SI units."""
+    """A robot described by its Denavit-Hartenberg table.
 
-    name: str
-    rows: tuple[Row, ...]
-    """The DH table, base first; at least one row."""
-    description: str = ""
-    source: str = ""
-    """Where the numbers come from, in the author's words."""
-    convention: Convention = Convention.STANDARD
+    Strings are taken where an enumeration is meant, and any real numbers and sequences of them; the spec that is
+    made holds enumerations, floats and read-only arrays.
+
+    Raises:
+        RobotError: Something is wrong; the error holds everything that is, with its path as in a robot file.
+    """
+
+    name: Annotated[str, Name("Name of the robot; names the exported files.", required=True)]
+    description: Annotated[str, Text("What the robot is.")] = ""
+    source: Annotated[str, Text("Where the numbers come from.")] = ""
+    convention: Annotated[
+        Convention,
+        Choice(
+            "standard: Rz(theta) Tz(d) Tx(a) Rx(alpha); modified: Tx(a) Rx(alpha) Rz(theta) Tz(d); "
+            "hayati: Rz(theta) Tx(a) Rx(alpha) Ry(beta).",
+            Convention,
+            other_names=CONVENTIONS,
+            required=True,
+        ),
+    ] = Convention.STANDARD
     """Of rows that name none."""
-    units: Units = field(default_factory=Units)
-    """Units the robot file is written in; the numbers here are in SI units whatever they are."""
-    parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    """Named constants, evaluated, in the file's own units."""
-    base: BaseSpec = field(default_factory=BaseSpec)
-    tool: Pose = field(default_factory=Pose)
-    """Pose of tool0 in DH frame n."""
-    gravity: Array = field(default_factory=lambda: read_only([0, 0, -9.81]))
-    """m/s² in base_link, shape (3,)."""
-    configurations: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
-    """Named joint vectors, each of shape (number of moving rows,)."""
-    source_file: SourceFile | None = None
+    units: Annotated[Units, Part("Units of this file; default rad and m.", Units)] = field(default_factory=Units)
+    """Of the file that the robot was read from, and of its parameters; everything else here is in SI units."""
+    parameters: Annotated[
+        Mapping[str, float], Parameters("Named constants for expressions, in the file's units.")
+    ] = field(default_factory=lambda: MappingProxyType({}))
+    """Evaluated."""
+    base: Annotated[BaseSpec, Part("DH frame 0 in base_link.", BaseSpec)] = field(default_factory=BaseSpec)
+    tool: Annotated[Pose, Part("tool0 in DH frame n.", Pose)] = field(default_factory=Pose)
+    gravity: Annotated[Array, Numbers("m/s² in base_link.")] = field(default_factory=lambda: read_only([0, 0, -9.81]))
+    rows: Annotated[
+        tuple[Row, ...],
+        Parts("The DH table, a row each, base first.", Part("", Row), required=True, key="joints"),
+    ]
+    configurations: Annotated[
+        Mapping[str, Array],
+        Configurations("Named joint vectors, a number for each moving row, in the file's units."),
+    ] = field(default_factory=lambda: MappingProxyType({}))
+    """Each of shape (number of moving rows,)."""
+    source_file: Annotated[SourceFile | None, Internal("", SourceFile)] = None
     """None for a robot made in code."""
+
+    def __post_init__(self) -> None:
+        """Check the robot and fill in what is left out."""
+        problems = _Problems()
+        scope = Scope(report=problems, parameters=None, directory=Path())
+        tree = ROBOT.check({"convention": Convention.STANDARD.value, **plain_part(self)}, (), scope)
+        check(tree, scope)
+        if problems.found:
+            raise RobotError(problems.found)
+        for name, value in robot_fields(tree, Units()).items():
+            object.__setattr__(self, name, value)
 
     @property
     def moving_rows(self) -> tuple[Row, ...]:
         """The rows that have a joint coordinate, in the order of a joint vector."""
         return tuple(row for row in self.rows if row.type.moves)
+
+
+ROBOT: Final = Part("", RobotSpec, more={"actuators": Part("What drives every joint.", ActuatorSpec)})
+"""The robot file as a whole."""
+
+
+class _Problems:
+    """Takes the problems of a robot made in code."""
+
+    def __init__(self) -> None:
+        self.found: list[Problem] = []
+
+    def __call__(self, loc: Loc, message: str, *, at_key: bool = False, path: Loc | None = None) -> None:  # noqa: ARG002
+        self.found.append(Problem(path=path_of(loc if path is None else path), message=message))
+
+    def line(self, *locs: Loc) -> str:  # noqa: ARG002
+        return ""
+
+
+def robot_fields(tree: Tree, units: UnitsLike) -> dict[str, Any]:
+    """Return the fields of the robot that a checked tree describes: what is left out is filled in.
+
+    Args:
+        tree: Without anything wrong.
+        units: That its values are in.
+    """
+    rows = filled_in(tree["joints"], tree)
+    fields = ROBOT.fields({**tree, "joints": rows}, units)
+    return {**fields, "configurations": joint_vectors(tree, rows, units)}
+
+
+def filled_in(rows: Sequence[Tree], robot: Tree) -> list[Tree]:
+    """Return the rows of a checked tree, each with a name, a convention and an actuator."""
+    shared = {"type": ActuatorType.POSITION, **robot.get("actuators", {})}
+    convention = robot.get("convention", Convention.STANDARD)
+    return [
+        {"name": default_name(index), "convention": convention, **row, "actuator": _actuator(row, shared)}
+        for index, row in enumerate(rows)
+    ]
+
+
+def joint_vectors(robot: Tree, rows: Sequence[Tree], units: UnitsLike) -> Mapping[str, Array]:
+    """Return the configurations of a checked tree in SI units."""
+    turns = [row["type"].turns for row in rows if row["type"].moves]
+    vectors = {
+        name: read_only(
+            [units.to_si(value, Dimension.COORDINATE, turns=turn) for value, turn in zip(vector, turns, strict=True)]
+        )
+        for name, vector in robot.get("configurations", {}).items()
+    }
+    return MappingProxyType(vectors)
+
+
+def _actuator(row: Tree, shared: Tree) -> Tree:
+    """Return a row's actuator: its own, else the file's; gains are inherited where the types agree."""
+    if row["type"] is JointType.FIXED:
+        return {"type": ActuatorType.NONE}
+    own = row.get("actuator", {})
+    return {**shared, **own} if own.get("type", shared["type"]) is shared["type"] else own

@@ -1,13 +1,8 @@
-"""YAML text to a tree of nodes.
+"""YAML text as a tree of nodes that know their places in it, and the report of problems at such places.
 
-Only what a robot file needs is accepted: one document of mappings with text keys, lists and scalars. Depth
-and the number of nodes with aliases expanded are bounded, so that no file takes long to refuse.
-
-Where something stands in a robot file, and the problems found so far.
-
-YAML 1.2 core schema: what a plain scalar stands for.
-
-The text of a robot file, and the tree of nodes that know where they stand in it.
+Only what a robot file needs is accepted: one document of mappings with text keys, lists and scalars of YAML 1.2's
+core schema. Size, depth and the number of nodes with aliases expanded are bounded, so that no file takes long to
+refuse.
 """
 
 from __future__ import annotations
@@ -23,25 +18,7 @@ from ruamel.yaml.error import MarkedYAMLError, StringMark
 from ruamel.yaml.events import Event, NodeEvent, ScalarEvent
 
 from dh2sim.errors import Problem, RobotFileError
-from dh2sim.messages import shown
-
-Loc: TypeAlias = tuple[str | int, ...]
-"""Keys and indices from the top of the file, such as ``("joints", 2, "a")``."""
-
-_PLAIN_KEY: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
-
-
-def path_of(loc: Loc) -> str:
-    """Return the path of a place, such as ``joints[2].limits.position``."""
-    path = ""
-    for part in loc:
-        if isinstance(part, int):
-            path += f"[{part}]"
-        elif not _PLAIN_KEY.fullmatch(part) or len(part) > 100:
-            path += f"[{shown(part)}]"
-        else:
-            path += f".{part}" if path else part
-    return path
+from dh2sim.messages import Loc, path_of, shown
 
 
 class Report:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.importing.serial import joint_names, robot_name
-from dh2sim.robot.schema import name_problem
+from dh2sim.robot.fields import name_problem
 
 
 def test_names_that_are_allowed_stay() -> None:

@@ -73,7 +73,8 @@ def test_a_file_that_holds_no_mapping_is_told_what_belongs_there(text: str, foun
         ("{type: }", "4:4: joints[0].type: found nothing. Allowed: revolute, continuous, prismatic, fixed"),
         (
             "{type: fixed, convention: craig}",
-            "4:29: joints[0].convention: found 'craig'. Allowed: standard, modified, hayati",
+            "4:29: joints[0].convention: found 'craig', which is called 'modified' here. "
+            "Allowed: standard, modified, hayati",
         ),
         ("{type: fixed, name: 2nd}", f"4:23: joints[0].name: {NAME}; found '2nd'"),
         ("{type: fixed, name: a b}", f"4:23: joints[0].name: {NAME}; found 'a b'"),
@@ -97,8 +98,8 @@ def test_a_file_that_holds_no_mapping_is_told_what_belongs_there(text: str, foun
         ("{type: revolute, flip: 'yes'}", "4:26: joints[0].flip: expected true or false, found 'yes'"),
         ("{type: revolute, flip: 1}", "4:26: joints[0].flip: expected true or false, found 1"),
         (
-            "{type: revolute, limits: [1, 2]}",
-            "4:28: joints[0].limits: expected a mapping with the keys position, velocity, effort, found a list",
+            "{type: revolute, limits: 2}",
+            "4:28: joints[0].limits: expected a mapping with the keys position, velocity, effort, found 2",
         ),
         (
             "{type: revolute, limits: }",

@@ -30,7 +30,7 @@ from dh2sim.formats.table.printout import find_configurations, find_poses, find_
 from dh2sim.formats.table.rows import Body, ResolvedUnits, is_hayati, read_body, to_row
 from dh2sim.messages import shown
 from dh2sim.robot.expressions import FUNCTIONS, ExpressionError, evaluate
-from dh2sim.robot.schema import name_problem
+from dh2sim.robot.fields import name_problem
 from dh2sim.robot.spec import AngleUnit, BaseSpec, Convention, JointType, LengthUnit, Pose, RobotSpec, Row, Units
 from dh2sim.robot.yaml_tree import Report, decode
 

@@ -15,7 +15,7 @@ from dh2sim.formats.table.notation import plain
 from dh2sim.formats.table.units import ANGLES, LENGTHS, Kind, Number, to_si
 from dh2sim.messages import shown
 from dh2sim.robot.checks import default_name
-from dh2sim.robot.schema import is_reserved, name_problem
+from dh2sim.robot.fields import is_reserved, name_problem
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Convention, JointType, Limits, Row
 
 _KINDS: Final = {

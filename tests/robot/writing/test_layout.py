@@ -26,7 +26,7 @@ from dh2sim.robot.spec import (
 )
 from dh2sim.robot.write import robot_file_text
 from dh2sim.typing import read_only
-from tests.robot.files import FULL, complaints, robot
+from tests.robot.files import FULL, robot
 
 
 def test_a_robot_file_in_its_own_units_keeps_its_numbers() -> None:
@@ -202,12 +202,3 @@ def test_actuators_that_differ_are_written_with_their_joints() -> None:
         "  - {type: revolute, a: 0, alpha: 0, d: 0, theta: 0}\n"
         "  - {type: revolute, a: 0, alpha: 0, d: 0, theta: 0, actuator: {type: velocity, kv: 0.5}}\n"
     )
-
-
-def test_what_a_robot_file_does_not_allow_is_written_for_the_reader_to_complain_of() -> None:
-    spec = _spec(_row(beta=0.5), _row(2, actuator=ActuatorSpec(type=ActuatorType.MOTOR, kp=3.0)))
-    text = robot_file_text(spec, angle=AngleUnit.RAD)
-    assert ", beta: 0.5, " in text
-    assert complaints(text)[1:] == [
-        "r.yaml:6:83: joints[1].actuator.kp: an actuator of type 'motor' takes no kp; kp is for position"
-    ]

@@ -1,0 +1,562 @@
+"""Kinds of fields in a robot: what a value means, its unit and what is allowed.
+
+A field of a spec is annotated with its kind, such as ``Annotated[float, Number("Rotor inertia …", least=0)]``.
+Everything else follows from it: the check of robot files and of robots made in code, the conversion to SI units,
+the JSON Schema (``schema``) and the text of a robot file (``write``).
+
+Checks work on plain values (text, numbers, booleans, None, lists, mappings), which ``plain`` makes of specs and the
+reader of files makes of YAML.
+"""
+
+import dataclasses
+import functools
+import math
+import numbers
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum, StrEnum
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Final, Protocol, TypeAlias
+
+import numpy as np
+
+from dh2sim.messages import Loc, closest, did_you_mean, listed, shown
+from dh2sim.robot.expressions import NumberError, is_name, parameter_name_problem, to_number
+from dh2sim.typing import read_only
+
+Tree: TypeAlias = dict[str, Any]
+"""Checked values by key, in the units that they were given in; WRONG where a value is wrong."""
+
+WRONG: Final = object()
+"""Stands for a value that a problem was reported of."""
+NAME_PATTERN: Final = "^[A-Za-z][A-Za-z0-9_-]*$"
+LONGEST_NAME: Final = 100
+_RESERVED: Final = re.compile(r"base_link-base|flange-tool0|base_link-dh_0|link_[0-9]+-(flange|dh_[0-9]+)")
+MESH_SUFFIXES: Final = (".stl", ".obj", ".ply", ".glb")
+_TRIANGLE_TOLERANCE: Final = 1e-9
+"""By which two principal moments may fall short of the third, relative to it."""
+
+
+class Dimension(Enum):
+    """What a number measures, where robot files have a choice of units."""
+
+    ANGLE = "angle"
+    LENGTH = "length"
+    COORDINATE = "coordinate"
+    """Of the joint: an angle or a length."""
+
+
+class UnitsLike(Protocol):
+    """Units that values are given in."""
+
+    def to_si(self, value: float, dimension: Dimension | None, *, turns: bool) -> float:
+        """Return a value in SI units; ``turns`` says whether a joint coordinate is an angle."""
+
+
+class Report(Protocol):
+    """Takes the problems that checks find."""
+
+    def __call__(self, loc: Loc, message: str, *, at_key: bool = False, path: Loc | None = None) -> None:
+        """Report a problem of the value at a place, or of its key; ``path`` is what the message calls the place."""
+
+    def line(self, *locs: Loc) -> str:
+        """Return `` on line 4`` for the first of these places that a file has, or the empty string."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scope:
+    """What checks need to know besides the value."""
+
+    report: Report
+    parameters: Mapping[str, float] | None
+    """Of the expressions in a file; NaN for a parameter that is wrong. None for robots made in code."""
+    directory: Path | None
+    """Where relative paths start; None where meshes are not allowed."""
+
+    @property
+    def in_file(self) -> bool:
+        """Whether the values come from a file."""
+        return self.parameters is not None
+
+    def wrong(self, loc: Loc, message: str) -> Any:
+        """Report a problem and return WRONG."""
+        self.report(loc, message)
+        return WRONG
+
+
+def name_problem(value: object, what: str = "a name") -> str | None:
+    """Return what is wrong with the name of a robot, a joint or a configuration, or None."""
+    if isinstance(value, str) and len(value) > LONGEST_NAME:
+        return f"{what} has at most {LONGEST_NAME} characters, found {len(value)}"
+    if isinstance(value, str) and re.fullmatch(NAME_PATTERN[1:-1], value):
+        return None
+    allowed = "letters, digits, '_' and '-', starting with a letter"
+    return f"{what} is made of {allowed}; found {shown(value)}"
+
+
+def is_reserved(name: str) -> bool:
+    """Whether a joint cannot have this name, which a fixed joint of the exports has."""
+    return _RESERVED.fullmatch(name) is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of field."""
+
+    description: str = ""
+    """For the JSON Schema and the reference of robot files."""
+    required: bool = field(default=False, kw_only=True)
+    """Whether a file must have it."""
+    key: str = field(default="", kw_only=True)
+    """Its key in files, where that is not the field's name."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return a plain value as the spec holds it, in the units given; WRONG with the problem reported."""
+        raise NotImplementedError
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:  # noqa: ARG002
+        """Return a checked value in SI units; ``turns`` says whether the joint coordinate is an angle."""
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class Name(Kind):
+    """A name that every format can hold."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return the name."""
+        problem = name_problem(value)
+        return value if problem is None else scope.wrong(loc, problem)
+
+
+@dataclass(frozen=True, slots=True)
+class Text(Kind):
+    """Any text."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return the text."""
+        if isinstance(value, str):
+            return value
+        hint = "; put it in quotes" if scope.in_file and isinstance(value, bool | int | float) else ""
+        return scope.wrong(loc, f"expected text, found {shown(value)}{hint}")
+
+
+@dataclass(frozen=True, slots=True)
+class Flag(Kind):
+    """True or false."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return the boolean."""
+        return value if isinstance(value, bool) else scope.wrong(loc, f"expected true or false, found {shown(value)}")
+
+
+@dataclass(frozen=True, slots=True)
+class Choice(Kind):
+    """A member of an enumeration."""
+
+    of: type[StrEnum] = StrEnum
+    without: tuple[str, ...] = ()
+    """Members that are not allowed here."""
+    short: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """Other spellings that are taken; lower case."""
+    inherited: bool = False
+    """Whether a file that leaves it out has not the field's default but that of the whole."""
+    other_names: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """Other names of members, lower case, that messages explain but that are not taken."""
+
+    @property
+    def allowed(self) -> list[str]:
+        """The values allowed."""
+        return [choice.value for choice in self.of if choice.value not in self.without]
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return the member."""
+        word = self.short.get(value.casefold(), value) if isinstance(value, str) else value
+        if word in self.allowed:
+            return self.of(word)
+        meant = self.other_names.get(value.casefold()) if isinstance(value, str) else None
+        called = f", which is called '{meant}' here" if meant else ""
+        guess = did_you_mean(value, self.allowed) if isinstance(value, str) and not meant else ""
+        return scope.wrong(loc, f"found {shown(value)}{called}.{guess} Allowed: {listed(self.allowed)}")
+
+
+@dataclass(frozen=True, slots=True)
+class Number(Kind):
+    """A finite number; in files also an expression."""
+
+    dimension: Dimension | None = None
+    """None for a number that is in SI units everywhere."""
+    above: float | None = field(default=None, kw_only=True)
+    """It must be greater than this."""
+    least: float | None = field(default=None, kw_only=True)
+    most: float | None = field(default=None, kw_only=True)
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return the number; NaN where it uses a parameter that is wrong itself."""
+        try:
+            number = to_number(value, scope.parameters)
+        except NumberError as error:
+            return scope.wrong(loc, str(error))
+        if problem := self._problem(number):
+            result = f" = {number!r}" if isinstance(value, str) else ""
+            return scope.wrong(loc, f"{problem}, found {shown(value)}{result}")
+        return number
+
+    def _problem(self, number: float) -> str | None:
+        if self.above is not None and number <= self.above:
+            return f"must be greater than {self.above:g}"
+        if self.most is not None and self.least is not None and (number < self.least or number > self.most):
+            return f"must be from {self.least:g} to {self.most:g}"
+        if self.least is not None and number < self.least:
+            return "must not be negative" if self.least == 0 else f"must be at least {self.least:g}"
+        return None
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
+        """Return the number in SI units."""
+        return units.to_si(value, self.dimension, turns=turns)
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers(Kind):
+    """A list of numbers."""
+
+    item: Number = Number()
+    of: str = field(default="x, y, z", kw_only=True)
+    """What the numbers are, as messages name them."""
+    counts: tuple[int, ...] = field(default=(3,), kw_only=True)
+    """The lengths allowed."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return a list of numbers."""
+        expected = f"expected a list of {' or '.join(map(str, self.counts))} numbers ({self.of})"
+        if not isinstance(value, list):
+            return scope.wrong(loc, f"{expected}, found {shown(value)}")
+        if len(value) not in self.counts:
+            return scope.wrong(loc, f"{expected}, found a list of {len(value)}")
+        checked = [self.item.check(number, (*loc, index), scope) for index, number in enumerate(value)]
+        return WRONG if WRONG in checked else checked
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
+        """Return a read-only array in SI units."""
+        return read_only([self.item.to_si(number, units, turns=turns) for number in value])
+
+
+@dataclass(frozen=True, slots=True)
+class Range(Numbers):
+    """A lower and an upper number."""
+
+    of: str = field(default="lower, upper", kw_only=True)
+    counts: tuple[int, ...] = field(default=(2,), kw_only=True)
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return both; the lower one is less than the upper one."""
+        checked = Numbers.check(self, value, loc, scope)
+        if checked is WRONG or not checked[0] >= checked[1]:
+            return checked
+        lower, upper = checked
+        return scope.wrong(loc, f"the lower limit {lower!r} is not below the upper limit {upper!r}")
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
+        """Return a tuple in SI units."""
+        return tuple(self.item.to_si(number, units, turns=turns) for number in value)
+
+
+@dataclass(frozen=True, slots=True)
+class Color(Numbers):
+    """Red, green, blue and optionally alpha."""
+
+    item: Number = Number(least=0, most=1)
+    of: str = field(default="red, green, blue, alpha", kw_only=True)
+    counts: tuple[int, ...] = field(default=(3, 4), kw_only=True)
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:  # noqa: ARG002
+        """Return a tuple of four; opaque where alpha is left out."""
+        return (*value, 1.0)[:4]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InertiaNumbers:
+    """Inertia about the centre of mass along DH frame i's axes, kg·m²."""
+
+    ixx: Annotated[float, Number("kg·m²", required=True)]
+    iyy: Annotated[float, Number("kg·m²", required=True)]
+    izz: Annotated[float, Number("kg·m²", required=True)]
+    ixy: Annotated[float, Number("kg·m²; the matrix entry, as in URDF.")] = 0.0
+    ixz: Annotated[float, Number("kg·m²; the matrix entry, as in URDF.")] = 0.0
+    iyz: Annotated[float, Number("kg·m²; the matrix entry, as in URDF.")] = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Inertia(Kind):
+    """An inertia that a body can have: in files six numbers by name, in specs a matrix of shape (3, 3)."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return the matrix as a list of rows."""
+        matrix = self._named(value, loc, scope) if scope.in_file else self._matrix(value, loc, scope)
+        if matrix is WRONG:
+            return WRONG
+        problem = _inertia_problem(np.array(matrix))
+        return matrix if problem is None else scope.wrong(loc, problem)
+
+    def _named(self, value: object, loc: Loc, scope: Scope) -> Any:
+        given = Part("", InertiaNumbers).check(value, loc, scope)
+        if given is WRONG or WRONG in given.values() or any(key not in given for key in ("ixx", "iyy", "izz")):
+            return WRONG
+        entries = InertiaNumbers(**given)
+        return [
+            [entries.ixx, entries.ixy, entries.ixz],
+            [entries.ixy, entries.iyy, entries.iyz],
+            [entries.ixz, entries.iyz, entries.izz],
+        ]
+
+    def _matrix(self, value: object, loc: Loc, scope: Scope) -> Any:
+        if not isinstance(value, list) or [len(row) for row in value if isinstance(row, list)] != [3, 3, 3]:
+            return scope.wrong(loc, f"expected a 3 × 3 matrix, found {shown(value)}")
+        number = Number()
+        matrix = [
+            [number.check(x, (*loc, i, j), scope) for j, x in enumerate(row)]  # a place in the matrix
+            for i, row in enumerate(value)
+        ]
+        if any(WRONG in row for row in matrix):
+            return WRONG
+        if any(matrix[i][j] != matrix[j][i] for i, j in ((0, 1), (0, 2), (1, 2))):
+            return scope.wrong(loc, "the matrix is not symmetric")
+        return matrix
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:  # noqa: ARG002
+        """Return the matrix, read-only."""
+        return read_only(value)
+
+
+def _inertia_problem(matrix: np.ndarray) -> str | None:
+    scale = float(np.abs(matrix).max())
+    if math.isnan(scale):
+        return None
+    a, b, c = np.linalg.eigvalsh(matrix / scale).tolist() if scale > 0 else (0.0, 0.0, 0.0)
+    moments = ", ".join(f"{moment * scale:.6g}" for moment in (a, b, c))
+    if a <= 0:
+        return f"not positive definite: the principal moments are {moments}"
+    if a + b < c * (1 - _TRIANGLE_TOLERANCE):
+        return f"no body has the principal moments {moments}: two make less than the third"
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class MeshFile(Kind):
+    """A mesh file that exists."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return its absolute path."""
+        text = Text().check(value, loc, scope)
+        if text is WRONG:
+            return WRONG
+        if scope.directory is None:  # nothing is looked for: an answer would tell what there is on this machine
+            return scope.wrong(loc, f"found {shown(text)}; a robot file that was uploaded cannot name mesh files")
+        path = scope.directory / text
+        if path.suffix.lower() not in MESH_SUFFIXES:
+            return scope.wrong(
+                loc, f"{shown(text)} is no mesh file that can be read; allowed: {listed(MESH_SUFFIXES)}"
+            )
+        try:
+            exists = path.is_file()
+        except (OSError, ValueError):
+            exists = False
+        if not exists:
+            where = "" if Path(text).is_absolute() else f" in {scope.directory.absolute()}"
+            return scope.wrong(loc, f"there is no file {shown(text)}{where}")
+        return path.absolute()
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters(Kind):
+    """Named constants; those of a file have been evaluated before."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return a mapping of names to numbers."""
+        if scope.parameters is not None:
+            return scope.parameters
+        if not isinstance(value, dict):
+            return scope.wrong(loc, f"expected a mapping of names to numbers, found {shown(value)}")
+        for name in value:
+            if not isinstance(name, str) or not is_name(name):
+                scope.report(loc, parameter_name_problem(name))
+        return {name: Number().check(number, (*loc, str(name)), scope) for name, number in value.items()}
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:  # noqa: ARG002
+        """Return them as they are: what they measure is not known."""
+        return MappingProxyType(dict(value))
+
+
+@dataclass(frozen=True, slots=True)
+class Configurations(Kind):
+    """Named joint vectors; names and lengths are checked with the table."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return a mapping of names to lists of numbers, some of which may be WRONG."""
+        if not isinstance(value, dict):
+            return scope.wrong(loc, f"expected a mapping, found {shown(value)}")
+        return {name: self._vector(vector, (*loc, str(name)), scope) for name, vector in value.items()}
+
+    def _vector(self, value: object, loc: Loc, scope: Scope) -> Any:
+        if not isinstance(value, list):
+            return scope.wrong(loc, f"expected a list, found {shown(value)}")
+        return [Number().check(number, (*loc, index), scope) for index, number in enumerate(value)]
+
+
+@dataclass(frozen=True, slots=True)
+class Internal(Kind):
+    """What a spec knows and no file says."""
+
+    of: type = object
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return the value."""
+        if isinstance(value, self.of):
+            return value
+        return scope.wrong(loc, f"expected a {self.of.__name__}, found {shown(value)}")
+
+
+@dataclass(frozen=True, slots=True)
+class Part(Kind):
+    """A part of a robot that has fields of its own: a mapping in files."""
+
+    of: type = object
+    inline: bool = field(default=False, kw_only=True)
+    """Whether its keys are among those of the whole."""
+    more: Mapping[str, Kind] = field(default_factory=dict, kw_only=True, hash=False)
+    """Keys of files that are no fields."""
+    list_is: str | None = field(default=None, kw_only=True)
+    """The key that a list in place of the mapping is the value of."""
+
+    @property
+    def keys(self) -> Mapping[str, Kind]:
+        """The keys in a file, those of inline parts too."""
+        keys = {k: kind for k, kind in _keys(self.of).items() if not isinstance(kind, Internal)}
+        return {**keys, **self.more} if self.more else keys
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return a tree of the keys that are given."""
+        keys = self.keys if scope.in_file else _keys(self.of)
+        if self.list_is and isinstance(value, list):
+            value = {self.list_is: value}
+        if not isinstance(value, dict):
+            expected = f"a mapping with the keys {listed(keys)}" if scope.in_file else f"a {self.of.__name__}"
+            return scope.wrong(loc, f"expected {expected}, found {shown(value)}")
+        unknown = [key for key in value if key not in keys]
+        for key in unknown:
+            if not scope.in_file and key in fields_of(self.of):  # an inline part that is none
+                fields_of(self.of)[key].check(value[key], (*loc, key), scope)
+                continue
+            message = f"unknown key {shown(key)}.{did_you_mean(str(key), keys)} Allowed keys: {listed(keys)}"
+            scope.report((*loc, str(key)), message, at_key=True, path=loc)
+        guessed = {closest(str(key), keys) for key in unknown}
+        for key, kind in keys.items():
+            if kind.required and key not in value and key not in guessed:
+                scope.report(loc, f"missing key '{key}'")
+        return {key: kind.check(value[key], (*loc, key), scope) for key, kind in keys.items() if key in value}
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
+        """Return the part in SI units."""
+        return self.of(**self.fields(value, units, turns=turns))
+
+    def fields(self, tree: Tree, units: UnitsLike, *, turns: bool = False) -> dict[str, Any]:
+        """Return what the part is made from: the fields that a checked tree has, in SI units."""
+        turns = getattr(tree.get("type"), "turns", turns)
+        fields: dict[str, Any] = {}
+        for name, kind in fields_of(self.of).items():
+            key = kind.key or name
+            if isinstance(kind, Part) and kind.inline:
+                fields[name] = kind.to_si(tree, units, turns=turns)
+            elif key in tree:
+                fields[name] = kind.to_si(tree[key], units, turns=turns)
+        return fields
+
+
+@dataclass(frozen=True, slots=True)
+class Parts(Kind):
+    """A list of parts, at least one."""
+
+    item: Part = Part()
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return a list of trees, some of which may be WRONG."""
+        if not isinstance(value, list):
+            return scope.wrong(loc, f"expected a list, found {shown(value)}")
+        if not value:
+            return scope.wrong(loc, "the list is empty; at least one entry is needed")
+        return [self.item.check(item, (*loc, index), scope) for index, item in enumerate(value)]
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
+        """Return a tuple of parts in SI units."""
+        return tuple(self.item.to_si(tree, units, turns=turns) for tree in value)
+
+
+def fields_of(part: type) -> Mapping[str, Kind]:
+    """Return the kinds of a dataclass's fields, by name."""
+    return _fields_of(part)
+
+
+@functools.cache
+def _fields_of(part: type) -> Mapping[str, Kind]:
+    return {
+        field.name: kind
+        for field in dataclasses.fields(part)
+        for kind in getattr(field.type, "__metadata__", ())
+        if isinstance(kind, Kind)
+    }
+
+
+@functools.cache
+def _keys(part: type) -> Mapping[str, Kind]:
+    """Return the kinds of a part by key, with those of inline parts in their places."""
+    keys: dict[str, Kind] = {}
+    for name, kind in fields_of(part).items():
+        keys |= _keys(kind.of) if isinstance(kind, Part) and kind.inline else {kind.key or name: kind}
+    return keys
+
+
+def plain(value: object) -> object:
+    """Return a value of a spec as checks take it."""
+    match value:
+        case Enum():
+            return value.value
+        case None | bool() | str() | int():
+            return value
+        case np.ndarray():
+            return plain(value.tolist())
+        case np.generic():
+            return plain(value.item())
+        case numbers.Real():
+            return float(value)
+        case os.PathLike():
+            return os.fspath(value)
+        case Mapping():
+            return {key: plain(inner) for key, inner in value.items()}
+        case str() | bytes():
+            return value
+        case Sequence():
+            return [plain(inner) for inner in value]
+        case _ if dataclasses.is_dataclass(type(value)) and fields_of(type(value)):
+            return plain_part(value)
+        case _:
+            return value
+
+
+def plain_part(part: Any) -> dict[str, object]:
+    """Return the fields of a part of a spec as a file would hold them; those that are as by default are left out."""
+    tree: dict[str, object] = {}
+    defaults = {field.name: field.default for field in dataclasses.fields(part)}
+    for name, kind in fields_of(type(part)).items():
+        value = getattr(part, name)
+        default = defaults[name]
+        if value is default or (type(value) is type(default) and value == default):
+            continue
+        inner = plain(value)
+        if isinstance(kind, Part) and isinstance(inner, dict):
+            tree |= inner if kind.inline else {kind.key or name: inner} if inner else {}
+        else:
+            tree[kind.key or name] = inner
+    return tree
