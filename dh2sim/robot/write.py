@@ -1,17 +1,14 @@
-"""RobotSpecs to robot files: the text that reads back as the same robot.
+"""RobotSpecs to robot files: texts that read back as the same robot.
 
-Numbers as a robot file writes them: the shortest text that reads back as the same double.
-
-Texts as a robot file writes them: plain where YAML allows it, and always such that they read back the same.
-
-Mappings and lists as lines of YAML: in braces where they fit on a line, a table's numbers below each other.
-
-The parts of a robot file, from what a RobotSpec holds; what is left out is what a reader fills in.
+Numbers are the shortest that read back as the same double; texts are plain where YAML allows it. Mappings and lists
+are in braces where they fit on a line, and a table's numbers are below each other. What a reader fills in is left
+out.
 """
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import itertools
 import math
 import os
@@ -20,22 +17,34 @@ import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
+
+import numpy as np
 
 from dh2sim.errors import ModelError
 from dh2sim.robot.checks import default_name
+from dh2sim.robot.fields import (
+    Choice,
+    Color,
+    Dimension,
+    Flag,
+    Inertia,
+    Internal,
+    Kind,
+    MeshFile,
+    Number,
+    Numbers,
+    Part,
+    fields_of,
+)
 from dh2sim.robot.spec import (
     ActuatorSpec,
     AngleUnit,
-    BaseSpec,
     Convention,
     Dynamics,
     JointType,
     LengthUnit,
     Limits,
-    LinkSpec,
-    MeshSpec,
-    Pose,
     RobotSpec,
     Row,
     Units,
@@ -90,21 +99,21 @@ class UnitWriter:
             return number(value)
         return _shortest(value, self.units.metres, self._from_metres, "m", self.units.length)
 
-    def coordinate(self, value: float, *, turns: bool) -> str:
-        """Return the text of a joint coordinate, or of its rate, in rad or m.
+    def text(self, value: float, dimension: Dimension | None, *, turns: bool) -> str:
+        """Return the text of a number in SI units; ``turns`` says whether a joint coordinate is an angle.
 
         Raises:
             ModelError: Too large for the file's unit.
         """
-        return self.angle(value) if turns else self.length(value)
-
-    def angles(self, values: Iterable[float]) -> list[str]:
-        """Return the texts of several angles in rad."""
-        return [self.angle(value) for value in values]
-
-    def lengths(self, values: Iterable[float]) -> list[str]:
-        """Return the texts of several lengths in m."""
-        return [self.length(value) for value in values]
+        match dimension:
+            case None:
+                return number(value)
+            case Dimension.COORDINATE:
+                return self.angle(value) if turns else self.length(value)
+            case Dimension.ANGLE:
+                return self.angle(value)
+            case Dimension.LENGTH:
+                return self.length(value)
 
     def _from_metres(self, value: float) -> float:
         """Return a length in the file's unit, an ulp off at most."""
@@ -310,106 +319,74 @@ def _cell(key: str, text: str, width: int) -> str:
     return f"{key}: {text}, ".ljust(width + len(": , "))
 
 
+_ONE_LINE: Final = (Limits, Dynamics)
+"""Mappings that are easier to read on one line, however long."""
+
+
 class PartWriter:
-    """Knows the units of one file, and its folder."""
+    """Writes the parts of a robot, each field as its kind says."""
 
     def __init__(self, units: UnitWriter, folder: Path | None) -> None:
         """``folder`` is where paths in the file start; without it they are absolute."""
         self._units = units
         self._folder = folder
 
-    def pose(self, pose: Pose) -> dict[str, Tree]:
-        """Return a pose; empty for the identity."""
+    def part(self, part: Any, *, turns: bool = False) -> dict[str, Tree]:
+        """Return the fields that are not as by default; ``turns`` says whether a joint coordinate is an angle."""
         tree: dict[str, Tree] = {}
-        if pose.xyz.any():
-            tree["xyz"] = self._units.lengths(pose.xyz.tolist())
-        if pose.rpy.any():
-            tree["rpy"] = self._units.angles(pose.rpy.tolist())
-        return tree
+        kinds = fields_of(type(part))
+        for each in dataclasses.fields(part):
+            value, kind = getattr(part, each.name), kinds[each.name]
+            if isinstance(kind, Part) and kind.inline:
+                tree |= self.part(value, turns=turns)
+            elif not isinstance(kind, Internal) and value is not None and not _is_default(value, each, kind):
+                tree[each.name] = self._value(kind, value, turns=turns)
+        return {key: value for key, value in tree.items() if value}
 
-    def base(self, base: BaseSpec) -> dict[str, Tree]:
-        """Return what is known of the base link."""
-        return {**self.pose(base.pose), **self._look(base.color, base.mesh)}
+    def _value(self, kind: Kind, value: Any, *, turns: bool) -> Tree:
+        match kind:
+            case Part():
+                tree = self.part(value, turns=turns)
+                return inline(tree) if tree and kind.of in _ONE_LINE else tree
+            case Number():
+                return self._units.text(value, kind.dimension, turns=turns)
+            case Color():
+                return numbers(value[:3] if value[3] == 1 else value)
+            case Numbers():
+                return [self._units.text(each, kind.item.dimension, turns=turns) for each in value]
+            case Inertia():
+                return _inertia(value)
+            case MeshFile():
+                return word(self._path(value))
+            case Flag():
+                return "true" if value else "false"
+            case _:
+                return word(str(value))
 
-    def rows(self, spec: RobotSpec, shared: ActuatorSpec) -> list[dict[str, Tree]]:
-        """Return the table; names are left out where all are the default ones."""
-        named = any(row.name != default_name(index) for index, row in enumerate(spec.rows))
-        return [self._row(row, spec.convention, shared, named=named) for row in spec.rows]
-
-    def configurations(self, configurations: Mapping[str, Array], moving: Sequence[Row]) -> dict[str, Tree]:
-        """Return the named joint vectors."""
-        return {
-            word(name): [
-                self._units.coordinate(value, turns=row.type.turns)
-                for value, row in zip(vector.tolist(), moving, strict=True)
-            ]
-            for name, vector in configurations.items()
-        }
-
-    def _row(self, row: Row, convention: Convention, shared: ActuatorSpec, *, named: bool) -> dict[str, Tree]:
-        tree: dict[str, Tree] = {"name": word(row.name)} if named else {}
-        tree |= {"type": row.type.value, **self._numbers(row)}
-        if row.convention is not convention:
-            tree["convention"] = row.convention.value
-        if row.flip:
-            tree["flip"] = "true"
-        own = row.type.moves and actuator(row.actuator) != actuator(shared)
-        parts: dict[str, Tree] = {
-            "limits": self._limits(row.limits, turns=row.type.turns),
-            "dynamics": _dynamics(row.dynamics),
-            "link": self._link(row.link),
-            "actuator": actuator(row.actuator) if own else {},
-        }
-        return tree | {key: part for key, part in parts.items() if part}
-
-    def _numbers(self, row: Row) -> dict[str, Tree]:
-        """Return the numbers of the table, zeros too, so that it can be read as one."""
-        tree: dict[str, Tree] = {"a": self._units.length(row.a), "alpha": self._units.angle(row.alpha)}
+    def row(self, row: Row, convention: Convention, shared: Tree, *, named: bool) -> dict[str, Tree]:
+        """Return a row of the table, with its zeros, so that it can be read as one."""
+        tree = self.part(row, turns=row.type.turns)
+        if not named:
+            del tree["name"]
+        if row.convention is convention:
+            del tree["convention"]
+        if not row.type.moves or self.part(row.actuator) == shared:
+            tree.pop("actuator", None)
         hayati = row.convention is Convention.HAYATI
-        if row.beta or hayati:
-            tree["beta"] = self._units.angle(row.beta)
-        if row.d or not hayati or row.type is JointType.PRISMATIC:  # other Hayati rows have none
-            tree["d"] = self._units.length(row.d)
-        return {**tree, "theta": self._units.angle(row.theta)}
+        left_out = {"d"} if hayati and row.type is not JointType.PRISMATIC else set() if hayati else {"beta"}
+        words: dict[str, Tree] = {key: tree.pop(key) for key in _WORDS if key in tree}
+        return {**words, **{key: tree.pop(key, "0") for key in _NUMBERS if key not in left_out}, **tree}
 
-    def _limits(self, limits: Limits, *, turns: bool) -> str:
-        tree: dict[str, Tree] = {}
-        if limits.position is not None:
-            tree["position"] = [self._units.coordinate(value, turns=turns) for value in limits.position]
-        if limits.velocity is not None:
-            tree["velocity"] = self._units.coordinate(limits.velocity, turns=turns)
-        if limits.effort is not None:
-            tree["effort"] = number(limits.effort)
-        return _given_line(tree)
-
-    def _link(self, link: LinkSpec) -> dict[str, Tree]:
-        tree: dict[str, Tree] = {}
-        if link.mass is not None:
-            tree["mass"] = number(link.mass)
-        if link.com is not None:
-            tree["com"] = self._units.lengths(link.com.tolist())
-        if link.inertia is not None:
-            tree["inertia"] = _inertia(link.inertia)
-        if link.density is not None:
-            tree["density"] = number(link.density)
-        if link.radius is not None:
-            tree["radius"] = self._units.length(link.radius)
-        return {**tree, **self._look(link.color, link.mesh)}
-
-    def _look(self, color: Sequence[float] | None, mesh: MeshSpec | None) -> dict[str, Tree]:
-        tree: dict[str, Tree] = {}
-        if color is not None:
-            tree["color"] = numbers(color[:3] if color[3] == 1 else color)
-        if mesh is not None:
-            scale: dict[str, Tree] = {} if mesh.scale == 1 else {"scale": number(mesh.scale)}
-            tree["mesh"] = {"file": word(self._path(mesh.file)), **scale, **self.pose(mesh.pose)}
-        return tree
+    def configuration(self, vector: Array, moving: Sequence[Row]) -> Tree:
+        """Return a joint vector."""
+        pairs = zip(vector.tolist(), moving, strict=True)
+        return [self._units.text(value, Dimension.COORDINATE, turns=row.type.turns) for value, row in pairs]
 
     def _path(self, file: Path) -> str:
         """Return a path as the file names it; relative to its folder, where they are on one drive."""
         path = Path(os.path.abspath(file))
         if self._folder is not None:
-            # links resolved on both sides: the system goes up from where a link leads, not from where it stands
+            # links resolved on both sides: the system goes up from where a link leads, not from where it is
             path = path.parent.resolve() / path.name
             with contextlib.suppress(ValueError):
                 path = Path(os.path.relpath(path, self._folder.resolve()))
@@ -418,36 +395,23 @@ class PartWriter:
         return path.as_posix()
 
 
-def actuator(actuator: ActuatorSpec) -> dict[str, Tree]:
-    """Return an actuator, with its type."""
-    tree: dict[str, Tree] = {"type": actuator.type.value}
-    if actuator.kp is not None:
-        tree["kp"] = number(actuator.kp)
-    if actuator.kv is not None:
-        tree["kv"] = number(actuator.kv)
-    return tree
+def _is_default(value: Any, of: dataclasses.Field[Any], kind: Kind) -> bool:
+    """Return whether a reader would fill in the value; never so for what may be inherited."""
+    if isinstance(value, np.ndarray):
+        factory = of.default_factory
+        return factory is not dataclasses.MISSING and np.array_equal(value, factory())
+    return bool(value == of.default) and not (isinstance(kind, Choice) and kind.inherited)
 
 
-def _dynamics(dynamics: Dynamics) -> str:
-    values = {"damping": dynamics.damping, "friction": dynamics.friction, "armature": dynamics.armature}
-    return _given_line({key: number(value) for key, value in values.items() if value})
-
-
-def _inertia(matrix: Array) -> str:
+def _inertia(matrix: Array) -> Tree:
     (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = matrix.tolist()
     products = {"ixy": ixy, "ixz": ixz, "iyz": iyz}
     moments = {"ixx": ixx, "iyy": iyy, "izz": izz}
-    return _given_line(
-        {key: number(value) for key, value in {**moments, **products}.items() if value or key in moments}
-    )
+    given = {**moments, **{key: value for key, value in products.items() if value}}
+    return inline({key: number(value) for key, value in given.items()})
 
 
-def _given_line(tree: dict[str, Tree]) -> str:
-    """Return a mapping that is easier to read on one line, however long; nothing where it is empty."""
-    return inline(tree) if tree else ""
-
-
-_GRAVITY = [0.0, 0.0, -9.81]
+_GRAVITY: Final = [0.0, 0.0, -9.81]
 
 
 def robot_file_text(
@@ -476,26 +440,27 @@ def robot_file_text(
         ModelError: A number is too large for the unit, or a mesh file has a name that YAML cannot hold.
     """
     parts = PartWriter(UnitWriter(units=Units(angle=angle, length=length)), folder)
-    shared = _shared_actuator(spec)
+    shared = parts.part(_shared_actuator(spec, parts))
     lines = [*comment_lines(header), f"name: {word(spec.name)}"]
     for key, text in {"description": spec.description, "source": spec.source}.items():
         lines += text_lines(key, text) if text else []
     lines += [f"convention: {spec.convention}", f"units: {{angle: {angle}, length: {length}}}"]
-    before: dict[str, Tree] = {"base": parts.base(spec.base), "tool": parts.pose(spec.tool)}
+    before: dict[str, Tree] = {"base": parts.part(spec.base), "tool": parts.part(spec.tool)}
     if spec.gravity.tolist() != _GRAVITY:
         before["gravity"] = numbers(spec.gravity.tolist())
     lines += [line for key, tree in before.items() if tree for line in entry_lines(key, tree)]
-    lines += ["joints:", *table_lines(parts.rows(spec, shared))]
-    configurations = parts.configurations(spec.configurations, spec.moving_rows)
-    if configurations:
+    named = any(row.name != default_name(index) for index, row in enumerate(spec.rows))
+    lines += ["joints:", *table_lines([parts.row(row, spec.convention, shared, named=named) for row in spec.rows])]
+    if spec.configurations:
         lines.append("configurations:")
-        lines += [line for name, vector in configurations.items() for line in entry_lines(name, vector, 2)]
-    if actuator(shared) != actuator(ActuatorSpec()):
-        lines += entry_lines("actuators", actuator(shared))
+    for name, vector in spec.configurations.items():
+        lines += entry_lines(word(name), parts.configuration(vector, spec.moving_rows), 2)
+    if shared != parts.part(ActuatorSpec()):
+        lines += entry_lines("actuators", shared)
     return "\n".join([*lines, ""])
 
 
-def _shared_actuator(spec: RobotSpec) -> ActuatorSpec:
+def _shared_actuator(spec: RobotSpec, parts: PartWriter) -> ActuatorSpec:
     """Return the actuator of all moving rows where it is one and the same, else the default."""
     first, *others = [row.actuator for row in spec.moving_rows] or [ActuatorSpec()]
-    return first if all(actuator(other) == actuator(first) for other in others) else ActuatorSpec()
+    return first if all(parts.part(other) == parts.part(first) for other in others) else ActuatorSpec()

@@ -8,14 +8,11 @@ refuse.
 from __future__ import annotations
 
 import codecs
+import functools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple, NoReturn, TypeAlias
-
-from ruamel.yaml import YAML, events
-from ruamel.yaml.error import MarkedYAMLError, StringMark
-from ruamel.yaml.events import Event, NodeEvent, ScalarEvent
+from typing import Any, Final, NamedTuple, NoReturn, TypeAlias
 
 from dh2sim.errors import Problem, RobotFileError
 from dh2sim.messages import Loc, path_of, shown
@@ -86,6 +83,8 @@ class Entry(NamedTuple):
     """Line of the key, from 1."""
     column: int
     """Column of the key, from 1."""
+    start: int
+    """Where the key starts in the text, in characters."""
     value: Node
 
 
@@ -94,13 +93,24 @@ Value: TypeAlias = Scalar | list["Node"] | dict[str, Entry]
 
 @dataclass(slots=True, eq=False)
 class Node:
-    """A value and where it stands, both counted from 1."""
+    """A value and its place in the text."""
 
     line: int
+    """From 1, as the column."""
     column: int
     value: Value = field(repr=False)
     wrong: bool = False
-    """Already complained of: nothing more is to be said of the value, nor of keys missing in it."""
+    """Whether a problem was reported: nothing more is to be said of the value, nor of keys missing in it."""
+    start: int = 0
+    """In characters from the start of the text, as the end."""
+    end: int = 0
+    """Of a scalar; 0 for collections."""
+    text: str = field(default="", repr=False)
+    """Of a scalar: as it is written, without quotes."""
+    flow: bool = False
+    """Whether it is a collection in brackets."""
+    anchor: bool = False
+    """Whether other parts of the text may stand for it too."""
 
     def at(self, *loc: str | int) -> Node | None:
         """Return the node at a place below this one, or None."""
@@ -169,11 +179,14 @@ def compose(text: str, report: Report, needs: str = "a robot needs at least name
     Args:
         text: The document.
         report: Where problems are noted.
-        needs: What an empty file is told that it needs.
+        needs: What an empty file is reported to need.
 
     Raises:
         RobotFileError: There is no tree, with everything noted so far.
     """
+    root = _fast(text)
+    if root is not None:
+        return root
     composer = _Composer(report)
     for event in _events(text, report):
         composer.take(event)
@@ -183,9 +196,41 @@ def compose(text: str, report: Report, needs: str = "a robot needs at least name
     return composer.root
 
 
-def _events(text: str, report: Report) -> Iterator[Event]:
+@functools.lru_cache(maxsize=2)  # an editor asks several things of one text
+def _fast(text: str) -> Node | None:
+    """Return the tree that libyaml finds; None where it is not installed, or for any problem.
+
+    It takes a twentieth of the time. Problems are reported by the other parser, whose messages and places are better,
+    and so are texts that YAML 1.1, which libyaml reads, may take differently.
+    """
+    if _OTHER_IN_YAML_1_1.search(text):
+        return None
+    try:
+        from yaml import YAMLError  # type: ignore[import-untyped]
+        from yaml.cyaml import CParser  # type: ignore[import-untyped]
+    except ImportError:
+        return None
+    report = Report("")
+    composer = _Composer(report)
+    try:
+        parser = CParser(text)
+        while (event := parser.get_event()) is not None:
+            composer.take(event)
+    except (YAMLError, RobotFileError, ValueError):
+        return None
+    return None if report.problems or composer.parsers_differ else composer.root
+
+
+_OTHER_IN_YAML_1_1: Final = re.compile(r"[\x85\u2028\u2029\ufeff]|^%|\t", re.MULTILINE)
+"""Line breaks of YAML 1.1, directives, and tabs, which parsers differ about."""
+
+
+def _events(text: str, report: Report) -> Iterator[Any]:
     """Yield ruamel's events; whatever it raises becomes a problem of the file."""
-    mark: StringMark | None = None
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError
+
+    mark: Any = None
     try:
         for event in YAML(typ="safe", pure=True).parse(text):
             mark = event.start_mark
@@ -233,66 +278,76 @@ class _Composer:
         self._anchors: dict[str, tuple[Node, int, int] | None] = {}
         """Node, size and height; None while the anchored node is still open."""
         self._total = 0
+        self.parsers_differ = False
+        """Whether there is an empty value without a key, which some mark lines further down than others."""
 
-    def take(self, event: Event) -> None:
-        """Take the next event."""
-        match event:
-            case events.DocumentStartEvent():
+    def take(self, event: Any) -> None:
+        """Take the next event, of either parser."""
+        match type(event).__name__:
+            case "DocumentStartEvent":
                 if self.root is not None:
                     self._fail(event, "a second YAML document; a robot file holds one")
                 if getattr(event, "version", None) not in (None, (1, 2)):
                     self._fail(event, "only YAML 1.2 is read")
-            case events.AliasEvent():
+            case "AliasEvent":
                 self._alias(event)
-            case events.ScalarEvent():
+            case "ScalarEvent":
                 self._attach(self._scalar(event), event.anchor, 1, 1)
-            case events.MappingStartEvent():
+            case "MappingStartEvent":
                 self._open(event, {})
-            case events.SequenceStartEvent():
+            case "SequenceStartEvent":
                 self._open(event, [])
-            case events.CollectionEndEvent():
+            case "MappingEndEvent" | "SequenceEndEvent":
                 frame = self._stack.pop()
                 self._attach(frame.node, frame.anchor, frame.size, frame.height)
 
     def _loc(self) -> Loc:
         return tuple(part for frame in self._stack for part in frame.part())
 
-    def _fail(self, event: Event, message: str) -> NoReturn:
+    def _fail(self, event: Any, message: str) -> NoReturn:
         mark = event.start_mark
         self._report.add(mark.line + 1, mark.column + 1, self._loc(), message)
         raise self._report.error()
 
-    def _count(self, event: Event, size: int, height: int) -> None:
+    def _count(self, event: Any, size: int, height: int) -> None:
         self._total += size
         if self._total > MAX_NODES:
             self._fail(event, f"more than {MAX_NODES} values (aliases counted each time)")
         if len(self._stack) + height > MAX_DEPTH:
             self._fail(event, f"nested deeper than {MAX_DEPTH} levels")
 
-    def _node(self, event: NodeEvent, value: Value) -> Node:
+    def _node(self, event: Any, value: Value) -> Node:
         self._count(event, 1, 1)
-        node = Node(event.start_mark.line + 1, event.start_mark.column + 1, value)
+        mark = event.start_mark
+        anchor = event.anchor is not None
+        node = Node(mark.line + 1, mark.column + 1, value, start=mark.index, anchor=anchor)
         tag = getattr(event, "tag", None)
         if tag is not None:
             written = shown(tag.replace("tag:yaml.org,2002:", "!!"))
             self._fail(event, f"tag {written} is not allowed; write the value alone")
         return node
 
-    def _scalar(self, event: ScalarEvent) -> Node:
-        plain = event.style is None
+    def _scalar(self, event: Any) -> Node:
+        plain = not event.style
         node = self._node(event, resolve_plain(event.value) if plain else event.value)
-        if plain and not event.value and self._stack and (key := self._stack[-1].key):
-            node.line, node.column = key[1].line, key[1].column  # ruamel's mark may be lines further down
+        node.end, node.text = event.end_mark.index, event.value
+        if plain and not event.value:
+            if self._stack and (key := self._stack[-1].key):
+                node.line, node.column, node.start, node.end = key[1].line, key[1].column, key[1].start, key[1].start
+            else:
+                self.parsers_differ = True
         if not plain and (found := NOT_PRINTABLE.search(event.value)):
             self._fail(event, f"control character U+{ord(found.group()):04X} is not allowed")
         return node
 
-    def _open(self, event: NodeEvent, value: Value) -> None:
+    def _open(self, event: Any, value: Value) -> None:
         if event.anchor:
             self._anchors[event.anchor] = None
-        self._stack.append(_Frame(self._node(event, value), event.anchor))
+        node = self._node(event, value)
+        node.flow = bool(event.flow_style)
+        self._stack.append(_Frame(node, event.anchor))
 
-    def _alias(self, event: NodeEvent) -> None:
+    def _alias(self, event: Any) -> None:
         if event.anchor not in self._anchors:
             self._fail(event, f"alias {shown(event.anchor)} has no anchor before it")
         anchored = self._anchors[event.anchor]
@@ -302,7 +357,7 @@ class _Composer:
         self._count(event, size, height)
         self._attach(node, None, size, height, event)
 
-    def _attach(self, node: Node, anchor: str | None, size: int, height: int, at: Event | None = None) -> None:
+    def _attach(self, node: Node, anchor: str | None, size: int, height: int, at: Any = None) -> None:
         if anchor:
             self._anchors[anchor] = (node, size, height)
         if not self._stack:
@@ -317,7 +372,7 @@ class _Composer:
             case dict() as entries if frame.key is not None:
                 (name, key), frame.key = frame.key, None
                 if name is not None:
-                    entries[name] = Entry(key.line, key.column, node)
+                    entries[name] = Entry(key.line, key.column, key.start, node)
             case dict() as entries:
                 if at is not None:
                     node = Node(at.start_mark.line + 1, at.start_mark.column + 1, node.value)

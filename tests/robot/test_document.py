@@ -149,11 +149,11 @@ def test_bad_keys_do_not_hide_other_mistakes() -> None:
 
 
 def test_a_file_that_is_too_large_is_refused_before_it_is_parsed() -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     assert complaints("a" * 10_000_000) == [
         f"r.yaml:1:1: the file has 10000000 bytes; at most {MAX_BYTES} are allowed"
     ]
-    assert time.perf_counter() - start < 1
+    assert time.process_time() - start < 1
 
 
 def test_a_line_that_is_too_long_is_refused() -> None:
@@ -164,11 +164,11 @@ def test_a_line_that_is_too_long_is_refused() -> None:
 
 @pytest.mark.parametrize("bracket", ["[", "{"])
 def test_deep_nesting_is_refused_at_once(bracket: str) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     (message,) = complaints(bracket * 100_000)
     assert message.startswith("r.yaml:1:33: ")
     assert message.endswith(f"nested deeper than {MAX_DEPTH} levels")
-    assert time.perf_counter() - start < 3
+    assert time.process_time() - start < 3
 
 
 def test_nesting_through_aliases_counts() -> None:
@@ -178,10 +178,10 @@ def test_nesting_through_aliases_counts() -> None:
 
 def test_a_billion_laughs_end_at_once() -> None:
     laughs = "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 20))
-    start = time.perf_counter()
+    start = time.process_time()
     (message,) = complaints("a0: &a0 [lol, lol, lol, lol, lol, lol, lol, lol, lol]\n" + laughs)
     assert message.endswith(f"more than {MAX_NODES} values (aliases counted each time)")
-    assert time.perf_counter() - start < 1
+    assert time.process_time() - start < 1
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dh2sim.errors import ModelError
+from dh2sim.robot.fields import Dimension
 from dh2sim.robot.spec import AngleUnit, LengthUnit, Units
 from dh2sim.robot.write import UnitWriter, number
 from dh2sim.robot.yaml_tree import resolve_plain
@@ -131,8 +132,8 @@ def test_lengths_are_written_in_the_unit_of_the_file(unit: str, text: str) -> No
 
 def test_coordinates_have_the_unit_of_their_joint() -> None:
     writer = UnitWriter(units=Units(angle=AngleUnit.DEG, length=LengthUnit.MM))
-    assert writer.coordinate(math.pi / 2, turns=True) == "90"
-    assert writer.coordinate(0.5, turns=False) == "500"
+    assert writer.text(math.pi / 2, Dimension.COORDINATE, turns=True) == "90"
+    assert writer.text(0.5, Dimension.COORDINATE, turns=False) == "500"
 
 
 @pytest.mark.parametrize("value", [5e-324, -5e-324, 1e-310, 2.2250738585072014e-308])
