@@ -11,7 +11,7 @@ from typing import Final, TypeAlias
 from dh2sim.kinematics.serial_chain import SerialChain
 from dh2sim.messages import Notes, listed
 from dh2sim.model.mass import MassProperties, is_possible
-from dh2sim.robot.schema import MESH_SUFFIXES
+from dh2sim.robot.fields import MESH_SUFFIXES
 from dh2sim.robot.spec import ActuatorSpec, Dynamics, Limits
 from dh2sim.typing import Array, read_only
 

@@ -242,6 +242,8 @@ def import_serial(
     """
     names, renamed = joint_names([joint.name for joint in robot.chain.joints])
     own_name = robot_name(robot.name if name is None else name)
+    joints = tuple(replace(joint, name=own) for joint, own in zip(robot.chain.joints, names, strict=True))
+    robot = replace(robot, chain=replace(robot.chain, joints=joints))
     recovery = recover_table(robot.chain, convention=convention, tolerance=tolerance, name=own_name)
     spec = assemble(robot, recovery, name=own_name, joint_names=names)
     hint = simpler_with(spec, tolerance)

@@ -9,17 +9,15 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from dh2sim.kinematics.chain import Joint
 from dh2sim.kinematics.transforms import move_point, rotate_tensor
 from dh2sim.model.shapes import Shape, ShapeKind
+from dh2sim.robot.fields import inertia_problem
 from dh2sim.robot.spec import LinkSpec
 from dh2sim.typing import Array, read_only
 
 ROUNDING = (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """Shares of its trace by which an inertia may be mended: numbers in robot files are rounded."""
-_TRIANGLE_TOLERANCE = 1e-9
 ASSUMED_DENSITY = 1000.0
 """kg/m³: a hollow arm with its motors is closer to water than to aluminium."""
 MIN_MASS = 1e-9
@@ -89,11 +87,7 @@ def is_possible(inertia: Array) -> bool:
 
     As a robot file allows it: two moments may fall short of the third by 1e-9 of it.
     """
-    scale = float(np.abs(inertia).max())
-    if scale == 0.0:
-        return False
-    a, b, c = np.linalg.eigvalsh(inertia / scale).tolist()
-    return bool(a > 0.0 and a + b >= c * (1.0 - _TRIANGLE_TOLERANCE))
+    return inertia_problem(inertia) is None
 
 
 def made_possible(inertia: Array) -> Array:

@@ -12,6 +12,7 @@ import dataclasses
 import functools
 import math
 import numbers
+import operator
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -25,7 +26,7 @@ import numpy as np
 
 from dh2sim.messages import Loc, closest, did_you_mean, listed, shown
 from dh2sim.robot.expressions import NumberError, is_name, parameter_name_problem, to_number
-from dh2sim.typing import read_only
+from dh2sim.typing import Array, read_only
 
 Tree: TypeAlias = dict[str, Any]
 """Checked values by key, in the units that they were given in; WRONG where a value is wrong."""
@@ -298,7 +299,7 @@ class Inertia(Kind):
         matrix = self._named(value, loc, scope) if scope.in_file else self._matrix(value, loc, scope)
         if matrix is WRONG:
             return WRONG
-        problem = _inertia_problem(np.array(matrix))
+        problem = inertia_problem(np.array(matrix))
         return matrix if problem is None else scope.wrong(loc, problem)
 
     def _named(self, value: object, loc: Loc, scope: Scope) -> Any:
@@ -331,7 +332,8 @@ class Inertia(Kind):
         return read_only(value)
 
 
-def _inertia_problem(matrix: np.ndarray) -> str | None:
+def inertia_problem(matrix: Array) -> str | None:
+    """Return why no body has an inertia of shape (3, 3), or None."""
     scale = float(np.abs(matrix).max())
     if math.isnan(scale):
         return None
@@ -346,10 +348,10 @@ def _inertia_problem(matrix: np.ndarray) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class MeshFile(Kind):
-    """A mesh file that exists."""
+    """A mesh file; one that a robot file names exists."""
 
     def check(self, value: object, loc: Loc, scope: Scope) -> Any:
-        """Return its absolute path."""
+        """Return its path; an absolute one for a file's."""
         text = Text().check(value, loc, scope)
         if text is WRONG:
             return WRONG
@@ -360,13 +362,14 @@ class MeshFile(Kind):
             return scope.wrong(
                 loc, f"{shown(text)} is no mesh file that can be read; allowed: {listed(MESH_SUFFIXES)}"
             )
+        if not scope.in_file:  # a robot stays one when its meshes are moved; the model complains of missing ones
+            return Path(text)
         try:
             exists = path.is_file()
         except (OSError, ValueError):
             exists = False
         if not exists:
-            where = "" if Path(text).is_absolute() else f" in {scope.directory.absolute()}"
-            return scope.wrong(loc, f"there is no file {shown(text)}{where}")
+            return scope.wrong(loc, f"there is no file {shown(text)} in {scope.directory.absolute()}")
         return path.absolute()
 
 
@@ -560,3 +563,23 @@ def plain_part(part: Any) -> dict[str, object]:
         else:
             tree[kind.key or name] = inner
     return tree
+
+
+def kept(old: Any, new: Any) -> Any:
+    """Return the new value, or the old one if that is the same, so that robots share what they have in common."""
+    if type(old) is not type(new):
+        return new
+    match new:
+        case np.ndarray():
+            same = old.dtype == new.dtype and not old.flags.writeable and np.array_equal(old, new)
+        case tuple():
+            new = tuple(map(kept, old, new)) if len(old) == len(new) else new
+            same = len(old) == len(new) and all(map(operator.is_, old, new))
+        case MappingProxyType():
+            same = list(old) == list(new) and all(kept(old[key], value) is old[key] for key, value in new.items())
+        case _ if dataclasses.is_dataclass(new):
+            pairs = [(getattr(old, each.name), getattr(new, each.name)) for each in dataclasses.fields(new)]
+            same = all(kept(before, after) is before for before, after in pairs)
+        case _:
+            same = old == new
+    return old if same else new

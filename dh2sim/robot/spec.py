@@ -36,6 +36,7 @@ from dh2sim.robot.fields import (
     Text,
     Tree,
     UnitsLike,
+    kept,
     plain_part,
 )
 from dh2sim.typing import Array, read_only
@@ -197,7 +198,7 @@ class MeshSpec:
     """A mesh file that shows a link."""
 
     file: Annotated[Path, MeshFile("STL, OBJ, PLY or GLB file; relative to the folder of this file.", required=True)]
-    """Absolute; known to exist when the robot was made."""
+    """Of a robot that was read from a file: absolute, and known to have existed then."""
     scale: Annotated[float, Number("Metres per unit of the mesh file.", above=0)] = 1.0
     pose: Annotated[Pose, Part("Pose of the mesh file's own frame in the DH frame.", Pose, inline=True)] = field(
         default_factory=Pose
@@ -369,7 +370,7 @@ class RobotSpec:
         if problems.found:
             raise RobotError(problems.found)
         for name, value in robot_fields(tree, Units()).items():
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, kept(getattr(self, name), value))
 
     @property
     def moving_rows(self) -> tuple[Row, ...]:

@@ -121,9 +121,13 @@ def test_named_configurations_are_keyframes_with_controls_that_hold_still() -> N
 
 
 def test_a_position_actuator_without_gain_is_asked_for_the_position_itself() -> None:
-    row = Row(name="only", type=REVOLUTE, convention=STANDARD, a=0.5, actuator=ActuatorSpec(kp=0.0, kv=0.0))
+    row = Row(name="only", type=REVOLUTE, convention=STANDARD, a=0.5)
     configurations = MappingProxyType({"home": read_only([0.3])})
     built = build_model(RobotSpec(name="limp", rows=(row,), configurations=configurations))
+    limp = dataclasses.replace(
+        built.joints[0], actuator=dataclasses.replace(built.joints[0].actuator, kp=0.0, kv=0.0)
+    )
+    built = dataclasses.replace(built, joints=(limp,))
     assert built.holding_controls(built.home) == [0.3]
 
 

@@ -134,12 +134,12 @@ def test_an_assumed_velocity_gain_answers_at_the_assumed_bandwidth() -> None:
     ("actuator", "gains"),
     [
         (ActuatorSpec(type=ActuatorType.POSITION, kp=100.0, kv=7.5), (100.0, 7.5)),
-        (ActuatorSpec(type=ActuatorType.POSITION, kp=0.0, kv=0.0), (0.0, 0.0)),
+        (ActuatorSpec(type=ActuatorType.POSITION, kp=1e-300, kv=1e-300), (1e-300, 1e-300)),
         (ActuatorSpec(type=ActuatorType.VELOCITY, kv=8.5), (0.0, 8.5)),
         (ActuatorSpec(type=ActuatorType.MOTOR), (0.0, 0.0)),
         (ActuatorSpec(type=ActuatorType.NONE), (0.0, 0.0)),
     ],
-    ids=["position", "zero", "velocity", "motor", "none"],
+    ids=["position", "tiny", "velocity", "motor", "none"],
 )
 def test_given_gains_win_and_a_motor_has_none(actuator: ActuatorSpec, gains: tuple[float, float]) -> None:
     found, _ = actuated(actuator)

@@ -27,7 +27,8 @@ BETA = -0.4
 def robot(link: LinkSpec, convention: Convention = STANDARD) -> RobotSpec:
     d, beta = (0.0, BETA) if convention is HAYATI else (0.2, 0.0)
     row = Row(name="one", type=REVOLUTE, convention=convention, a=A, alpha=ODD, d=d, theta=0.7, beta=beta, link=link)
-    after = Row(name="two", type=REVOLUTE, convention=convention, a=0.1, alpha=-1.1, d=0.15)
+    behind = STANDARD if convention is HAYATI else convention
+    after = Row(name="two", type=REVOLUTE, convention=behind, a=0.1, alpha=-1.1, d=0.15)
     return RobotSpec(name="weighed", rows=(row, after))
 
 

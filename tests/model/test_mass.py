@@ -149,7 +149,7 @@ def plates() -> list[Array]:
     for k in range(60):
         a, b = rng.uniform(0.01, 5, 2) * 10.0 ** rng.integers(-5, 3)
         R = pose_from_rpy([0, 0, 0], rng.uniform(-math.pi, math.pi, 3))[:3, :3] if k % 3 else np.eye(3)
-        tensor = R @ np.diag(rng.permutation([a, b, (a + b) * (1 + (1e-9 if k % 2 else 0.0))])) @ R.T
+        tensor = R @ np.diag(rng.permutation([a, b, (a + b) * (1 + (9e-10 if k % 2 else 0.0))])) @ R.T
         tensors.append(read_only((tensor + tensor.T) / 2))
     return tensors
 

@@ -24,7 +24,8 @@ KINDS = list(ActuatorType)
 
 def driven(kind: ActuatorType, **gains: float) -> RobotModel:
     actuator = ActuatorSpec(type=kind, **gains)
-    return build_model(replace(ODD_ROBOT, rows=tuple(replace(row, actuator=actuator) for row in ODD_ROBOT.rows)))
+    rows = (replace(row, actuator=actuator) if row.type.moves else row for row in ODD_ROBOT.rows)
+    return build_model(replace(ODD_ROBOT, rows=tuple(rows)))
 
 
 def actuators(robot: RobotModel) -> list[dict[str, object]]:

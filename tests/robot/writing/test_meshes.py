@@ -61,9 +61,7 @@ def test_a_mesh_that_is_a_link_keeps_its_own_name(tmp_path: Path) -> None:
     assert _mesh_path(tmp_path / "b.stl", tmp_path) == "b.stl"
 
 
-def test_a_mesh_whose_name_yaml_cannot_hold_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "a\x07.stl"
-    file.write_bytes(b"")
+def test_a_mesh_whose_name_yaml_cannot_hold_is_refused() -> None:
     with pytest.raises(ModelError) as error:
-        robot_file_text(_shown_by(file))
-    assert str(error.value) == f"a robot file cannot name the mesh file '{tmp_path}/a\\x07.stl'; rename it"
+        robot_file_text(_shown_by(Path("/meshes/a\x07.stl")))
+    assert str(error.value) == "a robot file cannot name the mesh file '/meshes/a\\x07.stl'; rename it"
