@@ -102,13 +102,14 @@ class LinkTree(Generic[Node]):
             raise NoArmError(f"no joint moves between the base {self.label(base)} and the tip {called}", tip)
         return way
 
-    def end(self, base: Node) -> ArmEnd[Node]:
+    def end(self, base: Node, notes: Notes) -> Node:
         """Follow the only way down that moves, to where nothing moves any more or the arm ends at a hand.
 
         A hand is a fork behind three joints or more, into branches of fewer joints than the arm has.
 
         Args:
             base: Where the arm begins.
+            notes: Takes what was taken for a hand.
 
         Raises:
             NoArmError: Nothing moves below the base, or the robot forks.
@@ -118,16 +119,15 @@ class LinkTree(Generic[Node]):
             raise NoArmError(f"no joint moves below the base {self.label(base)}", base)
         end, count = walk.follow(base, 0)
         branches = walk.branches(end)
-        if not branches:
-            return ArmEnd(node=end)
-        if not walk.is_hand(end, count):
+        if branches and not walk.is_hand(end, count):
             raise walk.fork(f"the robot forks at {self.label(end)}", end, count)
-        fingers = listed(f"{self.label(branch)} ({_joints(walk.size[branch])})" for branch in branches)
-        hand = (
-            f"The arm of {_joints(count)} ends at {self.label(end)}, where it forks; taken for a hand and left "
-            f"out: {fingers}. Another tip can be chosen."
-        )
-        return ArmEnd(node=end, hand=hand)
+        if branches:
+            fingers = listed(f"{self.label(branch)} ({_joints(walk.size[branch])})" for branch in branches)
+            notes.add(
+                f"The arm of {_joints(count)} ends at {self.label(end)}, where it forks; taken for a hand and left "
+                f"out: {fingers}. Another tip can be chosen."
+            )
+        return end
 
     def only_branch(self, node: Node) -> Node | None:
         """Return the only child that moves or carries what moves; None where there is none.
@@ -151,15 +151,6 @@ class LinkTree(Generic[Node]):
         if mass is None:
             return f"{what} (mass unknown)"
         return f"{what} ({mass:.6g} kg)" if mass > 0.0 else what
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ArmEnd(Generic[Node]):
-    """Where an arm was found to end."""
-
-    node: Node
-    hand: str = ""
-    """A note on the hand that it ends at; empty where nothing moves any more."""
 
 
 class _Walk(Generic[Node]):

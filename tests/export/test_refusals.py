@@ -73,7 +73,7 @@ def test_more_bodies_than_mujoco_reads_are_refused(tmp_path: Path) -> None:
         status=2,
         out="",
         err="dh2sim: snake: 496 rows make 497 nested bodies with base_link; MuJoCo reads at most 496. Split the "
-        "chain, or export it as URDF only (--format urdf)\n",
+        "chain, or export it as URDF only\n",
     )
     assert not (tmp_path / "made").exists()
 

@@ -130,7 +130,7 @@ def test_a_file_that_is_too_large_is_refused() -> None:
 
 
 def test_a_file_that_never_begins_is_refused() -> None:
-    message = f"a.xml:1:1: no element begins in the first {MAX_PROLOG} bytes"
+    message = f"a.xml:1:1: no element in the first {MAX_PROLOG} bytes"
     assert refusal(b"<!--" + b">" * 3 * MAX_PROLOG + b"--><a/>") == message
     assert refusal(b"<a b='" + b"x" * 3 * MAX_PROLOG + b"'/>") == message
 

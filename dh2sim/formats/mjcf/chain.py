@@ -127,13 +127,13 @@ def _base_of_only_tree(tree: MjcfTree, files: MjcfFiles) -> MjcfBody:
 
 def _found_end(tree: MjcfTree, base: MjcfBody, notes: Notes) -> tuple[MjcfBody, MjcfSite | None]:
     """Return the body where the only way with joints ends, and the site on its last link, if there is just one."""
-    found = tree.links.end(base.id)
-    last = tree.bodies[found.node]
+    found = tree.links.end(base.id, notes)
+    last = tree.bodies[found]
     while last.id != WORLD and not tree.links.moving[last.id]:  # up to the last body that has a joint
         last = tree.bodies[last.parent]
     sites = [site for body in tree.rigid(last.id) for site in tree.bodies[body].sites]
     site = sites[0] if len(sites) == 1 else None
-    end = tree.bodies[found.node if site is None else site.body]
+    end = tree.bodies[found if site is None else site.body]
     if site is not None:
         named = f"site {shown(site.name)}" if site.name else "site without a name"
         notes.add(f"The tip is the {named} on {end.label}, the only one on the last link.")
@@ -143,8 +143,6 @@ def _found_end(tree: MjcfTree, base: MjcfBody, notes: Notes) -> tuple[MjcfBody, 
             f"The tip is the frame of body {end.label}; the last link has {len(sites)} sites, which can be chosen "
             f"instead: {names}."
         )
-    if found.hand:
-        notes.add(found.hand)
     return end, site
 
 

@@ -49,14 +49,12 @@ def select_chain(tree: UrdfTree, base: str | None, tip: str | None, report: XmlR
 def _found_tip(tree: UrdfTree, base: str, notes: Notes) -> str:
     if (tool := _tool0(tree, base)) is not None:
         return tool
-    end = tree.links.end(base)
-    frames = tree.links.children[end.node]
-    if end.hand:
-        notes.add(end.hand)
-    elif frames:
+    end = tree.links.end(base, notes)
+    frames = tree.links.children[end]
+    if frames and not tree.links.moves(tree.links.below(end)[1:]):
         several = f"{len(frames)} frames are fixed to it and can be chosen instead: {listed(map(shown, frames))}"
-        notes.add(f"The tip is {shown(end.node)}; {several}.")
-    return end.node
+        notes.add(f"The tip is {shown(end)}; {several}.")
+    return end
 
 
 def _tool0(tree: UrdfTree, base: str) -> str | None:
