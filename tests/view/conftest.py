@@ -6,7 +6,7 @@ import contextlib
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import pytest
 
@@ -15,8 +15,7 @@ from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import ViewState
-from scripts.bench_view_probes import NO_DRAWING
-from tests.view.on_page import Serve
+from tests.view.on_page import Serve, wait_until
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
@@ -24,8 +23,15 @@ if TYPE_CHECKING:
 TIMEOUT = 60_000
 """ms that a page may take to show something: a browser without a graphics card is slow."""
 
+NO_DRAWING = """
+for (const call of ["clear", "drawArrays", "drawElements", "drawArraysInstanced", "drawElementsInstanced"])
+    WebGL2RenderingContext.prototype[call] = () => {};
+"""
 
-@pytest.fixture(scope="module")
+Windows: TypeAlias = "Callable[[bool], BrowserContext]"
+
+
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     """Chromium, drawing in software."""
     api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
@@ -41,7 +47,7 @@ def browser() -> Iterator[Browser]:
         launched.close()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def viewer() -> Iterator[Viewer]:
     """A server that shows the Stanford arm."""
     server = Viewer(open_state(load_robot("stanford")))
@@ -49,25 +55,36 @@ def viewer() -> Iterator[Viewer]:
     server.stop()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
+def windows(browser: Browser) -> Windows:
+    """Browser windows that draw, or do not; pages in one share what is loaded."""
+    opened: dict[bool, BrowserContext] = {}
+
+    def window(drawn: bool) -> BrowserContext:
+        if drawn not in opened:
+            opened[drawn] = browser.new_context(viewport={"width": 900, "height": 640}, accept_downloads=True)
+            opened[drawn].set_default_timeout(TIMEOUT)
+            if not drawn:
+                opened[drawn].add_init_script(NO_DRAWING)
+        return opened[drawn]
+
+    return window
+
+
+@pytest.fixture
 def drawn() -> bool:
-    """Whether pages draw; where nothing is looked at, leaving that out saves most of the time."""
-    return True
+    """Whether pages draw; without a graphics card, that takes most of the time."""
+    return False
 
 
-@pytest.fixture(scope="module")
-def window(browser: Browser, drawn: bool) -> Iterator[BrowserContext]:
-    """A browser window, small because it is drawn in software; its pages share what is loaded."""
-    context = browser.new_context(viewport={"width": 900, "height": 640}, accept_downloads=True)
-    context.set_default_timeout(TIMEOUT)
-    if not drawn:
-        context.add_init_script(NO_DRAWING)
-    yield context
-    context.close()
+@pytest.fixture
+def window(windows: Windows, drawn: bool) -> BrowserContext:
+    """A browser window, small because it may be drawn in software."""
+    return windows(drawn)
 
 
 def wait_for_panel(page: Page) -> None:
-    """Wait until a page has all that its panel is made of, keys included: a pose is shown after these."""
+    """Wait until the panel of a page is complete: the pose is shown last."""
     page.locator('[data-dh2sim="readout"] td').first.wait_for()
 
 
@@ -85,11 +102,12 @@ def open_page(window: BrowserContext, viewer: Viewer) -> Iterator[Callable[[], P
     yield opened
     for page in pages:
         page.close()
+    wait_until(lambda: not viewer.pages, "the pages are closed")
 
 
 @pytest.fixture
 def serve(window: BrowserContext) -> Iterator[Serve]:
-    """Serves any state, and opens a page of it; until the test ends."""
+    """Serves any state, and opens a page of it, until the test ends."""
     with contextlib.ExitStack() as stack:
 
         def served(state: ViewState, run: Path | None = None) -> tuple[Page, ServedPage]:

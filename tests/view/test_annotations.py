@@ -146,12 +146,12 @@ def test_a_hayati_row_tells_beta_and_rows_have_more_than_one_figure() -> None:
     assert texts == ["θ₁₂* = 0.0°", "d₁₂ = 0", "a₁₂ = 0.5 m", "α₁₂ = 0", "β₁₂ = 2.5°", "z₁₁", "z₁₂"]
 
 
-def test_angles_can_be_told_in_radians() -> None:
+def test_angles_can_be_shown_in_radians() -> None:
     scene = explained(ODD_ARM, 0, [0.5, 0.0, 0.0, 0.0, 0.0], angle=AngleUnit.RAD)
     assert (label(scene, "theta"), label(scene, "alpha")) == ("θ₁* = 0.800 rad", "α₁ = 0.651008 rad")
 
 
-def test_a_coordinate_that_is_nearly_nothing_has_no_minus_sign_and_rounding_is_told_as_zero() -> None:
+def test_a_tiny_coordinate_has_no_minus_sign_and_rounding_is_shown_as_zero() -> None:
     spec = RobotSpec(name="r", rows=(row("one", a=0.3 * math.cos(math.pi / 2), d=1e-6),))
     scene = explained(spec, 0, [-1e-5])
     assert [label(scene, name) for name in ("theta", "d", "a")] == ["θ₁* = 0.0°", "d₁ = 1e-06 m", "a₁ = 0"]

@@ -54,7 +54,7 @@ def test_what_was_typed_since_is_not_undone(typed: Field) -> None:
     assert bound.handle.value == "12"
 
 
-def test_a_value_that_the_state_refuses_is_taken_back(typed: Field) -> None:
+def test_a_value_that_the_state_refuses_is_restored(typed: Field) -> None:
     bound, type_in, seen = typed
     type_in("1000")
     seen[0]()
@@ -62,7 +62,7 @@ def test_a_value_that_the_state_refuses_is_taken_back(typed: Field) -> None:
     assert bound.handle.value == "90"
 
 
-def test_what_was_typed_before_the_field_was_told_something_else_is_shown_again(typed: Field) -> None:
+def test_typing_before_the_field_was_written_is_shown_again(typed: Field) -> None:
     bound, type_in, seen = typed
     type_in("typed")
     bound.show("told")

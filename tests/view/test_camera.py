@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -46,7 +45,7 @@ def origins(state: ViewState) -> Array:
 
 @settings(max_examples=40)
 @given(st.sampled_from(builtin_robots()), st.floats(0.2, 4.0))
-def test_the_robot_at_home_is_seen_in_pictures_of_every_shape(robot: str, aspect: float) -> None:
+def test_the_robot_at_home_is_seen_in_pictures_of_any_aspect(robot: str, aspect: float) -> None:
     state = open_state(load_robot(robot))
     assert is_in_picture(origins(state), viewpoint_of(state.model, aspect), aspect)
 
@@ -84,12 +83,7 @@ def is_seen(page: Page, served: ServedPage) -> bool:
     return bool(((places > low) & (places < low + size)).all())
 
 
-@pytest.fixture(scope="module")
-def drawn() -> bool:
-    return False
-
-
-def test_in_a_window_that_becomes_narrow_the_eye_steps_back(open_page: Callable[[], Page], viewer: Viewer) -> None:
+def test_in_a_narrower_window_the_camera_moves_back(open_page: Callable[[], Page], viewer: Viewer) -> None:
     page = open_page()
     (served,) = viewer.pages
     wait_until(lambda: served.client.camera.aspect < 1.0 and is_seen(page, served), "it is seen beside the panel")
@@ -103,7 +97,7 @@ def test_in_a_window_that_becomes_narrow_the_eye_steps_back(open_page: Callable[
     )
 
 
-def test_an_eye_that_the_user_has_moved_stays(open_page: Callable[[], Page], viewer: Viewer) -> None:
+def test_a_camera_that_the_user_has_moved_stays(open_page: Callable[[], Page], viewer: Viewer) -> None:
     page = open_page()
     (served,) = viewer.pages
     wait_until(lambda: is_seen(page, served), "it is seen")
@@ -137,7 +131,7 @@ def move_the_eye(page: Page, served: ServedPage, pixels: float) -> Array:
     return last[-1]
 
 
-def test_the_labels_of_a_row_can_be_read_wherever_the_user_moves_the_eye(
+def test_the_labels_of_a_row_can_be_read_wherever_the_camera_is(
     open_page: Callable[[], Page], viewer: Viewer
 ) -> None:
     page = open_page()

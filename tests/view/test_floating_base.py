@@ -11,32 +11,23 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
 from dh2sim.view.events import CompareMisread, Event, Follow, SetMode, Show
-from dh2sim.view.initial_state import open_state
 from dh2sim.view.motion.motion_source import Recording, Simulation
 from dh2sim.view.motion.replay import open_replay
 from dh2sim.view.panel.pose import frame_title
-from dh2sim.view.reduce import reduce
 from dh2sim.view.scene.items import Polyline as Line
 from dh2sim.view.scene.items import Scene
 from dh2sim.view.scene.scene import IN_BASE_LINK, scene_of
 from dh2sim.view.state import IDENTITY, Matrix, Mode, Part, ViewState
 from tests.program import dh2sim
+from tests.view.states import STANFORD, after
 from tests.view.test_solids import matrix
 
-STANFORD = open_state(load_robot("stanford"))
 ELSEWHERE: Matrix = ((0.0, -1.0, 0.0, 0.5), (1.0, 0.0, 0.0, -2.0), (0.0, 0.0, 1.0, 3.0), (0.0, 0.0, 0.0, 1.0))
 """A pose of base_link: a quarter of a turn about z, and away."""
 FOLLOW = Follow(q=STANFORD.q, T_world_base_link=ELSEWHERE)
 EVERYTHING: tuple[Event, ...] = (CompareMisread(), *(Show(part=part, on=True) for part in Part))
-
-
-def after(state: ViewState, *happened: Event) -> ViewState:
-    for event in happened:
-        state = reduce(state, event)
-    return state
 
 
 def in_world(scene: Scene, name: str) -> Array:
@@ -100,7 +91,7 @@ def state_tool(state: ViewState) -> Array:
     return in_world(scene_of(state), "/frames/tool0")[:3, 3]
 
 
-def test_all_that_stands_in_base_link_goes_with_it_and_the_ground_stays() -> None:
+def test_everything_in_base_link_moves_with_it_and_the_ground_does_not() -> None:
     still = after(STANFORD, *EVERYTHING)
     here, there = scene_of(still), scene_of(after(still, SetMode(mode=Mode.REPLAY), FOLLOW))
     assert here.keys() == there.keys() - {"/trace"}
@@ -132,7 +123,7 @@ def test_a_trace_ends_where_the_recording_does() -> None:
     assert after(with_trace, SetMode(mode=Mode.MANUAL)).trace == ()
 
 
-def test_a_trace_goes_on_though_only_base_link_moves() -> None:
+def test_a_trace_continues_while_only_base_link_moves() -> None:
     with_trace = after(STANFORD, SetMode(mode=Mode.REPLAY), Show(part=Part.TRACE, on=True), FOLLOW)
     x, y, z = state_tool(STANFORD)
     assert np.allclose(with_trace.trace, [(x, y, z), (0.5 - y, x - 2.0, z + 3.0)], rtol=0, atol=1e-12)
@@ -156,7 +147,7 @@ def test_a_base_that_is_fixed_has_no_pose_of_its_own(tmp_path: Path) -> None:
     assert simulation.T_world_base_link is None
 
 
-def test_the_pose_that_is_told_is_called_one_in_base_link_whatever_that_does() -> None:
+def test_the_pose_is_labelled_as_in_base_link_even_if_that_moves() -> None:
     assert frame_title(STANFORD) == "<b>tool0</b> in base_link"
     floating = after(STANFORD, SetMode(mode=Mode.REPLAY), FOLLOW)
     assert frame_title(floating) == "<b>tool0</b> in base_link (which floats in the scene)"

@@ -43,7 +43,7 @@ def test_manipulability_and_distance_to_singularity_are_those_of_the_table(robot
     assert told.smallest_singular_value == pytest.approx(least, abs=1e-5 * size)
 
 
-def test_where_the_wrist_is_stretched_there_is_no_distance_to_singularity() -> None:
+def test_the_distance_to_singularity_is_zero_with_a_stretched_wrist() -> None:
     spec = load_robot("stanford")
     bent = readout_of(reduce(open_state(spec), SetJoints(q=(0.3, 0.5, 0.4, 0.2, 0.9, 0.1))))
     stretched = readout_of(reduce(open_state(spec), SetJoints(q=(0.3, 0.5, 0.4, 0.2, 0.0, 0.1))))
@@ -54,7 +54,7 @@ def test_where_the_wrist_is_stretched_there_is_no_distance_to_singularity() -> N
 
 
 @pytest.mark.parametrize("frame", ["dh_0", "dh_3", "tool0"])
-def test_a_pose_is_told_in_three_ways_that_agree_with_the_table(frame: str) -> None:
+def test_a_pose_is_given_in_three_notations_that_agree_with_the_table(frame: str) -> None:
     spec = load_robot("stanford")
     state = reduce(reduce(open_state(spec), RandomConfiguration(seed=5)), ChooseFrame(name=frame))
     frames = table_frame_poses(spec, state.q)

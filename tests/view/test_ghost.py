@@ -72,7 +72,7 @@ def test_joints_are_matched_by_order_where_no_name_is_the_same_and_the_rest_stay
     assert found.notes == ("Joints of there that here does not have, shown at home: three.",)
 
 
-def test_an_angle_is_never_taken_for_a_length() -> None:
+def test_angles_and_lengths_are_never_confused() -> None:
     here = build_model(arm("here", row("a", a=0.3), row("b", "prismatic", a=0.2)))
     there = build_model(arm("there", row("a", "prismatic", a=0.4), row("b", "prismatic", a=0.1)))
     found = ghost_configuration(there, here, [1.5, 0.1])
@@ -90,7 +90,7 @@ def test_a_ghost_stops_at_its_limits() -> None:
     assert found.notes == ("Joints of there at their limits: a, b.",)
 
 
-def test_another_robot_is_told_by_where_its_tool_is_and_by_what_it_cannot_do() -> None:
+def test_another_robot_is_described_by_its_tool_and_the_joints_that_differ() -> None:
     here, there = build_model(robot("puma560")), build_model(robot("planar_2r"))
     q = np.radians([10.0, -40.0, 20.0, 30.0, 50.0, 60.0])
     stands = ghost_configuration(there, here, q)
@@ -103,7 +103,7 @@ def test_another_robot_is_told_by_where_its_tool_is_and_by_what_it_cannot_do() -
     assert ghost_text(limited_there, wide, [2.0]).endswith(" Joints of there at their limits: a.")
 
 
-def test_the_other_reading_has_the_same_numbers_in_the_other_convention() -> None:
+def test_misreading_keeps_the_numbers_and_changes_the_convention() -> None:
     read = misread(ODD_ARM)
     assert [entry.convention for entry in read.rows] == [
         STANDARD if entry.convention is MODIFIED else MODIFIED for entry in ODD_ARM.rows
@@ -115,7 +115,7 @@ def test_the_other_reading_has_the_same_numbers_in_the_other_convention() -> Non
     assert read.tool is ODD_ARM.tool
 
 
-def test_reading_twice_in_the_other_convention_is_reading_in_the_right_one() -> None:
+def test_misreading_twice_gives_the_table_back() -> None:
     back = misread(misread(ODD_ARM))
     assert [entry.convention for entry in back.rows] == [entry.convention for entry in ODD_ARM.rows]
 
@@ -128,7 +128,7 @@ def test_hayati_rows_have_no_other_reading() -> None:
 
 
 @given(robots_with_joint_vectors(max_rows=6))
-def test_the_gap_is_the_one_between_the_tables_themselves(drawn: tuple[RobotSpec, Array]) -> None:
+def test_the_offset_is_that_between_the_tables_themselves(drawn: tuple[RobotSpec, Array]) -> None:
     spec, vectors = drawn
     offset = misread_offset(spec, vectors[0])
     here, there = table_tool_pose(spec, vectors[0]), table_tool_pose(misread(spec), vectors[0])
@@ -137,7 +137,7 @@ def test_the_gap_is_the_one_between_the_tables_themselves(drawn: tuple[RobotSpec
     assert math.cos(offset.angle) == pytest.approx(cosine, abs=1e-12)
 
 
-def test_the_puma_misread_is_told_in_metres_and_degrees() -> None:
+def test_the_offset_of_the_misread_puma_is_given_in_metres_and_degrees() -> None:
     q = np.radians([10.0, -40.0, 20.0, 30.0, 50.0, 60.0])
     spec = robot("puma560")
     here, there = table_tool_pose(spec, q), table_tool_pose(misread(spec), q)

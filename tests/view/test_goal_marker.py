@@ -6,24 +6,14 @@ import numpy as np
 import pytest
 
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.read import load_robot
 from dh2sim.view.events import Event, MoveJoint, MoveTool, SetMode, Show
-from dh2sim.view.initial_state import open_state
-from dh2sim.view.reduce import reduce
 from dh2sim.view.scene.items import Polyline
 from dh2sim.view.scene.scene import goal_text, scene_of
-from dh2sim.view.state import Matrix, Mode, Part, ViewState
+from dh2sim.view.state import Matrix, Mode, Part
+from tests.view.states import STANFORD, after
 
-STANFORD = open_state(load_robot("stanford"))
 HANDLE = Show(part=Part.HANDLE, on=True)
 TOOL = table_tool_pose(STANFORD.spec, STANFORD.q)
-
-
-def after(*happened: Event) -> ViewState:
-    state = STANFORD
-    for event in happened:
-        state = reduce(state, event)
-    return state
 
 
 def wanted(*, reached: bool, turned: bool = False) -> MoveTool:
@@ -37,8 +27,8 @@ def wanted(*, reached: bool, turned: bool = False) -> MoveTool:
 
 
 @pytest.mark.parametrize(("turned", "how_far"), [(False, "0.5 m away"), (True, "0.5 m away and turned by 90°")])
-def test_it_is_told_how_far_the_tool_is_from_its_handle_and_a_line_leads_there(turned: bool, how_far: str) -> None:
-    state = after(HANDLE, wanted(reached=False, turned=turned))
+def test_a_missed_goal_is_described_and_marked_by_a_line(turned: bool, how_far: str) -> None:
+    state = after(STANFORD, HANDLE, wanted(reached=False, turned=turned))
     assert goal_text(state) == f"The handle is out of reach, or too far for one step: tool0 is {how_far}."
     line = scene_of(state)["/goal"]
     assert isinstance(line, Polyline)
@@ -56,11 +46,11 @@ def test_it_is_told_how_far_the_tool_is_from_its_handle_and_a_line_leads_there(t
     ],
     ids=["reached", "moved otherwise", "simulated", "no handle"],
 )
-def test_nothing_is_told_where_the_tool_is_not_wanted_elsewhere(happened: tuple[Event, ...]) -> None:
-    state = after(*happened)
+def test_a_goal_that_is_reached_or_given_up_is_not_marked(happened: tuple[Event, ...]) -> None:
+    state = after(STANFORD, *happened)
     assert goal_text(state) == ""
     assert "/goal" not in scene_of(state)
 
 
-def test_a_handle_that_was_put_away_comes_back_at_the_tool() -> None:
-    assert after(HANDLE, wanted(reached=False), Show(part=Part.HANDLE, on=False), HANDLE).goal is None
+def test_a_handle_shown_again_is_at_the_tool() -> None:
+    assert after(STANFORD, HANDLE, wanted(reached=False), Show(part=Part.HANDLE, on=False), HANDLE).goal is None

@@ -290,7 +290,7 @@ def pose(row: int, column: int, value: float) -> Array:
     ],
     ids=["nan", "inf", "shape", "text", "mirror", "huge", "scale"],
 )
-def test_what_is_no_pose_is_refused(T: Array, message: str) -> None:
+def test_an_invalid_pose_is_refused(T: Array, message: str) -> None:
     with pytest.raises(ConfigurationError, match=f"^{re.escape(message)}$"):
         inverse("planar_2r").solve([0.0, 0.0], T)
 
@@ -303,7 +303,7 @@ def test_what_is_no_pose_is_refused(T: Array, message: str) -> None:
     ],
     ids=["nan", "two axes"],
 )
-def test_what_is_no_joint_vector_is_refused(q: list[float], message: str) -> None:
+def test_an_invalid_joint_vector_is_refused(q: list[float], message: str) -> None:
     message = message.replace("shoulder", robot("planar_2r").moving_joints[1].name)
     with pytest.raises(ConfigurationError, match=f"^{re.escape(message)}$"):
         inverse("planar_2r").solve(q, identity())

@@ -65,14 +65,14 @@ def test_labels_with_room_stay_and_those_that_are_first_keep_their_places() -> N
     assert moved["second"].position == pytest.approx((0.0, 0.0, -0.18), abs=1e-12), "two half heights down"
 
 
-def test_a_label_for_which_there_is_no_room_near_by_stays() -> None:
+def test_a_label_without_free_space_nearby_stays() -> None:
     labels = {str(i): Label(text="x", position=(0.0, 0.0, 0.0)) for i in range(20)}
     moved = spread_labels(labels, FROM_AFAR)
     stayed = [name for name, label in moved.items() if label == labels[name]]
     assert stayed == ["0", *map(str, range(13, 20))]
 
 
-def test_what_is_behind_the_eye_stays_and_takes_no_room() -> None:
+def test_labels_behind_the_camera_stay_and_take_no_space() -> None:
     labels = {
         "behind": Label(text="x", position=(0.0, -20.0, 0.0)),
         "at the eye": Label(text="x", position=FROM_AFAR.position),

@@ -4,23 +4,40 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from dh2sim.engines.mujoco_engine import MujocoEngine
-from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.read import load_robot, parse_robot
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.robot.read import builtin_robots, load_robot, parse_robot
+from dh2sim.robot.spec import Convention
+from dh2sim.view.initial_state import folder_of, open_state
+from dh2sim.view.scene.ghost import misread_text
 from dh2sim.view.server import Viewer
-from tests.view.on_page import DEADLINE, OpenPage, field, open_tab, shown, wait_for_position, wait_until
+from tests.view.on_page import (
+    DEADLINE,
+    OpenPage,
+    Serve,
+    choose,
+    field,
+    open_tab,
+    pixel,
+    shown,
+    wait_for_position,
+    wait_until,
+    xyz,
+)
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+    from dh2sim.view.page import Page as ServedPage
 
 HOME = load_robot("stanford").configurations["home"].tolist()
-
-
-@pytest.fixture(scope="module")
-def drawn() -> bool:
-    return False
 
 
 def test_a_number_beyond_a_limit_stops_there_and_nonsense_moves_nothing(open_page: OpenPage) -> None:
@@ -33,7 +50,7 @@ def test_a_number_beyond_a_limit_stops_there_and_nonsense_moves_nothing(open_pag
     wait_for_position(page, spec, [*HOME[:2], 0.1, HOME[3], math.pi / 2, HOME[5]])
 
 
-def test_pages_have_states_of_their_own_and_a_reload_begins_anew(open_page: OpenPage, viewer: Viewer) -> None:
+def test_pages_have_their_own_states_and_a_reload_starts_again(open_page: OpenPage, viewer: Viewer) -> None:
     first, second, spec = open_page(), open_page(), load_robot("stanford")
     first.get_by_role("button", name="zero").click()
     wait_for_position(first, spec, [0.0] * 6)
@@ -44,7 +61,9 @@ def test_pages_have_states_of_their_own_and_a_reload_begins_anew(open_page: Open
     wait_until(lambda: len(viewer.pages) == 2, "the page of before the reload is closed")
 
 
-def test_the_pose_is_shown_in_every_form_beside_that_of_mujoco(open_page: OpenPage, tmp_path: Path) -> None:
+def test_the_pose_is_shown_in_all_notations_with_its_difference_to_mujoco(
+    open_page: OpenPage, tmp_path: Path
+) -> None:
     page, spec = open_page(), load_robot("stanford")
     open_tab(page, "Pose")
     wait_until(lambda: "Difference to MuJoCo" in shown(page, "mujoco"), "MuJoCo's pose")
@@ -53,10 +72,9 @@ def test_the_pose_is_shown_in_every_form_beside_that_of_mujoco(open_page: OpenPa
     found = re.search(r"Difference to MuJoCo: (\S+) m, (\S+) rad", shown(page, "mujoco"))
     assert found is not None
     assert all(float(number) < 1e-12 for number in found.groups())
-    page.screenshot(path=tmp_path / "pose.png")
 
 
-def test_files_are_handed_out_as_edited_and_the_model_matches_the_table(open_page: OpenPage, tmp_path: Path) -> None:
+def test_files_are_downloaded_as_edited_and_the_model_matches_the_table(open_page: OpenPage, tmp_path: Path) -> None:
     page = open_page()
     open_tab(page, "Table")
     field(page, "a₁").fill("0.123")
@@ -78,7 +96,7 @@ def test_files_are_handed_out_as_edited_and_the_model_matches_the_table(open_pag
     wait_until(lambda: "stanford.xml: largest difference to the table" in shown(page, "notice"), "the comparison")
 
 
-def test_a_page_of_somebody_else_is_turned_away(viewer: Viewer) -> None:
+def test_a_page_of_another_origin_is_turned_away(viewer: Viewer) -> None:
     client = pytest.importorskip("websockets.sync.client")
     closed = pytest.importorskip("websockets.exceptions").ConnectionClosed
     import viser
@@ -89,3 +107,141 @@ def test_a_page_of_somebody_else_is_turned_away(viewer: Viewer) -> None:
     for origin in ("http://elsewhere.example", f"http://elsewhere.example:{viewer.port}", "null"):
         with client.connect(address, origin=origin, subprotocols=protocols) as connection, pytest.raises(closed):
             connection.recv(timeout=DEADLINE)
+
+
+def test_joints_are_moved_by_number_slider_key_and_name(open_page: OpenPage, tmp_path: Path) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    wait_for_position(page, spec, HOME)
+    q = list(HOME)
+    field(page, "joint_1 [°]").fill("-45.5")
+    q[0] = math.radians(-45.5)
+    wait_for_position(page, spec, q)
+    page.get_by_role("slider").nth(2).focus()
+    page.keyboard.press("End")
+    q[2] = 1.27
+    wait_for_position(page, spec, q)
+    page.locator("canvas").first.focus()
+    page.keyboard.press("6")
+    q[1] += math.radians(3.0)
+    wait_for_position(page, spec, q)
+    page.get_by_role("button", name="zero").click()
+    wait_for_position(page, spec, [0.0] * 6)
+    assert field(page, "joint_1 [°]").input_value() == "0"
+
+
+def test_the_table_is_edited_marked_reread_and_restored(open_page: OpenPage, tmp_path: Path) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    open_tab(page, "Table")
+    choose(page, "Edit row", "2: joint_2")
+    field(page, "d₂").fill("d2 + 0.1")
+    wait_until(lambda: "d2 + 0.1" in shown(page, "table"), "the cell")
+    open_tab(page, "Joints")
+    edited = parse_robot(spec.source_file.text.replace("d: d2", "d: 0.25"))  # type: ignore[union-attr]
+    wait_for_position(page, edited, HOME)
+    open_tab(page, "Table")
+    field(page, "α₂").fill("90 +")
+    wait_until(lambda: "it ends too early" in shown(page, "cell-errors"), "the error")
+    assert shown(page, "notice") == "Robot unchanged: joints[1].alpha: in '90 +': it ends too early"
+    open_tab(page, "Joints")
+    wait_for_position(page, edited, HOME)
+    open_tab(page, "Table")
+    field(page, "α₂").fill("pi / pi * 45")
+    choose(page, "convention₂", "modified")
+    wait_until(lambda: "modified" in shown(page, "table"), "the convention")
+    assert field(page, "α₁").input_value() == "pi / pi * 45", "its index in this convention"
+    open_tab(page, "Joints")
+    text = edited.source_file.text.replace(  # type: ignore[union-attr]
+        "alpha: 90, d: 0.25", "alpha: 45, d: 0.25, convention: modified"
+    )
+    other = parse_robot(text)
+    assert other.rows[1].convention is Convention.MODIFIED
+    wait_for_position(page, other, HOME)
+    open_tab(page, "Table")
+    undo = page.get_by_role("button", name="Undo", exact=True)
+    for _ in range(3):  # the convention, the angle, the length
+        undo.click()
+    wait_until(undo.is_disabled, "all edits are taken back")
+    open_tab(page, "Joints")
+    wait_for_position(page, spec, HOME)
+
+
+def test_physics_moves_the_robot_until_manual_mode_is_chosen(open_page: OpenPage, tmp_path: Path) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    open_tab(page, "Motion")
+    choose(page, "Actuators", "free")
+    choose(page, "Mode", "physics")
+    wait_until(lambda: simulated(page) >= 1.0, "a second is simulated")
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Play").wait_for()
+    before = simulated(page)
+    page.get_by_role("button", name="Step", exact=True).click()
+    wait_until(lambda: simulated(page) == pytest.approx(before + 0.002), "a time step")
+    open_tab(page, "Joints")
+    home = table_tool_pose(spec, HOME)[:3, 3]
+    wait_until(lambda: math.dist(xyz(page), home) > 0.1, "the arm falls")
+    open_tab(page, "Motion")
+    choose(page, "Mode", "manual")
+    open_tab(page, "Joints")
+    page.get_by_role("button", name="home").click()
+    wait_for_position(page, spec, HOME)
+
+
+def simulated(page: Page) -> float:
+    """The simulated time that the page shows, s."""
+    found = re.match(r"Simulated: (\S+) s", shown(page, "motion"))
+    return float(found.group(1)) if found else -1.0
+
+
+def test_a_link_is_dragged_with_the_mouse(open_page: OpenPage, viewer: Viewer, tmp_path: Path) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    open_tab(page, "Motion")
+    choose(page, "Mode", "physics")
+    wait_until(lambda: simulated(page) > 0.1, "the simulation runs")
+    (served,) = viewer.pages
+    shoulder, wrist = table_frame_poses(spec, HOME)[[2, 3], :3, 3]
+    x, y = pixel(page, served, 0.5 * (shoulder + wrist))  # amid link 3, a long beam
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 40, y, steps=4)
+    page.mouse.move(x + 60, y - 10, steps=4)
+    wait_until(lambda: served.state.drag is not None, "the link is grabbed")
+    drag = served.state.drag
+    assert drag is not None
+    assert drag.link == "link_3"
+    wait_until(lambda: f"Force on {drag.link}: " in shown(page, "motion"), "it is shown")
+    wait_until(lambda: math.dist(pixel(page, served, target(served)), (x + 60, y - 10)) < 3.0, "the mouse is there")
+    page.mouse.up()
+    wait_until(lambda: served.state.drag is None, "the link is released")
+    wait_until(lambda: "Force on" not in shown(page, "motion"), "the force is gone")
+
+
+def target(served: ServedPage) -> Sequence[float]:
+    """Where the mouse pulls to, m."""
+    drag = served.state.drag
+    assert drag is not None
+    return drag.target
+
+
+def test_another_robot_or_the_misread_table_is_shown_as_a_ghost(open_page: OpenPage, tmp_path: Path) -> None:
+    page, spec = open_page(), load_robot("stanford")
+    open_tab(page, "Show")
+    choose(page, "Ghost", "this table, misread")
+    wait_until(lambda: "Read as modified, this table has tool0 " in shown(page, "ghost"), "the misread table")
+    assert shown(page, "ghost") == misread_text(spec, HOME)
+    choose(page, "Ghost", "scara")
+    wait_until(lambda: shown(page, "ghost").startswith("scara has tool0 "), "another robot")
+    choose(page, "Ghost", "none")
+    wait_until(lambda: not shown(page, "ghost"), "no ghost")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", builtin_robots())
+def test_every_built_in_robot_opens_at_home(serve: Serve, robot: str) -> None:
+    spec = load_robot(robot)
+    page, served = serve(open_state(spec, folder_of(robot)))
+    zero = [0.0] * len(spec.moving_rows)
+    wait_for_position(page, spec, spec.configurations["home"].tolist() if "home" in spec.configurations else zero)
+    assert page.get_by_role("slider").count() >= len(spec.moving_rows)
+    for number in range(1, len(spec.rows) + 1):
+        assert served.client.scene.get_handle_by_name(f"/robot/link_{number}") is not None
+    wait_until(lambda: page.get_by_text(f"dh2sim · {spec.name}").first.is_visible(), "its name")

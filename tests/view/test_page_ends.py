@@ -22,7 +22,7 @@ from tests.view.without_browser import speaking
     ],
     ids=["viser", "asyncio"],
 )
-def test_a_browser_that_was_closed_is_no_defect(error: Exception) -> None:
+def test_a_closed_browser_is_no_error(error: Exception) -> None:
     assert is_disconnect(error)
 
 

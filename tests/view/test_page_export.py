@@ -53,7 +53,7 @@ def world_pose(scene: Scene, name: str) -> Array:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_frame_of_the_table_stands_below_its_link_and_has_its_name(name: str) -> None:
+def test_every_frame_of_the_table_is_below_its_link_with_its_name(name: str) -> None:
     model = build_model(robot(name))
     q = model.home + 0.1
     scene, frames = robot_page_scene(model, q), table_frame_poses(model.spec, q)
@@ -194,7 +194,7 @@ def test_a_page_that_stood_there_stays_where_the_new_one_cannot_be_made(puma: Ro
     assert [entry.name for entry in tmp_path.iterdir()] == ["puma.html"]
 
 
-def test_a_folder_that_is_not_there_is_told(puma: RobotModel, tmp_path: Path) -> None:
+def test_a_missing_folder_is_an_error(puma: RobotModel, tmp_path: Path) -> None:
     path = tmp_path / "none" / "puma.html"
     with pytest.raises(OutputError) as caught:
         export_page(puma, puma.home, path)

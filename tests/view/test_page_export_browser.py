@@ -150,7 +150,7 @@ def test_a_robot_is_seen_without_server_or_network_and_the_console_is_clean(
 
 
 @pytest.mark.slow
-def test_the_eye_can_go_around_the_robot(puma: RobotModel, tab: Tab, tmp_path: Path) -> None:
+def test_the_camera_can_orbit_the_robot(puma: RobotModel, tab: Tab, tmp_path: Path) -> None:
     path = tmp_path / "puma.html"
     export_page(puma, puma.home, path)
     tab.open(path)
@@ -189,7 +189,7 @@ def test_solids_are_seen_where_they_are_in_the_colour_that_they_have(tab: Tab, t
 
 
 @pytest.mark.slow
-def test_an_animation_plays_again_and_again_and_goes_to_any_time(tab: Tab, tmp_path: Path) -> None:
+def test_an_animation_loops_and_can_be_searched(tab: Tab, tmp_path: Path) -> None:
     path = tmp_path / "colours.html"
     moments = [(0.4 * k, {"/box": box(color)}) for k, color in enumerate((RED, GREEN, BLUE))]
     path.write_text(page_html(moments, title="colours", bounds=UNIT), encoding="utf-8")

@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext
 
 
-@pytest.fixture(scope="module")
-def drawn() -> bool:
-    return False
-
-
 @pytest.mark.slow
 def test_an_interruption_ends_a_program_that_simulates(window: BrowserContext) -> None:
     with serving("stanford", "--port", str(port := unused_port())) as process:

@@ -23,11 +23,6 @@ PAIRS = [("1", "3"), ("4", "6"), ("7", "9"), ("r", "y"), ("f", "h"), ("v", "n"),
 STEP = math.radians(3.0)
 
 
-@pytest.fixture(scope="module")
-def drawn() -> bool:
-    return False
-
-
 def press(page: Page, key: str, served: ServedPage, expected: list[float]) -> None:
     """Press a key, and wait until the joints are where that should bring them, and nowhere else."""
     page.keyboard.press(key)
@@ -82,7 +77,7 @@ def test_a_key_moves_a_sliding_joint_by_a_hundredth_of_its_travel(serve: Serve) 
 
 
 @pytest.mark.slow
-def test_an_arrow_held_at_a_slider_moves_the_joint_and_not_the_eye(serve: Serve) -> None:
+def test_an_arrow_key_held_on_a_slider_moves_the_joint_and_not_the_camera(serve: Serve) -> None:
     page, served = serve(open_state(STANFORD))
     camera = served.client.camera
     wait_until(lambda: camera.aspect < 1.0, "the panel is beside the scene")

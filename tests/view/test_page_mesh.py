@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 import trimesh
 
 from dh2sim.kinematics.table_oracle import table_frame_poses
@@ -29,6 +30,11 @@ joints:
 SIDES = (0.1, 0.06, 0.08)
 """Of the mesh, a block whose middle is the origin of DH frame 1, m."""
 WHITE = (255, 255, 255)
+
+
+@pytest.fixture
+def drawn() -> bool:
+    return True
 
 
 def color_at(page: Page, served: ServedPage, point: Array) -> tuple[int, int, int] | None:
@@ -64,6 +70,5 @@ def test_the_mesh_of_a_link_is_sent_to_the_browser_and_seen(serve: Serve, tmp_pa
     wait_until(lambda: served.state.shown.isdisjoint({Part.FRAMES, Part.GRID}), "nothing but the robot is shown")
     middle = table_frame_poses(spec, [0.0])[1][:3, 3]
     wait_until(lambda: color_at(page, served, middle) not in (WHITE, None), "the mesh is seen")
-    page.screenshot(path=tmp_path / "mesh.png")
     page.get_by_text("Robot", exact=True).click()
     wait_until(lambda: color_at(page, served, middle) == WHITE, "the robot is hidden, and so is its mesh")

@@ -11,14 +11,12 @@ import numpy as np
 import pytest
 
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.read import load_robot
-from dh2sim.view.initial_state import open_state
 from dh2sim.view.motion.motion_source import Recording, Simulation
 from dh2sim.view.motion.replay import Replay, open_replay
 from dh2sim.view.state import LinkDrag
 from tests.program import dh2sim
+from tests.view.states import STANFORD
 
-STANFORD = open_state(load_robot("stanford"))
 PAUSED = replace(STANFORD, paused=True)
 
 
@@ -30,7 +28,7 @@ def replay(tmp_path_factory: pytest.TempPathFactory) -> Replay:
     return open_replay(path, STANFORD.model)
 
 
-def test_a_simulation_goes_with_the_clock_and_holds_the_robot_where_it_was() -> None:
+def test_a_simulation_follows_the_clock_and_holds_the_robot_in_place() -> None:
     simulation = Simulation(STANFORD.model, STANFORD.q, gravity=True, drive="position")
     for now in (10.0, 10.05, 10.1, 10.15):
         q = simulation.tick(now, STANFORD)
@@ -59,7 +57,7 @@ def test_a_robot_that_nothing_drives_falls() -> None:
     assert height < table_tool_pose(STANFORD.spec, STANFORD.q)[2, 3] - 0.05
 
 
-def test_a_simulation_stands_while_it_is_paused_and_makes_the_steps_that_were_asked_for() -> None:
+def test_a_paused_simulation_makes_only_the_requested_steps() -> None:
     simulation = Simulation(STANFORD.model, STANFORD.q, gravity=True, drive="free")
     step = simulation.physics.timestep
     simulation.tick(0.0, STANFORD)
@@ -94,7 +92,7 @@ def test_gravity_and_actuators_are_switched_while_the_robot_moves() -> None:
     assert np.allclose(simulation.physics.q, STANFORD.q, rtol=0, atol=0.02), "it is brought back"
 
 
-def test_a_link_that_is_pulled_at_comes_to_the_mouse_until_it_is_let_go() -> None:
+def test_a_dragged_link_follows_the_mouse_until_it_is_released() -> None:
     simulation = Simulation(STANFORD.model, STANFORD.q, gravity=False, drive="free")
     drag = LinkDrag(link="link_3", point_in_link=(0.0, 0.0, 0.1), target=(0.5, 0.5, 0.5))
     pulled = replace(STANFORD, drag=drag)
@@ -111,7 +109,7 @@ def test_a_link_that_is_pulled_at_comes_to_the_mouse_until_it_is_let_go() -> Non
     assert "pulled" not in simulation.status
 
 
-def test_a_paused_recording_goes_from_one_recorded_instant_to_the_next(replay: Replay) -> None:
+def test_a_paused_recording_steps_from_one_recorded_time_to_the_next(replay: Replay) -> None:
     recording, times = Recording(replay, 0), replay.times(0)
     assert recording.tick(0.0, replace(PAUSED, steps=2)) == tuple(replay.q_at(0, times[2]).tolist())
     assert recording.time == times[2]

@@ -28,11 +28,6 @@ DURATION = 0.5
 
 
 @pytest.fixture(scope="module")
-def drawn() -> bool:
-    return False
-
-
-@pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return recorded(tmp_path_factory.mktemp("runs"))
 
@@ -65,7 +60,7 @@ def stand_at(page: Page, percent: int, rollout: int) -> float:
 
 
 @pytest.mark.slow
-def test_a_recording_is_paused_wound_exchanged_and_given_back(serve: Serve, run: Path) -> None:
+def test_a_recording_is_paused_searched_changed_and_stopped(serve: Serve, run: Path) -> None:
     page, served = serve(open_state(STANFORD), run)
     open_tab(page, "Motion")
     choose(page, "Mode", "recording")
@@ -80,11 +75,11 @@ def test_a_recording_is_paused_wound_exchanged_and_given_back(serve: Serve, run:
         open_tab(page, "Motion")
     choose(page, "Mode", "manual")
     wait_until(lambda: served.state.mode is Mode.MANUAL, "the joints are given back")
-    wait_until(lambda: shown(page, "motion") == "", "nothing is told of the recording any more")
+    wait_until(lambda: shown(page, "motion") == "", "the status of the recording is gone")
 
 
 @pytest.mark.slow
-def test_the_way_of_the_tool_is_drawn_while_a_recording_plays(serve: Serve, run: Path) -> None:
+def test_the_path_of_the_tool_is_drawn_while_a_recording_plays(serve: Serve, run: Path) -> None:
     page, served = serve(open_state(STANFORD), run)
     open_tab(page, "Show")
     page.get_by_text("Path of tool0").click()
@@ -107,7 +102,7 @@ def trace_sent(served: ServedPage) -> Array:
 
 
 @pytest.mark.slow
-def test_a_base_that_floats_goes_away_and_comes_back(serve: Serve, tmp_path: Path) -> None:
+def test_a_floating_base_moves_away_and_returns(serve: Serve, tmp_path: Path) -> None:
     run = recorded(tmp_path, "--floating-base")
     page, served = serve(open_state(STANFORD), run)
     open_tab(page, "Motion")

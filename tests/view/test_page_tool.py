@@ -88,7 +88,6 @@ def test_tool0_follows_its_handle_and_the_page_says_where_it_cannot(
 
     drag(page, served, 0, 2.0)
     wait_until(lambda: not goal_of(served).reached, "that is out of reach")
-    page.screenshot(path=tmp_path / "out_of_reach.png")
     told = r"The handle is out of reach, or too far for one step: tool0 is (\S+) m away and turned by (\S+)°\."
     wait_until(lambda: re.fullmatch(told, shown(page, "notice")) is not None, shown(page, "notice"))
     found = re.fullmatch(told, shown(page, "notice"))

@@ -18,11 +18,6 @@ HOME = STANFORD.configurations["home"].tolist()
 SOMEWHERE = [0.3, -0.7, 0.45, 1.1, -0.2, 0.9]
 
 
-@pytest.fixture(scope="module")
-def drawn() -> bool:
-    return False
-
-
 @pytest.mark.slow
 def test_the_table_is_written_in_radians_and_millimetres_and_the_robot_stays(serve: Serve) -> None:
     page, served = serve(open_state(STANFORD))
@@ -35,7 +30,7 @@ def test_the_table_is_written_in_radians_and_millimetres_and_the_robot_stays(ser
     choose(page, "Lengths in", "mm")
     millimetres = f"{1000.0 * STANFORD.rows[1].d:g}"
     wait_until(lambda: field(page, "d₂").input_value() == millimetres, "millimetres")
-    assert shown(page, "error") == ""
+    assert shown(page, "cell-errors") == ""
     written = parse_robot(served.state.text)
     assert (served.state.table.units.angle, served.state.table.units.length) == (AngleUnit.RAD, LengthUnit.MM)
     for q in (HOME, SOMEWHERE):

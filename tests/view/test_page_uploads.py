@@ -40,7 +40,7 @@ def upload(page: Page, button: str, name: str, text: str) -> None:
     chooser.set_input_files({"name": name, "mimeType": "application/yaml", "buffer": text.encode()})
 
 
-def test_a_robot_file_is_opened_a_wrong_one_is_told_of_and_the_first_comes_back(
+def test_a_robot_file_is_opened_an_invalid_one_reported_and_the_first_reopened(
     open_page: OpenPage, viewer: Viewer, tmp_path: Path
 ) -> None:
     page, spec, stanford = open_page(), parse_robot(MINE), load_robot("stanford")
@@ -55,18 +55,16 @@ def test_a_robot_file_is_opened_a_wrong_one_is_told_of_and_the_first_comes_back(
     open_tab(page, "Table")
     assert "turn" in shown(page, "table")
     assert "joint_6" not in shown(page, "table")
-    page.screenshot(path=tmp_path / "opened.png")
     field(page, "a₁").fill("0.75")
     wait_until(lambda: "0.75" in shown(page, "table"), "it is edited")
 
     open_tab(page, "Files")
     upload(page, OPEN, "wrong.yaml", MINE.replace("a: 0.5", "a: 0.5 +").replace("prismatic", "prismatik"))
-    wait_until(lambda: "wrong.yaml" in shown(page, "notice"), "what is wrong is told")
+    wait_until(lambda: "wrong.yaml" in shown(page, "notice"), "the errors are shown")
     told = shown(page, "notice").split("\n")
     assert told[0] == "Robot unchanged."
     assert told[1] == "wrong.yaml:5:37: joints[0].a: in '0.5 +': it ends too early"
     assert told[2].startswith("wrong.yaml:6:25: joints[1].type: found 'prismatik'. Did you mean 'prismatic'?")
-    page.screenshot(path=tmp_path / "wrong.png")
     assert served.state.text == MINE.replace("a: 0.5", "a: 0.75")
 
     page.get_by_role("button", name="Reopen the first file").click()
@@ -77,7 +75,7 @@ def test_a_robot_file_is_opened_a_wrong_one_is_told_of_and_the_first_comes_back(
     assert (served.state.file, served.state.folder) == (viewer._state.file, viewer._state.folder)
 
 
-def test_a_robot_file_is_compared_with(open_page: OpenPage) -> None:
+def test_a_robot_file_is_shown_as_the_ghost(open_page: OpenPage) -> None:
     page = open_page()
     open_tab(page, "Show")
     scara = builtin_path("scara")
@@ -86,13 +84,13 @@ def test_a_robot_file_is_compared_with(open_page: OpenPage) -> None:
     wait_until(lambda: shown(page, "ghost").startswith("scara has tool0 "), "the ghost")
     wait_until(lambda: field(page, "Ghost").input_value() == "scara (uploaded)", "its name")
     upload(page, COMPARE, "any.yaml", "name: x\n")
-    wait_until(lambda: "missing key 'joints'" in shown(page, "notice"), "what is wrong is told")
+    wait_until(lambda: "missing key 'joints'" in shown(page, "notice"), "the errors are shown")
     assert shown(page, "ghost").startswith("scara has tool0 ")
     choose(page, "Ghost", "none")
     wait_until(lambda: not shown(page, "ghost"), "no ghost")
 
 
-def test_a_file_that_is_too_large_is_refused_and_the_next_one_is_taken(open_page: OpenPage) -> None:
+def test_a_file_that_is_too_large_is_refused_and_the_next_one_opened(open_page: OpenPage) -> None:
     page = open_page()
     open_tab(page, "Files")
     upload(page, OPEN, "big.yaml", MINE + "#" * 3 * MAX_BYTES)
@@ -107,7 +105,7 @@ def test_a_file_that_is_too_large_is_refused_and_the_next_one_is_taken(open_page
 
 
 @pytest.mark.slow
-def test_a_recording_is_played_with_the_robot_alone_that_it_is_of(
+def test_a_recording_is_played_only_with_its_own_robot(
     window: BrowserContext, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     path = tmp_path_factory.mktemp("run") / "run.zarr"
@@ -164,7 +162,7 @@ def buttons(served: ServedPage) -> dict[str, str]:
     return {uuid: handle.label for uuid, handle in handles if isinstance(handle, viser.GuiUploadButtonHandle)}
 
 
-def test_whatever_is_sent_the_page_takes_the_next_right_file(speaker: tuple[ServedPage, Callable[..., None]]) -> None:
+def test_after_nonsense_the_next_valid_file_is_opened(speaker: tuple[ServedPage, Callable[..., None]]) -> None:
     served, say = speaker
     button = next(uuid for uuid, label in buttons(served).items() if label == OPEN)
     others = [uuid for uuid in served.client.gui._gui_input_handle_from_uuid if uuid not in buttons(served)]

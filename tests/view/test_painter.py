@@ -86,7 +86,7 @@ def test_the_same_scene_again_sends_nothing(scene: viser.SceneApi) -> None:
     assert painter.draw(dict(items)) == 0
 
 
-def test_what_looks_different_is_exchanged_under_its_name(scene: viser.SceneApi) -> None:
+def test_an_item_that_looks_different_is_replaced(scene: viser.SceneApi) -> None:
     painter = Painter(scene)
     painter.draw({"/a": Placed(), "/a/b": triangle()})
     assert painter.draw({"/a": Placed(), "/a/b": triangle((0.0, 1.0, 0.0))}) == 1

@@ -33,7 +33,7 @@ def cells(html: str) -> list[list[str]]:
     ],
 )
 @pytest.mark.parametrize(("kind", "column"), [("revolute", "theta"), ("prismatic", "d")])
-def test_a_joints_variable_stands_before_its_offset_which_is_left_out_where_it_is_zero(
+def test_a_joint_variable_is_followed_by_its_offset_unless_that_is_zero(
     kind: str, column: str, offset: str, flip: str, printed: str
 ) -> None:
     text = f"name: x\nconvention: standard\njoints: [{{type: {kind}, {column}: {offset}, flip: {flip}, a: 0.5}}]\n"

@@ -54,7 +54,7 @@ def simulated(physics: Physics, duration: float) -> None:
 
 @pytest.mark.parametrize("gravity", [True, False])
 @pytest.mark.parametrize("name", ["stanford", "puma560", "scara", "planar_2r"])
-def test_a_driven_robot_stands_still_where_it_is_put(name: str, gravity: bool) -> None:
+def test_a_driven_robot_stays_where_it_starts(name: str, gravity: bool) -> None:
     model = robot(name)
     physics = Physics(model, model.home, gravity=gravity)
     simulated(physics, 1.0)
@@ -146,7 +146,7 @@ def test_only_whole_time_steps_are_simulated() -> None:
     assert physics.time == pytest.approx(6 * step)
 
 
-def test_when_time_is_up_the_page_gets_its_turn() -> None:
+def test_the_time_budget_is_kept() -> None:
     model = robot("planar_2r")
     physics = Physics(model, model.home)
     assert physics.advance(1000.0, time_budget_s=0.0) == pytest.approx(STEPS_PER_CLOCK_READING * physics.timestep)
@@ -161,7 +161,7 @@ def test_steps_are_the_same_one_by_one_and_together() -> None:
     assert np.array_equal(one.q, many.q)
 
 
-def test_a_reset_puts_the_robot_where_it_is_told_at_rest_and_unpushed() -> None:
+def test_a_reset_puts_the_robot_at_rest_without_forces() -> None:
     model = robot("puma560")
     physics = Physics(model, model.home, drive="free")
     physics.apply_force(model.links[-1].name, [0.0, 0.0, 0.0], [10.0, 0.0, 0.0])
@@ -176,7 +176,7 @@ def test_a_reset_puts_the_robot_where_it_is_told_at_rest_and_unpushed() -> None:
     assert physics.q == pytest.approx(q, abs=1e-6)
 
 
-def test_a_pushed_robot_gives_way_as_its_jacobian_and_stiffness_say() -> None:
+def test_a_robot_yields_to_a_force_as_its_jacobian_and_stiffness_predict() -> None:
     model = robot("stanford")
     physics = Physics(model, model.home, gravity=False)
     T = forward_kinematics(model.chain, model.home)
@@ -197,7 +197,7 @@ def test_a_pushed_robot_gives_way_as_its_jacobian_and_stiffness_say() -> None:
     assert physics.q == pytest.approx(model.home, abs=1e-4)
 
 
-def test_a_push_keeps_its_direction_while_the_link_turns() -> None:
+def test_a_force_keeps_its_direction_while_the_link_turns() -> None:
     physics = Physics(pendulum(), [0.0], gravity=False, drive="free")
     physics.apply_force("link_1", [0.5, 0.0, 0.0], [0.0, 4.0, 0.0])
     # the apply_force is to this pendulum what its weight is to one that hangs: it swings about pi/2
@@ -277,7 +277,7 @@ def test_the_base_cannot_be_dragged_away() -> None:
     ],
     ids=["turns", "slides", "not finite"],
 )
-def test_an_unstable_simulation_stops_with_a_reason_and_begins_anew_when_it_is_reset(
+def test_an_unstable_simulation_stops_with_a_reason_and_a_reset_starts_it_again(
     model: RobotModel,
     lever: float,
     force: list[float],
@@ -312,7 +312,7 @@ def test_what_was_good_before_an_instability_counts_as_simulated() -> None:
     assert np.isfinite(physics.q).all()
 
 
-def test_a_robot_without_moving_joints_stands_there() -> None:
+def test_a_robot_without_moving_joints_can_be_simulated() -> None:
     row = Row(name="j", type=JointType.FIXED, convention=Convention.STANDARD, a=0.5)
     physics = Physics(build_model(RobotSpec(name="stick", rows=(row,))), [])
     physics.drag("link_1", [0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
@@ -352,14 +352,16 @@ def test_dry_friction_and_damping_of_the_file_act_on_free_joints() -> None:
     ],
     ids=["link", "point", "force"],
 )
-def test_a_push_at_nothing_is_refused(link: str, point: list[float], force: list[float], message: str) -> None:
+def test_a_force_on_an_unknown_link_or_point_is_refused(
+    link: str, point: list[float], force: list[float], message: str
+) -> None:
     physics = Physics(pendulum(), [0.0])
     with pytest.raises(ConfigurationError, match=f"^{re.escape(message)}$"):
         physics.apply_force(link, point, force)
     assert physics.applied_force is None
 
 
-def test_a_target_that_is_no_point_is_refused() -> None:
+def test_an_invalid_target_is_refused() -> None:
     physics = Physics(pendulum(), [0.0])
     with pytest.raises(
         ConfigurationError, match=r"^the target must be three finite numbers, got \[inf, 0\.0, 0\.0\]$"
@@ -367,7 +369,7 @@ def test_a_target_that_is_no_point_is_refused() -> None:
         physics.drag("link_1", [0.0] * 3, [math.inf, 0.0, 0.0])
 
 
-def test_what_is_no_joint_vector_is_refused_and_changes_nothing() -> None:
+def test_an_invalid_joint_vector_is_refused_and_changes_nothing() -> None:
     physics = Physics(pendulum(), [0.3])
     with pytest.raises(ConfigurationError, match=r"^coordinate of swing is nan: it must be finite$"):
         physics.reset([math.nan])

@@ -74,7 +74,7 @@ def test_before_two_readings_nothing_is_due_and_there_is_no_factor() -> None:
     assert pace.factor is None
 
 
-def test_a_clock_that_stands_still_or_goes_back_makes_nothing_due() -> None:
+def test_nothing_is_due_if_the_clock_stops_or_goes_back() -> None:
     pace = RealTime()
     pace.due(5.0)
     assert pace.due(5.0) == 0.0

@@ -146,6 +146,6 @@ def test_rollouts_that_have_not_been_run_are_left_out(tmp_path: Path, model: Rob
             replay.times(0)
 
 
-def test_what_is_no_run_is_refused(tmp_path: Path, model: RobotModel) -> None:
+def test_something_that_is_not_a_run_is_refused(tmp_path: Path, model: RobotModel) -> None:
     with pytest.raises(RunError, match=f"^'{re.escape(str(tmp_path))}' is not a run of dh2sim$"):
         open_replay(tmp_path, model)

@@ -55,7 +55,7 @@ def set_value(speaker: Speaker, label: str, value: str) -> None:
     say("GuiUpdateMessage", uuid=widgets(served)[label]._impl.uuid, updates={"value": value})
 
 
-def test_what_is_typed_before_another_row_is_shown_goes_to_the_row_that_the_field_names(speaker: Speaker) -> None:
+def test_typing_before_another_row_is_shown_changes_the_row_that_the_label_names(speaker: Speaker) -> None:
     served, _say = speaker
     first, go_on = widgets(served)["d₁"], threading.Event()
     served.send(lambda: (go_on.wait(20.0), None)[1])  # the page's thread is busy
@@ -69,7 +69,7 @@ def test_what_is_typed_before_another_row_is_shown_goes_to_the_row_that_the_fiel
     assert widgets(served)["d₂"].value == "d2"
 
 
-def test_another_row_has_fields_of_its_own(speaker: Speaker) -> None:
+def test_another_row_has_its_own_fields(speaker: Speaker) -> None:
     served, _say = speaker
     assert fields(served) == ["a₁", "α₁", "d₁", "θ₁"]
     set_value(speaker, "Edit row", "6: joint_6")
@@ -80,7 +80,7 @@ def test_another_row_has_fields_of_its_own(speaker: Speaker) -> None:
 
 
 @pytest.mark.parametrize("speaker", [open_state(parse_robot(MIXED))], indirect=True, ids=["mixed"])
-def test_fields_are_named_as_the_row_s_convention_has_it(speaker: Speaker) -> None:
+def test_fields_are_labelled_for_the_convention_of_the_row(speaker: Speaker) -> None:
     served, _say = speaker
     assert fields(served) == ["a₀", "α₀", "d₁", "θ₁"]
     set_value(speaker, "convention₁", "hayati")
@@ -91,7 +91,7 @@ def test_fields_are_named_as_the_row_s_convention_has_it(speaker: Speaker) -> No
     wait_until(lambda: "β₂" in fields(served) and served.state.table.errors != (), "beta means nothing there")
 
 
-def test_a_row_that_there_is_not_is_never_chosen(speaker: Speaker) -> None:
+def test_an_unknown_row_cannot_be_selected(speaker: Speaker) -> None:
     served, _say = speaker
     set_value(speaker, "Edit row", "7: joint_7")
     set_value(speaker, "a₁", "0.125")

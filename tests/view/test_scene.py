@@ -11,22 +11,14 @@ from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
-from dh2sim.view.events import CompareMisread, Event, MoveJoint, SelectRow, SetJoints, Show
+from dh2sim.view.events import CompareMisread, MoveJoint, SelectRow, SetJoints, Show
 from dh2sim.view.initial_state import open_state
-from dh2sim.view.reduce import reduce
 from dh2sim.view.scene.items import Label, Lines, Polyline, Scene, Solid, Triad
 from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import Part, ViewState, within
 from tests.strategies import robots_with_joint_vectors
+from tests.view.states import STANFORD, after
 from tests.view.test_solids import matrix
-
-STANFORD = open_state(load_robot("stanford"))
-
-
-def after(state: ViewState, *happened: Event) -> ViewState:
-    for event in happened:
-        state = reduce(state, event)
-    return state
 
 
 def below(scene: Scene, root: str) -> set[str]:
@@ -35,7 +27,7 @@ def below(scene: Scene, root: str) -> set[str]:
 
 @settings(max_examples=40)
 @given(robots_with_joint_vectors(max_rows=6))
-def test_links_and_frames_stand_where_the_table_has_them(robot: tuple[RobotSpec, Array]) -> None:
+def test_links_and_frames_are_where_the_table_has_them(robot: tuple[RobotSpec, Array]) -> None:
     spec, vectors = robot
     opened = open_state(spec)
     state = after(opened, SetJoints(q=tuple(vectors[0].tolist())))
@@ -106,7 +98,7 @@ def test_without_soft_shading_surfaces_are_plain_and_nothing_else_changes() -> N
     assert not any(item.plain for item in soft.values() if isinstance(item, Solid))
 
 
-def test_the_ghost_stands_where_the_other_reading_puts_it() -> None:
+def test_the_ghost_is_where_the_misread_table_has_it() -> None:
     state = after(STANFORD, CompareMisread(), MoveJoint(joint=1, value=0.3))
     assert state.ghost is not None
     scene, ghost = scene_of(state), state.ghost.model

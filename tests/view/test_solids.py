@@ -87,7 +87,7 @@ def test_triangles_are_made_once_for_each_size_of_a_shape() -> None:
     assert all(shape_triangles(other) != shape_triangles(made) for other in others)
 
 
-def test_a_table_read_anew_shares_the_triangles_of_the_shapes_that_stay() -> None:
+def test_a_table_that_is_read_again_shares_the_triangles_of_unchanged_shapes() -> None:
     read, again = (build_model(load_robot("stanford")) for _ in range(2))
     before, after = (robot_solids(model, model.home, "/robot") for model in (read, again))
     solids = [name for name, item in before.items() if isinstance(item, Solid)]
@@ -138,7 +138,7 @@ def test_a_pose_becomes_position_and_quaternion_and_back() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_built_in_robot_stands_where_its_joints_are_with_one_solid_for_every_shape(name: str) -> None:
+def test_every_built_in_robot_has_one_solid_for_every_shape_in_its_place(name: str) -> None:
     model = build_model(robot(name))
     items = robot_solids(model, model.home, "/robot")
     assert items["/robot"] == items["/robot/base_link"] == Placed()
@@ -162,7 +162,7 @@ def test_only_poses_of_links_change_with_the_configuration() -> None:
     assert changed == {f"/ghost/link_{i}" for i in range(1, len(model.links) + 1)}
 
 
-def test_a_mesh_stands_in_the_dh_frame_of_its_link_instead_of_the_shapes() -> None:
+def test_a_mesh_in_the_dh_frame_of_its_link_replaces_the_shapes() -> None:
     model = build_model(ODD_ROBOT)
     link, joint = model.links[0], model.chain.joints[0]
     T_dh_mesh = pose_from_rpy([0.1, 0.2, -0.3], [0.3, 0.2, 0.1])

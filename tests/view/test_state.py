@@ -16,11 +16,10 @@ from dh2sim.robot.spec import AngleUnit, Convention, JointType, LengthUnit, Robo
 from dh2sim.robot.write import robot_file_text
 from dh2sim.view import events
 from dh2sim.view.initial_state import open_state
-from dh2sim.view.reduce import reduce
 from dh2sim.view.state import COLUMNS, CellError, LinkDrag, Mode, Part, ViewState
 from tests.strategies import robot_specs
+from tests.view.states import STANFORD, after
 
-STANFORD = open_state(load_robot("stanford"))
 ONE_JOINT = "name: one\nconvention: standard\njoints: [{type: continuous, a: 1}]\n"
 
 typed = st.sampled_from(
@@ -85,12 +84,6 @@ anything: st.SearchStrategy[events.Event] = st.one_of(
 )
 
 
-def after(state: ViewState, *happened: events.Event) -> ViewState:
-    for event in happened:
-        state = reduce(state, event)
-    return state
-
-
 def assert_sound(state: ViewState) -> None:
     """What must hold of a page's state at all times."""
     assert len(state.q) == state.model.chain.n
@@ -119,7 +112,7 @@ def test_a_page_takes_any_robot(spec: RobotSpec, happened: list[events.Event]) -
     assert_sound(after(open_state(spec), *happened))
 
 
-def test_a_page_begins_at_home() -> None:
+def test_a_page_starts_at_home() -> None:
     assert STANFORD.q == tuple(load_robot("stanford").configurations["home"].tolist())
 
 
@@ -233,7 +226,7 @@ def test_reading_all_rows_in_a_convention_overrules_rows_that_name_their_own() -
     assert {row.convention for row in read.spec.rows} == {Convention.MODIFIED}
 
 
-def test_a_row_becomes_hayati_and_back_though_a_zero_stands_in_a_column_that_it_then_lacks() -> None:
+def test_a_row_becomes_hayati_and_back_despite_a_zero_in_a_column_that_it_then_lacks() -> None:
     text = robot_file_text(STANFORD.spec, angle=AngleUnit.DEG)  # every column is written
     state = open_state(parse_robot(text))
     hayati = after(state, events.SetConvention(row=4, convention=Convention.HAYATI))
@@ -268,14 +261,14 @@ def test_other_units_write_other_numbers_for_the_same_robot() -> None:
     assert state.notice == "Parameters were replaced by their values."
 
 
-def test_a_file_whose_values_are_shared_by_an_anchor_is_written_anew() -> None:
+def test_a_file_whose_values_share_an_anchor_is_rewritten() -> None:
     text = "name: x\nconvention: standard\njoints:\n  - {type: revolute, a: &l 0.3}\n  - {type: revolute, a: *l}\n"
     state = open_state(parse_robot(text))
     edited = after(state, events.EditCell(row=0, column="a", text="0.5"))
     assert [row.a for row in edited.spec.rows] == [0.5, 0.3]
 
 
-def test_the_table_stands_while_a_simulation_moves_the_joints() -> None:
+def test_the_table_cannot_be_edited_during_a_simulation() -> None:
     driven = after(STANFORD, events.SetMode(mode=Mode.PHYSICS))
     edited = after(driven, events.EditCell(row=0, column="a", text="1"))
     assert edited.model is STANFORD.model
@@ -300,7 +293,7 @@ def test_while_physics_is_on_the_user_moves_what_the_actuators_hold() -> None:
     assert still.commanded == STANFORD.q
 
 
-def test_what_moves_is_paused_and_stepped_and_begins_anew_running() -> None:
+def test_a_motion_is_paused_and_stepped_and_a_new_one_runs() -> None:
     assert after(STANFORD, events.Pause(on=True), events.Step()) == STANFORD
     for mode in (Mode.PHYSICS, Mode.REPLAY):
         moving = after(STANFORD, events.SetMode(mode=mode))
@@ -313,7 +306,7 @@ def test_what_moves_is_paused_and_stepped_and_begins_anew_running() -> None:
         assert (anew.paused, anew.steps) == (False, 0)
 
 
-def test_only_links_of_a_simulated_robot_are_pulled_at() -> None:
+def test_only_links_of_a_simulated_robot_can_be_dragged() -> None:
     drag = LinkDrag(link="link_3", point_in_link=(0.0, 0.1, 0.0), target=(1.0, 0.0, 0.0))
     assert after(STANFORD, events.DragLink(drag=drag)).drag is None
     driven = after(STANFORD, events.SetMode(mode=Mode.PHYSICS), events.DragLink(drag=drag))
@@ -326,7 +319,7 @@ def test_only_links_of_a_simulated_robot_are_pulled_at() -> None:
     assert after(driven, events.SetMode(mode=Mode.MANUAL)).drag is None
 
 
-def test_nobody_moves_the_joints_of_a_recording() -> None:
+def test_joints_cannot_be_moved_during_a_recording() -> None:
     played = after(STANFORD, events.SetMode(mode=Mode.REPLAY), events.Follow(q=(0.1,) * 6))
     assert after(played, events.SetConfiguration(name="zero"), events.Nudge(joint=0, direction=1)).q == (0.1,) * 6
 

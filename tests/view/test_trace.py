@@ -9,23 +9,14 @@ import numpy as np
 import pytest
 
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.read import load_robot
-from dh2sim.view.events import Event, Follow, SetMode, Show
-from dh2sim.view.initial_state import open_state
+from dh2sim.view.events import Follow, SetMode, Show
 from dh2sim.view.motion.motion_source import Recording
 from dh2sim.view.motion.replay import open_replay
-from dh2sim.view.reduce import reduce
-from dh2sim.view.state import Mode, Part, ViewState
+from dh2sim.view.state import Mode, Part
 from tests.program import dh2sim
+from tests.view.states import STANFORD, after
 
-STANFORD = open_state(load_robot("stanford"))
 PLACES = [(0.1 * k, 0.5, 0.3, 0.0, 0.2, 0.0) for k in range(4)]
-
-
-def after(state: ViewState, *happened: Event) -> ViewState:
-    for event in happened:
-        state = reduce(state, event)
-    return state
 
 
 def tool(q: tuple[float, ...]) -> list[float]:
@@ -33,7 +24,7 @@ def tool(q: tuple[float, ...]) -> list[float]:
     return place
 
 
-def test_where_a_recording_leaps_another_trace_begins() -> None:
+def test_a_jump_of_a_recording_starts_another_trace() -> None:
     played = after(STANFORD, Show(part=Part.TRACE, on=True), SetMode(mode=Mode.REPLAY))
     begun = after(played, Follow(q=PLACES[0], jumps=True), Follow(q=PLACES[1]), Follow(q=PLACES[2]))
     assert np.allclose(begun.trace, [tool(q) for q in PLACES[:3]], rtol=0, atol=1e-12)
@@ -41,7 +32,7 @@ def test_where_a_recording_leaps_another_trace_begins() -> None:
     assert np.allclose(wound.trace, [tool(PLACES[0]), tool(PLACES[3])], rtol=0, atol=1e-12)
 
 
-def test_a_recording_leaps_where_it_begins_ends_and_is_wound_and_nowhere_else(tmp_path: Path) -> None:
+def test_a_recording_jumps_only_at_its_start_its_end_and_when_searched(tmp_path: Path) -> None:
     out = tmp_path / "run.zarr"
     done = dh2sim("rollout", "stanford", "--out", out, "--rollouts", "1", "--duration", "1", "--quiet")
     assert done.status == 0, done.err

@@ -6,27 +6,18 @@ from dataclasses import replace
 
 import pytest
 
-from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
-from dh2sim.view.events import ConvertTable, EditCell, Event, OpenText, SelectRow, SetConvention, SetUnits, Undo
-from dh2sim.view.initial_state import open_state
-from dh2sim.view.reduce import MAX_UNDO, MAX_UNDO_LENGTH, reduce
-from dh2sim.view.state import Mode, ViewState
-
-STANFORD = open_state(load_robot("stanford"))
-
-
-def after(state: ViewState, *happened: Event) -> ViewState:
-    for event in happened:
-        state = reduce(state, event)
-    return state
+from dh2sim.view.events import ConvertTable, EditCell, OpenText, SelectRow, SetConvention, SetUnits, Undo
+from dh2sim.view.reduce import MAX_UNDO, MAX_UNDO_LENGTH
+from dh2sim.view.state import Mode
+from tests.view.states import STANFORD, after
 
 
 def cell(text: str, row: int = 0, column: str = "a") -> EditCell:
     return EditCell(row=row, column=column, text=text)
 
 
-def test_edits_are_taken_back_in_turn_to_the_letter() -> None:
+def test_edits_are_undone_one_by_one_to_the_letter() -> None:
     edits = (
         cell("0.1"),
         cell("0.2", row=1),
@@ -55,7 +46,7 @@ def test_what_is_typed_into_a_cell_letter_by_letter_is_one_edit() -> None:
     assert len(other.undo_texts) == 3, "into another cell and back are further edits"
 
 
-def test_what_is_wrong_is_no_edit_and_its_mark_goes_with_the_edit_before() -> None:
+def test_an_invalid_value_is_no_edit_and_its_mark_goes_with_the_edit_before() -> None:
     wrong = after(STANFORD, cell("0.1"), cell("pi /", row=1, column="alpha"))
     assert wrong.table.errors
     assert wrong.undo_texts == (STANFORD.text,)
@@ -77,19 +68,19 @@ def test_joints_and_the_chosen_row_stay_where_they_are() -> None:
     assert (back.q, back.selected_row) == (moved.q, 3)
 
 
-def test_where_nothing_was_edited_nothing_is_taken_back_and_it_is_told() -> None:
+def test_without_an_edit_there_is_nothing_to_undo() -> None:
     assert after(STANFORD, Undo()) == replace(STANFORD, notice="Nothing to undo.")
 
 
 @pytest.mark.parametrize("mode", [Mode.PHYSICS, Mode.REPLAY])
-def test_nothing_is_taken_back_while_something_moves_the_joints(mode: Mode) -> None:
+def test_nothing_can_be_undone_while_something_moves_the_joints(mode: Mode) -> None:
     edited = after(STANFORD, cell("0.1"))
     state = after(replace(edited, mode=mode), Undo())
     assert (state.text, state.undo_texts) == (edited.text, edited.undo_texts)
     assert state.notice == "The table can be edited in manual mode only."
 
 
-def test_another_file_begins_anew() -> None:
+def test_another_file_cannot_be_undone() -> None:
     edited = after(STANFORD, cell("0.1"))
     opened = after(edited, OpenText(text=b"name: x\nconvention: standard\njoints:\n  - {type: revolute}\n", file="x"))
     assert opened.spec.name == "x", opened.notice

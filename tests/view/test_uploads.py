@@ -20,19 +20,12 @@ from dh2sim.robot.read import builtin_path, load_robot, parse_robot
 from dh2sim.view import events
 from dh2sim.view.initial_state import MAX_PROBLEMS, builtin_ghost, file_name, open_state, uploaded_ghost
 from dh2sim.view.panel import markup
-from dh2sim.view.reduce import reduce
-from dh2sim.view.state import Mode, Part, ViewState
+from dh2sim.view.state import Mode, Part
+from tests.view.states import STANFORD, after
 
-STANFORD = open_state(load_robot("stanford"))
 HEAD = "name: mine\nconvention: standard\njoints:\n"
 ROW = "  - {type: revolute, a: 0.5, limits: {position: [-1, 1]}}\n"
 MINE = f"{HEAD}{ROW}  - {{type: prismatic, theta: 0.3, limits: {{position: [0, 0.4]}}}}\n"
-
-
-def after(state: ViewState, *happened: events.Event) -> ViewState:
-    for event in happened:
-        state = reduce(state, event)
-    return state
 
 
 def upload(text: str | bytes, file: str = "mine.yaml") -> events.OpenText:
@@ -47,7 +40,7 @@ def assert_refused(text: str | bytes, *lines: str) -> None:
     assert after(state, events.Notify(notice="")) == before
 
 
-def test_a_robot_that_is_uploaded_stands_at_home_where_its_table_has_it() -> None:
+def test_an_uploaded_robot_is_at_home_where_its_table_has_it() -> None:
     puma = builtin_path("puma560")
     assert puma is not None
     text, spec = puma.read_bytes(), load_robot("puma560")
@@ -60,7 +53,7 @@ def test_a_robot_that_is_uploaded_stands_at_home_where_its_table_has_it() -> Non
     assert np.array_equal(table_tool_pose(state.spec, state.q), table_tool_pose(spec, state.q))
 
 
-def test_nothing_points_at_places_of_the_robot_that_was_shown_before() -> None:
+def test_nothing_refers_to_the_robot_that_was_shown_before() -> None:
     eye = tuple(tuple(row) for row in np.eye(4).tolist())
     before = after(
         STANFORD,
@@ -90,7 +83,7 @@ def test_an_uploaded_robot_is_edited_as_any_other() -> None:
     assert np.array_equal(table_tool_pose(converted.spec, (0.1, 0.2)), table_tool_pose(state.spec, (0.1, 0.2)))
 
 
-def test_the_ghost_stays_unless_it_is_a_reading_of_the_robot_that_was_shown() -> None:
+def test_the_ghost_stays_unless_it_is_the_misread_robot() -> None:
     scara = builtin_ghost("scara")
     assert after(STANFORD, events.Compare(ghost=scara), upload(MINE)).ghost == scara
     ghost = after(STANFORD, events.CompareMisread(), upload(MINE)).ghost
@@ -143,7 +136,7 @@ def test_an_uploaded_file_names_no_mesh_and_no_path_of_it_is_followed(
     assert parse_robot(robot_with_mesh.read_text(), directory=mesh.parent).rows[0].link.mesh is not None
 
 
-def test_a_mesh_that_there_is_and_one_that_there_is_not_are_refused_alike(robot_with_mesh: Path) -> None:
+def test_existing_and_missing_meshes_are_refused_alike(robot_with_mesh: Path) -> None:
     for file in (robot_with_mesh.parent / "box.stl", robot_with_mesh.parent / "none.stl"):
         name = str(file) if len(str(file)) <= 60 else f"{str(file)[:57]}..."
         text = f"{HEAD}  - {{type: revolute, link: {{mesh: {{file: {file}}}}}}}\n"
@@ -155,7 +148,7 @@ def test_a_mesh_that_there_is_and_one_that_there_is_not_are_refused_alike(robot_
         )
 
 
-def test_all_that_is_wrong_is_told_as_of_any_robot_file() -> None:
+def test_all_errors_are_reported_as_for_any_robot_file() -> None:
     assert_refused(
         "name: 3d\nconvention: standrad\njoints:\n  - {type: revolute, a: __import__, alpha: 1/0}\n",
         "mine.yaml:1:7: name: a name is made of letters, digits, '_' and '-', starting with a letter; found '3d'",
@@ -165,7 +158,7 @@ def test_all_that_is_wrong_is_told_as_of_any_robot_file() -> None:
     )
 
 
-def test_of_many_problems_the_first_are_told_and_how_many_more_there_are() -> None:
+def test_of_many_problems_the_first_and_the_number_of_others_are_reported() -> None:
     state = after(STANFORD, upload(HEAD + "  - {type: revolute, a: x}\n" * 40))
     lines = state.notice.split("\n")
     assert len(lines) == 1 + MAX_PROBLEMS + 1
@@ -189,7 +182,7 @@ def test_of_many_problems_the_first_are_told_and_how_many_more_there_are() -> No
     ],
     ids=["empty", "NUL", "escaped NUL", "a picture", "latin 1", "UTF-16", "large", "tag", "deep", "no text"],
 )
-def test_what_is_no_robot_file_is_refused(text: bytes, told: str) -> None:
+def test_something_that_is_not_a_robot_file_is_refused(text: bytes, told: str) -> None:
     state = after(STANFORD, upload(text))
     assert state.model is STANFORD.model
     first = state.notice.split("\n")[1]
@@ -241,7 +234,7 @@ def test_no_bytes_bring_a_page_down(data: bytes) -> None:
     assert all(math.isfinite(value) for value in state.q)
 
 
-def test_a_robot_to_compare_with_is_called_by_its_name() -> None:
+def test_an_uploaded_ghost_has_the_name_of_its_robot() -> None:
     ghost = uploaded_ghost(MINE.encode(), "some file.yaml")
     assert (ghost.model.name, ghost.label, ghost.misread) == ("mine", "mine (uploaded)", False)
     with pytest.raises(Dh2simError) as caught:
@@ -253,7 +246,7 @@ def test_a_robot_to_compare_with_is_called_by_its_name() -> None:
     ]
 
 
-def test_a_page_that_asks_for_a_ghost_of_any_other_name_gets_no_file(robot_with_mesh: Path) -> None:
+def test_a_ghost_with_an_unknown_name_opens_no_file(robot_with_mesh: Path) -> None:
     for name in (str(robot_with_mesh), "../robots/scara", "/etc/passwd", ""):
         with pytest.raises(Dh2simError, match=r"^unknown robot '"):
             builtin_ghost(name)
