@@ -24,7 +24,7 @@ from dh2sim.messages import listed
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.view.scene.items import Arrow, Item, Label, Placed, Polyline, Scene, Solid, Triad, Vector
-from dh2sim.view.scene.link_poses import triad_length
+from dh2sim.view.scene.link_poses import round_length, triad_length
 from dh2sim.view.scene.painter import Painter
 from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids, rotation_matrix
 from dh2sim.view.server import recording_server
@@ -139,18 +139,12 @@ def _look_at(server: viser.ViserServer, bounds: BoundingSphere) -> None:
 
 def _add_ground(server: viser.ViserServer, bounds: BoundingSphere) -> None:
     """Add a grid of a round number of metres on the ground, below the middle of the scene."""
-    cell = _round_length(bounds.radius / 4.0)
+    cell = round_length(bounds.radius / 10.0)
     side = 20.0 * cell
     x, y = (5.0 * cell * round(value / (5.0 * cell)) for value in bounds.centre[:2])
     server.scene.add_grid(
         "/ground", width=side, height=side, cell_size=cell, section_size=5.0 * cell, position=(x, y, 0.0)
     )
-
-
-def _round_length(length: float) -> float:
-    """Return 1, 2 or 5 times a power of ten, at most ``length``."""
-    unit = 10.0 ** math.floor(math.log10(length))
-    return max(step for step in (1.0, 2.0, 5.0) if step * unit <= length) * unit
 
 
 MAX_FRAME_RATE = 30.0

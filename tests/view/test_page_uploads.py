@@ -130,8 +130,8 @@ def test_a_recording_is_played_only_with_its_own_robot(
             assert not page.get_by_text("Rollout", exact=True).is_visible()
             (served,) = viewer.pages
             served.send(lambda: served.motion.play(0))
-            told = "The recording is one of the robot that was opened at first: go back to that."
-            wait_until(lambda: shown(page, "notice") == told, "it is not to be played")
+            notice = "The recording is of the robot opened first: return to that to play it."
+            wait_until(lambda: shown(page, "notice") == notice, "it is not to be played")
             open_tab(page, "Joints")
             assert np.allclose(xyz(page), table_tool_pose(parse_robot(MINE), (0.5, 0.2))[:3, 3], rtol=0, atol=1.1e-6)
             open_tab(page, "Files")

@@ -37,7 +37,7 @@ _PART_LABELS: Final = {
     Part.FRAME_NAMES: "Frame names",
     Part.ANNOTATIONS: "Explained row",
     Part.TRACE: "Path of tool0",
-    Part.GHOST: "Ghost",
+    Part.GHOST: "Show ghost",
     Part.HANDLE: "Handle to drag tool0",
     Part.GRID: "Grid",
     Part.SHADING: "Soft shading",

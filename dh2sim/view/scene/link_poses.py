@@ -1,7 +1,8 @@
-"""Poses of a robot's links and frames, computed once for everything that is drawn; and how large the robot is."""
+"""Poses of a robot's links and frames, computed once for everything that is drawn; and lengths to draw them with."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
@@ -71,3 +72,9 @@ def frame_origins(model: RobotModel) -> Array:
 def triad_length(model: RobotModel) -> float:
     """Return the length of the axes that frames are drawn with, m."""
     return _TRIAD * robot_size(model)
+
+
+def round_length(length: float) -> float:
+    """Return the least length that is not shorter and is 1, 2 or 5 times a power of ten."""
+    unit = 10.0 ** math.floor(math.log10(length))
+    return next(step * unit for step in (1.0, 2.0, 5.0, 10.0) if length <= step * unit * 1.000001)

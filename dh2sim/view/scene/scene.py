@@ -32,7 +32,7 @@ from dh2sim.view.scene.items import (
     vector,
 )
 from dh2sim.view.scene.labels import spread_labels
-from dh2sim.view.scene.link_poses import poses_at, robot_size, triad_length
+from dh2sim.view.scene.link_poses import poses_at, robot_size, round_length, triad_length
 from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids
 from dh2sim.view.state import Goal, LinkDrag, Part, ViewState
 
@@ -214,7 +214,7 @@ def _link_pose(model: RobotModel, q: ArrayLike, link: str) -> Array:
 @lru_cache(maxsize=8)  # the lines are the same in every picture
 def _grid(size: float) -> Mapping[str, Item]:
     """Return lines on the ground, a round number of metres apart."""
-    cell = _round_length(2.6 * size / _CELLS)
+    cell = round_length(2.6 * size / _CELLS)
     half = 0.5 * _CELLS * cell
     places = [-half + k * cell for k in range(_CELLS + 1)]
     middle = places.pop(_CELLS // 2)
@@ -228,9 +228,3 @@ def _crosses(places: Iterable[float], half: float) -> Iterator[tuple[Vector, Vec
     for at in places:
         yield (at, -half, 0.0), (at, half, 0.0)
         yield (-half, at, 0.0), (half, at, 0.0)
-
-
-def _round_length(length: float) -> float:
-    """Return 1, 2 or 5 times a power of ten, about as long."""
-    unit = 10.0 ** math.floor(math.log10(length))
-    return next(step * unit for step in (1.0, 2.0, 5.0, 10.0) if length <= step * unit * 1.000001)
