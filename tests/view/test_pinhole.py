@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from dh2sim.draw.projection import Pinhole
 from dh2sim.typing import Array
-from dh2sim.view.scene.pinhole import pinhole_of
+from dh2sim.view.scene.camera import pinhole_of
 
 
 @dataclass

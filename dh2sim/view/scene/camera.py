@@ -20,7 +20,6 @@ from dh2sim.typing import Array
 from dh2sim.view.events import SetCamera
 from dh2sim.view.scene.items import Vector, vector
 from dh2sim.view.scene.link_poses import frame_origins, poses_at, robot_size
-from dh2sim.view.scene.pinhole import pinhole_of
 from dh2sim.view.scene.solids import mesh_triangles
 
 if TYPE_CHECKING:
@@ -77,6 +76,24 @@ def aim(camera: viser.CameraHandle | viser.InitialCameraConfig, model: RobotMode
     camera.fov = FIELD_OF_VIEW
     camera.position = viewpoint.position
     camera.look_at = viewpoint.look_at
+
+
+def pinhole_of(camera: viser.CameraHandle) -> Pinhole | None:
+    """Return the model of a page's camera, or None if the browser sent nothing usable.
+
+    viser's cameras follow OpenCV: x to the right, y down, z ahead. The unit quaternion (w, v) turns a vector
+    x into x + 2 v × (v × x + w x).
+    """
+    height, field_of_view = float(camera.image_height), float(camera.fov)
+    if not (height > 0.0 and 0.0 < field_of_view < math.pi):
+        return None
+    pinhole = Pinhole(
+        position=vector(camera.position),
+        right=vector(_rotated(camera.wxyz, (1.0, 0.0, 0.0))),
+        up=vector(_rotated(camera.wxyz, (0.0, -1.0, 0.0))),
+        focal=0.5 * height / math.tan(0.5 * field_of_view),
+    )
+    return pinhole if pinhole.is_usable else None
 
 
 class CameraWatch:
@@ -155,3 +172,8 @@ def _box(mesh: MeshAsset) -> Array:
 
 def _transformed(T: Array, points: ArrayLike) -> Array:
     return np.asarray(points) @ T[:3, :3].T + T[:3, 3]
+
+
+def _rotated(wxyz: Array, x: Vector) -> Array:
+    w, v = wxyz[0], wxyz[1:]
+    return np.asarray(np.array(x) + 2.0 * np.cross(v, np.cross(v, x) + w * np.array(x)))
