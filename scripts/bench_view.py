@@ -246,8 +246,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=2.0, help="of clicking at random")
     parser.add_argument("--only", action="append", choices=PARTS, help="a part to be measured; may be repeated")
-    wish = parser.parse_args()
-    for what, figure, target, met in view(wish.minutes, wish.only or PARTS):
+    arguments = parser.parse_args()
+    for what, figure, target, met in view(arguments.minutes, arguments.only or PARTS):
         words = {True: "met", False: "MISSED", None: ""}[met]
         print(f"{what}: {figure}; target {target or 'none'} {words}".rstrip(), flush=True)
     print(f"load: {' '.join(f'{load:.1f}' for load in os.getloadavg())}")

@@ -107,6 +107,7 @@ def test_a_command_without_its_extra_says_how_to_install_it(
     assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "extra"),
     [
@@ -121,7 +122,8 @@ def test_the_library_without_an_extra_says_how_to_install_it(folder: Path, code:
     assert last.endswith(f" needs the extra '{extra}': pip install 'dh2sim[{extra}]'")
 
 
-def test_a_run_is_simulated_before_nothing_that_is_missing(folder: Path) -> None:
+@pytest.mark.slow
+def test_nothing_is_simulated_that_could_not_be_returned(folder: Path) -> None:
     code = "from dh2sim.simulate import rollout; rollout('rpr', out='late.zarr', rollouts=1, steps=2)"
     assert Blocked({"xarray"}, folder).python(code).status == 1
     assert not (folder / "late.zarr").exists()

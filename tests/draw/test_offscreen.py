@@ -12,6 +12,8 @@ import pytest
 
 from tests.program import Outcome, environment
 
+pytestmark = pytest.mark.slow
+
 WITHOUT = """
 import ctypes, ctypes.util, os
 gone = [name for name in os.environ.get("GONE", "").split(",") if name]
