@@ -64,8 +64,8 @@ def new(
       dh2sim new my_arm --joints RRR --convention modified
       dh2sim new my_arm --from stanford -o robots/my_arm.yaml
     """
-    from dh2sim.robot.read import parse_robot
     from dh2sim.robot.fields import name_problem
+    from dh2sim.robot.read import parse_robot
     from dh2sim.robot.spec import Convention
 
     name = name.removesuffix(".yaml")

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Measure what dh2sim and each of its extras take on the disk.
 
-    scripts/install_sizes                 core, every extra and all (several minutes, several GB of temporary files)
-    scripts/install_sizes view plot       only these, and core
-    scripts/install_sizes --write         write the table into docs/dependencies.md
+    scripts/install_sizes.py               core, every extra and all (minutes, and GB of temporary files)
+    scripts/install_sizes.py view plot     only these, and core
+    scripts/install_sizes.py --write       write the table into docs/dependencies.md
 
 Each is installed in a fresh virtual environment. Counted are the files of the installed distributions, as their
 wheels unpack; compiled bytecode, pip and the environment itself come on top.
