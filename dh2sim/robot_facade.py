@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError, OutputError
 from dh2sim.messages import did_you_mean, listed, member, shown
+from dh2sim.robot.configurations import named_configurations
 from dh2sim.robot.spec import (
     ActuatorSpec,
     AngleUnit,
@@ -303,8 +304,7 @@ class Robot:
     @cached_property
     def configurations(self) -> Mapping[str, Array]:
         """Named joint vectors, rad and m, each of shape (n,): ``zero``, ``home`` and those of the robot file."""
-        home = self.model.home  # 'home' of the file, or zero moved inside the limits
-        return MappingProxyType({"zero": read_only([0.0] * self.n), **self.spec.configurations, "home": home})
+        return named_configurations(self.spec)
 
     @cached_property
     def limits(self) -> tuple[Array, Array]:

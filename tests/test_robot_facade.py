@@ -74,18 +74,18 @@ def test_kinematics_take_any_batch_and_agree_with_the_functions(name: str) -> No
 
 
 def test_a_configuration_is_given_by_its_name(arm: Robot) -> None:
-    assert list(arm.configurations) == ["zero", "out", "home"]
+    assert list(arm.configurations) == ["home", "zero", "out"]
     assert np.array_equal(arm.fk("out"), arm.fk([0.0, 1.0, 1.2]))
     assert np.array_equal(arm.fk("home"), arm.fk([0.0, 0.0, 0.1]))
     with pytest.raises(ConfigurationError) as caught:
         arm.jacobian("hme")
     assert str(caught.value) == (
-        "my_arm has no configuration 'hme'. Did you mean 'home'? Configurations: zero, out, home"
+        "my_arm has no configuration 'hme'. Did you mean 'home'? Configurations: home, zero, out"
     )
 
 
 def test_an_unknown_frame_and_a_wrong_joint_vector_are_named(arm: Robot) -> None:
-    with pytest.raises(UnknownFrameError, match="there is no frame 'dh_4'"):
+    with pytest.raises(UnknownFrameError, match="unknown frame 'dh_4'"):
         arm.fk([0.0, 0.0, 0.2], frame="dh_4")
     with pytest.raises(ConfigurationError, match="expected 3 joint coordinates"):
         arm.fk([0.0, 0.0])

@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 def export(
     robots: RobotsArgument,
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Where to write; every robot gets a folder of its own.")
+        Path, typer.Option(metavar="DIR", help="Folder to write to; each robot gets a folder of its own in it.")
     ] = Path("generated"),
     formats: Annotated[
         list[str] | None,
-        typer.Option("--format", metavar="urdf|mjcf", help="What to write; may be repeated. [default: both]"),
+        typer.Option("--format", metavar="urdf|mjcf", help="Format to write; may be repeated. [default: both]"),
     ] = None,
     check: Annotated[
         bool,
-        typer.Option("--check", help="Write nothing; compare with the files that are there, exit 1 if they differ."),
+        typer.Option("--check", help="Write nothing; exit with status 1 if the existing files are out of date."),
     ] = False,
     no_verify: Annotated[
         bool, typer.Option("--no-verify", help="Do not compare the written files with the table.")
@@ -41,7 +41,7 @@ def export(
     """Write a robot as URDF and MJCF, and verify them against its table.
 
     The poses that MuJoCo reads from the written files are compared with the textbook product of the table before the
-    files are put in place. The files of a robot are written all together or not at all.
+    files are moved into place. The files of a robot are written all together or not at all.
 
     \b
     Examples:
@@ -74,7 +74,7 @@ def _formats(names: list[str] | None) -> list[Format]:
     wanted = []
     for name in names or [format_.value for format_ in Format]:
         if name not in list(Format):
-            raise typer.BadParameter(f"'{name}' is no format. Allowed: urdf, mjcf", param_hint="--format")
+            raise typer.BadParameter(f"unknown format '{name}'; allowed are urdf, mjcf", param_hint="--format")
         wanted.append(Format(name))
     return list(dict.fromkeys(wanted))
 

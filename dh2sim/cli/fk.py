@@ -31,7 +31,9 @@ VELOCITIES = ("vx", "vy", "vz", "wx", "wy", "wz")
 def fk(
     robot: RobotArgument,
     q: QArgument = None,
-    frame: Annotated[str | None, typer.Option(help=f"{FRAMES} [default: tool0]", show_default=False)] = None,
+    frame: Annotated[
+        str | None, typer.Option(metavar="FRAME", help=f"{FRAMES} [default: tool0]", show_default=False)
+    ] = None,
     source: Annotated[
         str | None,
         typer.Option("--from", metavar="FRAME", help="Frame that the pose is given in. [default: base_link]"),
@@ -134,7 +136,7 @@ def _print_rows(spec: RobotSpec, chain: KinematicChain, vector: JointVector, *, 
 def jacobian(
     robot: RobotArgument,
     q: QArgument = None,
-    frame: Annotated[str, typer.Option(help=FRAMES)] = "tool0",
+    frame: Annotated[str, typer.Option(metavar="FRAME", help=FRAMES)] = "tool0",
     degrees: DegreesOption = False,
     radians: RadiansOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in rad and m.")] = False,
@@ -142,8 +144,8 @@ def jacobian(
     """Print the Jacobian of a frame in base_link, and how close it is to singular.
 
     Its rows are the velocity of the frame's origin and the angular velocity of the frame, its columns the joints.
-    At a singular configuration the joint motions that leave the frame still are printed, and the velocities that
-    it has lost. A robot with more than six joints has self-motions everywhere.
+    At a singular configuration the joint motions that do not move the frame and the velocities that the frame
+    cannot have are printed. A robot with more than six joints has self-motions everywhere.
 
     \b
     Examples:

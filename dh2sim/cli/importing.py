@@ -1,9 +1,4 @@
-"""``dh2sim convert``.
-
-``dh2sim import``.
-
-``dh2sim frames``.
-"""
+"""``dh2sim import``, ``convert`` and ``frames``: the commands that make robot files from something else."""
 
 from __future__ import annotations
 
@@ -27,40 +22,49 @@ if TYPE_CHECKING:
 
 def import_robot(
     file: Annotated[
-        str, typer.Argument(metavar="FILE", help="URDF, MJCF, or a table in Markdown, CSV or TSV; - reads a table.")
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="A URDF, an MJCF, or a table in Markdown, CSV or TSV; - reads a table from standard input.",
+        ),
     ],
     base: Annotated[
-        str | None, typer.Option(metavar="LINK", help="What becomes base_link. [default: the root]")
+        str | None, typer.Option(metavar="LINK", help="Link that becomes base_link. [default: the root]")
     ] = None,
     tip: Annotated[
-        str | None, typer.Option(metavar="LINK|SITE", help="What becomes tool0. [default: where the arm ends]")
+        str | None,
+        typer.Option(metavar="LINK|SITE", help="Link or site that becomes tool0. [default: where the arm ends]"),
     ] = None,
     convention: Annotated[
         str | None,
-        typer.Option(metavar="standard|modified", help="Of the table made (default standard), or of the table read."),
+        typer.Option(
+            metavar="standard|modified", help="Convention of the table to make (default standard) or to read."
+        ),
     ] = None,
     angle: Annotated[str | None, typer.Option(metavar="deg|rad", help="Unit of a table's angles.")] = None,
     length: Annotated[str | None, typer.Option(metavar="m|mm|cm|in", help="Unit of a table's lengths.")] = None,
     tolerance: Annotated[
-        float, typer.Option(metavar="T", help="Greatest residual, rad and m; numbers within it are made simple.")
+        float, typer.Option(metavar="T", help="Largest residual, rad and m; numbers are rounded as far as it allows.")
     ] = 1e-9,
     package_path: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FOLDER", help="Where package:// is looked for; may be repeated."),
+        typer.Option(metavar="FOLDER", help="Folder to find package:// in; may be repeated."),
     ] = None,
-    name: Annotated[str | None, typer.Option(help="Name of the robot. [default: the file's]")] = None,
+    name: Annotated[str | None, typer.Option(metavar="NAME", help="Name of the robot. [default: the file's]")] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="Write it there. [default: print it]")
+        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="File to write. [default: print it]")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Write over a file that exists.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the robot file, and errors.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print nothing but the robot file and errors.")
+    ] = False,
 ) -> None:
-    """Make a robot file of a URDF, an MJCF, or a table.
+    """Make a robot file from a URDF, an MJCF, or a table.
 
-    A URDF's or MJCF's joints become DH rows, whatever way their axes lie. All joint axes and the tip are
-    compared with the file's own kinematics at 1000 random configurations; a residual above the tolerance is an
-    error. Limits, masses, inertias and meshes come along; what cannot is listed. Where axes are nearly parallel
-    the row is Hayati's. Angles such as 1.5708 become 90 degrees with --tolerance 1e-4.
+    The joints of a URDF or an MJCF become DH rows, however their axes lie; where axes are nearly parallel, Hayati's
+    row is used. All joint axes and the tip are compared with the file's own kinematics at 1000 random
+    configurations, and a residual above the tolerance is an error. Limits, masses, inertias and meshes are kept;
+    what cannot be is listed. With --tolerance 1e-4 angles such as 1.5708 become 90 degrees.
 
     \b
     Examples:
@@ -116,25 +120,31 @@ def summary(imported: Imported) -> str:
 
 
 def frames(
-    axes: Annotated[str, typer.Argument(metavar="AXES.yaml", help="Joint axes: points and directions.")],
+    axes: Annotated[str, typer.Argument(metavar="AXES.yaml", help="File of joint axes: points and directions.")],
     convention: Annotated[
-        str | None, typer.Option(metavar="standard|modified", help="Of the table. [default: the file's, or standard]")
+        str | None,
+        typer.Option(metavar="standard|modified", help="Convention of the table. [default: the file's, or standard]"),
     ] = None,
     explain: Annotated[
-        bool, typer.Option("--explain", help="Tell every step at the head of the robot file, and draw the frames.")
+        bool, typer.Option("--explain", help="Explain every step at the head of the robot file, and draw the frames.")
     ] = False,
     picture: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw them: .svg, .png or .pdf. [with --explain: NAME-frames.svg]"),
+        typer.Option(
+            metavar="FILE",
+            help="Picture of the frames: .svg, .png or .pdf. [default with --explain: NAME-frames.svg]",
+        ),
     ] = None,
     tolerance: Annotated[
-        float, typer.Option(metavar="T", help="Greatest residual, rad and m; numbers within it are made simple.")
+        float, typer.Option(metavar="T", help="Largest residual, rad and m; numbers are rounded as far as it allows.")
     ] = 1e-9,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="Write it there. [default: print it]")
+        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="File to write. [default: print it]")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Write over files that exist.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the robot file, and errors.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print nothing but the robot file and errors.")
+    ] = False,
 ) -> None:
     """Assign DH frames to joint axes, step by step as in a textbook.
 
@@ -147,7 +157,7 @@ def frames(
         - {type: prismatic, direction: [1, 0, 0]}
       tool: {xyz: [0.5, 0, 0.2]}
 
-    Every case is met: axes that intersect, are parallel, antiparallel, coincident, skew or nearly parallel.
+    Axes may intersect, be parallel, antiparallel, coincident, skew or nearly parallel.
 
     \b
     Examples:
@@ -192,17 +202,19 @@ def _require_frame_figure(path: Path) -> None:
 
 def convert(
     robot: RobotArgument,
-    to: Annotated[str, typer.Option(metavar="standard|modified", help="The convention wanted.")],
+    to: Annotated[str, typer.Option(metavar="standard|modified", help="Convention to convert to.")],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="Write it there. [default: print it]")
+        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="File to write. [default: print it]")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Write over a file that exists.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the robot file, and errors.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print nothing but the robot file and errors.")
+    ] = False,
 ) -> None:
     """Write a robot's table in the other convention.
 
-    a and alpha move by one row; what they leave over at the ends goes to base and tool. The arm stays the same:
-    poses of tool0 are compared at 1000 configurations. DH frames 1 to n do not: masses and meshes are moved along.
+    a and alpha move by one row; what is left over at the ends goes to base and tool. The arm stays the same, which
+    is checked at 1000 configurations. Its DH frames 1 to n change; masses and meshes are moved with them.
 
     \b
     Examples:

@@ -25,7 +25,7 @@ def info(
     robot: RobotArgument,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in m, rad, kg.")] = False,
     srdf: Annotated[
-        bool, typer.Option("--srdf", help="Print the pairs of links that do not collide, as in an SRDF, too.")
+        bool, typer.Option("--srdf", help="Also print the pairs of links that do not collide, as in an SRDF.")
     ] = False,
 ) -> None:
     """Print a robot's table as in a textbook, its frames at home, mass and reach, and what is estimated.

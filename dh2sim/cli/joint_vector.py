@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,7 +19,7 @@ QArgument = Annotated[
     typer.Argument(
         metavar="Q",
         help="Joint coordinates in the robot file's units, or the name of a configuration such as home or zero. "
-        "Expressions such as pi/2 are allowed, and so are commas and [ ].",
+        "May contain expressions such as pi/2, commas and brackets.",
     ),
 ]
 DegreesOption = Annotated[bool, typer.Option("--degrees", help="Read Q in deg and m.")]
@@ -62,6 +62,7 @@ def read_joint_vector(
     Raises:
         ConfigurationError: The number of coordinates is wrong, one is not a number, or a name is unknown.
     """
+    from dh2sim.robot.configurations import named_configurations
     from dh2sim.robot.spec import AngleUnit, Units
 
     if degrees and radians:
@@ -71,7 +72,7 @@ def read_joint_vector(
     known = named_configurations(spec)
     rows = spec.moving_rows
     if len(words) == 1 and words[0] in known:
-        vector = JointVector(q=known[words[0]], name=words[0], units=units, rows=rows)
+        vector = JointVector(q=tuple(known[words[0]].tolist()), name=words[0], units=units, rows=rows)
     else:
         for word in words:
             if word.startswith("--"):
@@ -81,14 +82,6 @@ def read_joint_vector(
         vector = JointVector(q=_coordinates(spec, words, units), name="", units=units, rows=rows)
     _warn_outside(vector)
     return vector
-
-
-def named_configurations(spec: RobotSpec) -> Mapping[str, tuple[float, ...]]:
-    """Return the configurations that have a name, rad and m: home and zero, which every robot has, and the file's."""
-    limits = [row.limits.position or (0.0, 0.0) for row in spec.moving_rows]
-    home = tuple(max(lower, 0.0) if lower > 0.0 else min(upper, 0.0) for lower, upper in limits)
-    given = {name: tuple(float(x) for x in vector) for name, vector in spec.configurations.items()}
-    return {"home": home, "zero": (0.0,) * len(limits), **given}
 
 
 def _coordinates(spec: RobotSpec, words: Sequence[str], units: Units) -> tuple[float, ...]:
@@ -136,6 +129,7 @@ def _split_outside_parentheses(text: str, separators: str) -> list[str]:
 
 def _wrong_count(spec: RobotSpec, words: Sequence[str], parts: Sequence[str], units: Units) -> str:
     from dh2sim.messages import did_you_mean, listed, shown
+    from dh2sim.robot.configurations import named_configurations
 
     rows = spec.moving_rows
     names = ", ".join(f"{row.name} ({_unit(row, units)})" for row in rows)

@@ -27,7 +27,9 @@ def render(
             metavar="RUN.zarr|ROBOT", help="A run, or a robot: a file, or the name of one that comes with dh2sim."
         ),
     ],
-    rollout: Annotated[int | None, typer.Option(help="Number of the rollout, from 0. [default: 0]")] = None,
+    rollout: Annotated[
+        int | None, typer.Option(metavar="N", help="Number of the rollout, from 0. [default: 0]")
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -49,10 +51,10 @@ def render(
     frames: Annotated[bool, typer.Option("--frames", help="Show the DH frames: x red, y green, z blue.")] = False,
     trace: Annotated[bool, typer.Option("--trace/--no-trace", help="Show the path of tool0.")] = True,
     fps: Annotated[
-        float | None, typer.Option(help=f"Pictures per second. [default: {FPS:g}, .gif: {GIF_FPS:g}]")
+        float | None, typer.Option(metavar="X", help=f"Pictures per second. [default: {FPS:g}, .gif: {GIF_FPS:g}]")
     ] = None,
     speed: Annotated[
-        float | None, typer.Option(help="Speed of the video; below 1 is slow motion. [default: 1]")
+        float | None, typer.Option(metavar="X", help="Speed of the video; below 1 is slow motion. [default: 1]")
     ] = None,
     time: Annotated[
         float | None, typer.Option(metavar="S", help="Time shown by a .png of a run, in seconds. [default: the end]")
@@ -160,7 +162,7 @@ def _refuse(what: str, options: dict[str, object]) -> None:
 
 def plot(
     run: Annotated[Path, typer.Argument(metavar="RUN.zarr", help="A run written by 'dh2sim rollout'.")],
-    rollout: Annotated[int, typer.Option(help="Number of the rollout, from 0.")] = 0,
+    rollout: Annotated[int, typer.Option(metavar="N", help="Number of the rollout, from 0.")] = 0,
     what: Annotated[str, typer.Option(metavar="joints|tool|energy|tracking", help="What to plot.")] = "joints",
     out: Annotated[
         Path | None,
@@ -169,7 +171,9 @@ def plot(
     size: Annotated[
         str | None, typer.Option(metavar="WIDTHxHEIGHT", help="Size in pixels. [default: depends on the plot]")
     ] = None,
-    dpi: Annotated[float, typer.Option(min=30, max=1200, help="Pixels per inch; more make text larger.")] = 150.0,
+    dpi: Annotated[
+        float, typer.Option(min=30, max=1200, metavar="X", help="Pixels per inch; more make text larger.")
+    ] = 150.0,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Plot a rollout.

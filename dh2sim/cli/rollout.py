@@ -27,20 +27,25 @@ if TYPE_CHECKING:
 
 def rollout(
     robot: RobotArgument,
-    out: Annotated[Path, typer.Option(metavar="RUN.zarr", help="Where to write the run.")],
-    rollouts: Annotated[int, typer.Option(help="How many rollouts.")] = 256,
+    out: Annotated[Path, typer.Option(metavar="RUN.zarr", help="Folder to write the run to.")],
+    rollouts: Annotated[int, typer.Option(metavar="N", help="Number of rollouts.")] = 256,
     duration: Annotated[
-        float | None, typer.Option(metavar="S", help="Length of each, in seconds; 2 if --steps is not given either.")
+        float | None,
+        typer.Option(metavar="S", help="Duration of each rollout, s. [default: 2, unless --steps is given]"),
     ] = None,
-    steps: Annotated[int | None, typer.Option(metavar="K", help="Length of each, in time steps.")] = None,
-    timestep: Annotated[float, typer.Option(metavar="S", help="Seconds.")] = 0.002,
-    integrator: Annotated[str, typer.Option(help="Euler, RK4, implicit or implicitfast.")] = "implicitfast",
+    steps: Annotated[
+        int | None, typer.Option(metavar="K", help="Length of each rollout in time steps, in place of --duration.")
+    ] = None,
+    timestep: Annotated[float, typer.Option(metavar="S", help="Time step, s.")] = 0.002,
+    integrator: Annotated[
+        str, typer.Option(metavar="NAME", help="Euler, RK4, implicit or implicitfast.")
+    ] = "implicitfast",
     controller: Annotated[
         str,
         typer.Option(
             metavar="NAME[:key=value,…]",
             help="passive, hold, gravity-compensation, pd, computed-torque, sine, random, replay, "
-            "or MODULE:NAME of your own.",
+            "or your own MODULE:NAME.",
         ),
     ] = "sine",
     start: Annotated[
@@ -50,33 +55,36 @@ def rollout(
             help="home, zero, random, a configuration of the robot file, or a .csv or .npy file of joint positions.",
         ),
     ] = "home",
-    seed: Annotated[int, typer.Option(help="Of all random numbers.")] = 0,
-    threads: Annotated[int, typer.Option(min=0, max=1024, help="0: one for each processor.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random number generator.")] = 0,
+    threads: Annotated[
+        int, typer.Option(min=0, max=1024, metavar="N", help="Number of threads; 0: one for each processor.")
+    ] = 0,
     record: Annotated[
         str,
         typer.Option(
             metavar="NAMES",
-            help="Of qpos, qvel, ctrl, tool_pose, reference, qacc, torque, energy, contacts; separated by commas.",
+            help="What to record, separated by commas: qpos, qvel, ctrl, tool_pose, reference, qacc, torque, energy, "
+            "contacts.",
         ),
     ] = "qpos,qvel,ctrl,tool_pose,reference",
-    every: Annotated[int, typer.Option(help="Record a state in so many.")] = 1,
+    every: Annotated[int, typer.Option(metavar="N", help="Record every N-th state.")] = 1,
     randomize: Annotated[
         str,
         typer.Option(
             metavar="NAME=X,…",
-            help="Multiply mass, friction, damping, armature or gain by 1 - X to 1 + X, another factor for every "
-            "link or joint of every rollout.",
+            help="Multiply mass, friction, damping, armature or gain by a random factor from 1 - X to 1 + X, for "
+            "each link or joint of each rollout.",
         ),
     ] = "",
-    floating_base: Annotated[bool, typer.Option("--floating-base", help="Let base_link float.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Carry on with an interrupted run, or begin it.")] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the run that stands there.")] = False,
+    floating_base: Annotated[bool, typer.Option("--floating-base", help="Let base_link move freely.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted run, or start it.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing run.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> int:
     """Simulate many rollouts in MuJoCo and write them as a dataset.
 
-    The same seed gives the same bits, whatever the number of threads and after any interruption: Ctrl-C finishes the
-    rollouts at hand, and --resume carries on. Rollouts that become unstable stop alone and are marked.
+    The same seed gives the same bits, with any number of threads and after any interruption: Ctrl-C finishes the
+    rollouts in progress, and --resume continues. Unstable rollouts are stopped one by one, and marked.
 
     \b
     Examples:
@@ -85,7 +93,7 @@ def rollout(
       dh2sim rollout my_arm.yaml --out run.zarr --rollouts 100000 --resume
       dh2sim rollout puma560 --out run.zarr --randomize mass=0.2
     Then:
-      dh2sim runs run.zarr               what it holds
+      dh2sim runs run.zarr               what it contains
       dh2sim plot run.zarr --what joints
       dh2sim render run.zarr
     """
@@ -122,8 +130,8 @@ def rollout(
     if progress.finished:
         return 0
     print(
-        f"dh2sim: interrupted; {summary.rollouts - summary.not_run:,} of {rollouts:,} rollouts are safe in {out}. "
-        "Carry on with the same command and --resume",
+        f"dh2sim: interrupted; {summary.rollouts - summary.not_run:,} of {rollouts:,} rollouts are saved in {out}. "
+        "Continue with the same command and --resume",
         file=sys.stderr,
     )
     return INTERRUPTED if patience.arrived == signal.SIGINT else 128 + int(patience.arrived or 0)
@@ -157,7 +165,7 @@ class _Patience:
 
 @contextmanager
 def _patient(quiet: bool) -> Iterator[_Patience]:
-    """Let a first SIGINT or SIGTERM wait until the rollouts at hand are safe; a second one is dealt with at once."""
+    """Let a first SIGINT or SIGTERM wait until the rollouts in progress are saved; a second one stops at once."""
     patience = _Patience()
     previous: dict[signal.Signals, Callable[[int, FrameType | None], None] | int | None] = {}
 
@@ -166,7 +174,7 @@ def _patient(quiet: bool) -> Iterator[_Patience]:
         for kind, handler in previous.items():
             signal.signal(kind, signal.SIG_DFL if handler is None else handler)
         if not quiet:
-            print("dh2sim: finishing the rollouts at hand; once more ends at once", file=sys.stderr)
+            print("dh2sim: finishing the rollouts in progress; interrupt again to stop at once", file=sys.stderr)
 
     for kind in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(kind) is not signal.SIG_IGN:
@@ -189,7 +197,7 @@ def _tell(job: Job, summary: RunDescription, progress: Progress, out: Path) -> N
         took = f"{progress.seconds:.1f}" if progress.seconds >= 1.0 else f"{progress.seconds:.2g}"
         print(f"  simulated {progress.rollouts:,} in {took} s: {rate:,.0f} steps/s")
     else:
-        print("  all of them were there already")
+        print("  all of them were simulated before")
     recorded = [each.name for each in job.layout.variables if {"step", "interval"} & {*each.dimensions}]
     print(f"  recorded {', '.join(recorded)}: {size_text(summary.bytes_on_disk)}")
     counts = [f"finished {summary.finished:,}"]

@@ -31,24 +31,22 @@ def runs(
         bool, typer.Option("--json", help="Print JSON alone: an object for one run, a list for several.")
     ] = False,
     to: Annotated[
-        str | None, typer.Option("--to", metavar="parquet|hdf5", help="Convert, instead of telling what a run holds.")
+        str | None, typer.Option("--to", metavar="parquet|hdf5", help="Convert to this format instead of describing.")
     ] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="File to write. [default: RUN.parquet or RUN.h5, beside the run]"),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that exist.")] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="No progress bar, and not a word of files written.")
-    ] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite existing files.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Tell what runs hold, or convert them to other formats.
+    """Describe runs, or convert them to other formats.
 
-    Told are robot, controller, how many rollouts there are and which stopped early, what is recorded, size, speed and
-    versions; of a run that is not complete also how to carry on with it.
+    Prints robot, controller, the number of rollouts and which of them stopped early, what is recorded, size, speed
+    and versions, and how to continue a run that is not complete.
 
-    Parquet becomes three tables: FILE has a row for every rollout, step and joint, and beside it stand FILE's
-    .steps.parquet and .rollouts.parquet. HDF5 becomes one file, which xarray reads as the same dataset (netCDF-4).
+    Parquet makes three tables: FILE has a row for every rollout, step and joint, and beside it are FILE's
+    .steps.parquet and .rollouts.parquet. HDF5 makes one file, which xarray reads as the same dataset (netCDF-4).
 
     \b
     Examples:
@@ -65,11 +63,11 @@ def runs(
         return
     if to not in FORMATS:
         guess = did_you_mean(to, FORMATS)
-        raise typer.BadParameter(f"'{to}' is no format.{guess} Allowed: {', '.join(FORMATS)}", param_hint="--to")
+        raise typer.BadParameter(f"unknown format '{to}'.{guess} Allowed: {', '.join(FORMATS)}", param_hint="--to")
     if as_json:
-        raise typer.BadParameter("goes without --to", param_hint="--json")
+        raise typer.BadParameter("not with --to", param_hint="--json")
     if out is not None and len(paths) > 1:
-        raise typer.BadParameter("names one file, for one run", param_hint="--out")
+        raise typer.BadParameter("is one file; convert one run at a time", param_hint="--out")
     _convert(paths, to, out, overwrite=overwrite, quiet=quiet)
 
 

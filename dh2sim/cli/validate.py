@@ -27,34 +27,44 @@ if TYPE_CHECKING:
 
 def validate(
     robots: RobotsArgument,
-    samples: Annotated[int, typer.Option(min=1, max=10**8, help="Random configurations, inside the limits.")] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random configurations.")] = 0,
+    samples: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            max=10**8,
+            metavar="N",
+            help="Number of random configurations, inside the limits.",
+        ),
+    ] = 1000,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the random configurations.")] = 0,
     tolerance: Annotated[
         float,
-        typer.Option(help="Allowed angle, rad, and distance as a share of the larger of 1 m and the reach."),
+        typer.Option(
+            metavar="T", help="Largest error: an angle in rad, a distance as a fraction of the reach or of 1 m."
+        ),
     ] = 1e-12,
     dynamics: Annotated[
         bool,
         typer.Option(
             "--dynamics",
-            help="Simulate, too: energy, momentum, rest, tracking, inverse dynamics, self-contact.",
+            help="Simulate the robot, too: energy, momentum, rest, tracking, inverse dynamics, self-contact.",
         ),
     ] = False,
     folder: Annotated[
         Path | None,
-        typer.Option("--dir", metavar="DIR", help="Read the files in DIR/<name>/ instead of exporting afresh."),
+        typer.Option("--dir", metavar="DIR", help="Check the files in DIR/<name>/ instead of a new export."),
     ] = None,
     json_file: Annotated[
         str | None,
-        typer.Option("--json", metavar="FILE|-", help="Write the report as JSON; - prints it, and nothing else."),
+        typer.Option("--json", metavar="FILE|-", help="Write the report as JSON; - prints it alone."),
     ] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the report as JUnit XML.")] = None,
 ) -> int:
     """Check every engine against the table: poses, Jacobians and dynamics.
 
-    Compared are the library itself, MuJoCo on the MJCF and on the URDF, yourdfpy, and pinocchio where it is
-    installed. With --dynamics the robot is simulated as by 'dh2sim rollout', and must move as physics has it.
-    Exit status 1 if anything differs by more than rounding, or by more than a simulation may.
+    The engines are dh2sim itself, MuJoCo on the MJCF and on the URDF, and yourdfpy and pinocchio where they are
+    installed. With --dynamics the robot is also simulated, and its motion is checked against the laws of physics.
+    The exit status is 1 if anything differs by more than the tolerance.
 
     \b
     Examples:

@@ -31,7 +31,7 @@ def view(
         int, typer.Option(min=1, max=65535, metavar="N", help="Port, or the next free one.")
     ] = DEFAULT_PORT,
     host: Annotated[
-        str, typer.Option(help="Address to listen at; by default only this machine can reach it.")
+        str, typer.Option(metavar="ADDRESS", help="Address to listen at; by default only this machine can reach it.")
     ] = "127.0.0.1",
     share: Annotated[str, typer.Option(metavar="never", help="Pages are never shared over the internet.")] = NEVER,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
@@ -39,7 +39,7 @@ def view(
         Path | None, typer.Option(metavar="PAGE.html", help="Write a page that needs no server, and exit.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Let --export replace an existing file.")] = False,
-    rollout: Annotated[int, typer.Option(help="Rollout of the run to export, from 0.")] = 0,
+    rollout: Annotated[int, typer.Option(metavar="N", help="Rollout of the run to export, counted from 0.")] = 0,
 ) -> None:
     """Show a robot in the browser: move its joints, edit its table, read its poses.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from dh2sim.errors import PictureError
 from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.robot.configurations import named_configurations
 from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:
@@ -112,13 +113,10 @@ def motion_of_robot(robot: RobotModel, configuration: str | None = None) -> Moti
     from dh2sim.formats.mjcf.scene import to_scene
     from dh2sim.formats.mjcf.write import to_mjcf
 
-    configurations = robot.spec.configurations
-    if configuration is None:
-        q = robot.home
-    elif configuration in configurations:
-        q = np.asarray(configurations[configuration], dtype=float)
-    else:
-        hint = did_you_mean(configuration, configurations)
+    configurations = named_configurations(robot.spec)
+    q = configurations.get("home" if configuration is None else configuration)
+    if q is None:
+        hint = did_you_mean(str(configuration), configurations)
         raise PictureError(
             f"{robot.name} has no configuration {shown(configuration)}.{hint} Configurations: "
             f"{listed(configurations)}"

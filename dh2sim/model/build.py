@@ -8,14 +8,14 @@ from typing import Protocol, TypeAlias
 from dh2sim.kinematics.chain import HasChain, Joint, KinematicChain, SpecLike, build_chain, spec_of
 from dh2sim.model.actuators import actuator_model, seen_inertias
 from dh2sim.model.collision_exclusions import excluded_pairs
-from dh2sim.model.limits import Range, clamped, filled_limits, load_bound, position_ranges, reach_bound
+from dh2sim.model.limits import Range, filled_limits, load_bound, position_ranges, reach_bound
 from dh2sim.model.link_shapes import lay_out, link_scale, neat
 from dh2sim.model.mass import link_inertial
 from dh2sim.model.meshes import load_mesh
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape
+from dh2sim.robot.configurations import named_configurations
 from dh2sim.robot.spec import JointType, RobotSpec, Row
-from dh2sim.typing import Array, read_only
 
 SLENDERNESS = 0.16
 """Radius of the base's shapes as a share of the mean segment."""
@@ -85,8 +85,8 @@ def build_model(spec: SpecLike) -> RobotModel:
         estimated=(),
     )
     bodies = [link.inertial for link in links]
-    home = _home(spec, ranges)
-    zero = read_only([0.0] * chain.n)
+    named = named_configurations(spec)
+    home, zero = named["home"], named["zero"]
     seen = iter(seen_inertias(chain, bodies, home))
     joints = []
     for i, (row, joint, position) in enumerate(zip(spec.rows, chain.joints, ranges, strict=True)):
@@ -106,12 +106,6 @@ def build_model(spec: SpecLike) -> RobotModel:
         reach=reach_bound(chain, spec.rows),
         home=home,
     )
-
-
-def _home(spec: RobotSpec, ranges: Sequence[Range | None]) -> Array:
-    if "home" in spec.configurations:
-        return spec.configurations["home"]
-    return read_only([clamped(0.0, span) for row, span in zip(spec.rows, ranges, strict=True) if row.type.moves])
 
 
 def _shapes(spec: RobotSpec, chain: KinematicChain, ranges: Sequence[Range | None]) -> tuple[tuple[Shape, ...], ...]:

@@ -115,7 +115,7 @@ def test_a_finished_run_has_nothing_to_resume(folder: Path) -> None:
     dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *QUICK)
     run = dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *QUICK, "--resume")
     assert (run.status, run.err) == (0, "")
-    assert run.out.splitlines()[1] == "  all of them were there already"
+    assert run.out.splitlines()[1] == "  all of them were simulated before"
 
 
 def test_every_mistake_is_told_at_once(folder: Path) -> None:

@@ -213,12 +213,12 @@ def test_what_is_no_run_is_told_and_the_others_all_the_same(run: Path) -> None:
     [
         (
             ["--to", "hdf"],
-            "Invalid value for --to: 'hdf' is no format. Did you mean 'hdf5'? Allowed: parquet, hdf5",
+            "Invalid value for --to: unknown format 'hdf'. Did you mean 'hdf5'? Allowed: parquet, hdf5",
         ),
         (["--out", "x"], "Invalid value for --out: only with --to: without it nothing is written"),
         (["--overwrite"], "Invalid value for --overwrite: only with --to: without it nothing is written"),
-        (["--to", "hdf5", "--json"], "Invalid value for --json: goes without --to"),
-        (["b.zarr", "--to", "hdf5", "--out", "x"], "Invalid value for --out: names one file, for one run"),
+        (["--to", "hdf5", "--json"], "Invalid value for --json: not with --to"),
+        (["b.zarr", "--to", "hdf5", "--out", "x"], "Invalid value for --out: is one file; convert one run at a time"),
     ],
     ids=["format", "out", "overwrite", "json", "several"],
 )

@@ -97,7 +97,7 @@ def test_a_robot_is_at_home_or_in_the_configuration_that_is_named() -> None:
     with pytest.raises(PictureError) as caught:
         motion_of_robot(robot, "prnted")
     assert str(caught.value) == (
-        "stanford has no configuration 'prnted'. Did you mean 'printed'? Configurations: zero, printed, home"
+        "stanford has no configuration 'prnted'. Did you mean 'printed'? Configurations: home, zero, printed"
     )
 
 

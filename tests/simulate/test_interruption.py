@@ -127,9 +127,9 @@ def test_an_interrupt_finishes_the_block_at_hand_and_tells_how_to_carry_on(run: 
     assert 0 < safe < ROLLOUTS
     assert safe % BLOCK == 0
     assert err == (
-        "dh2sim: finishing the rollouts at hand; once more ends at once\n"
-        f"dh2sim: interrupted; {safe} of {ROLLOUTS} rollouts are safe in {run}. "
-        "Carry on with the same command and --resume\n"
+        "dh2sim: finishing the rollouts in progress; interrupt again to stop at once\n"
+        f"dh2sim: interrupted; {safe} of {ROLLOUTS} rollouts are saved in {run}. "
+        "Continue with the same command and --resume\n"
     )
     assert f"finished {safe}, not run {ROLLOUTS - safe}" in out
     rest = _finish(run)
@@ -155,7 +155,7 @@ def test_a_second_interrupt_ends_at_once_and_loses_no_committed_block(run: Path,
 def test_a_finished_run_is_left_alone(run: Path, undisturbed: Path) -> None:
     _finish(run)
     before = contents(run)
-    assert "all of them were there already" in _finish(run).out
+    assert "all of them were simulated before" in _finish(run).out
     assert contents(run) == before
 
 
