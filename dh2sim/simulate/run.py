@@ -14,8 +14,7 @@ import numpy as np
 
 from dh2sim.errors import SettingsError
 from dh2sim.extras import require_extra
-from dh2sim.model.build import build_model
-from dh2sim.model.robot_model import RobotModel
+from dh2sim.model.build import ModelLike, model_of
 from dh2sim.robot.read import load_robot
 from dh2sim.simulate.block import Block, Job, simulate_block
 from dh2sim.simulate.dataset_layout import Layout
@@ -59,7 +58,7 @@ class Progress:
 
 
 def rollout(
-    model: RobotModel | str | PathLike[str],
+    robot: ModelLike | str | PathLike[str],
     *,
     out: str | PathLike[str] | None = None,
     threads: int = 0,
@@ -71,7 +70,7 @@ def rollout(
     """Simulate many rollouts of a robot.
 
     Args:
-        model: The robot, or its file or name.
+        robot: The robot, or its file or name.
         out: Folder to write the run to, by convention named ``….zarr``; None to keep it in memory.
         threads: Number of threads, 0 for one a processor. The result does not depend on it.
         resume: Whether to continue the run at ``out``, if there is one.
@@ -94,8 +93,7 @@ def rollout(
     """
     require_extra("data", "xarray", what="a run as an xarray dataset")
     checked = RolloutOptions(**options)
-    if not isinstance(model, RobotModel):
-        model = build_model(load_robot(model))
+    model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
     job = prepare(model, checked)
     if out is None:
         try:

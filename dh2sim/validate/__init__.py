@@ -1,1 +1,1 @@
-"""Does it hold: every engine against the table itself."""
+"""Validation: every engine against the table, and motions against physics."""

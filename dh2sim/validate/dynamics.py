@@ -1,4 +1,4 @@
-"""Dynamics: do the files hold the model's masses, and do the engines make the same equations of motion of them?"""
+"""Dynamics: link inertias in the files, and the equations of motion that engines derive from them."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from dh2sim.validate.report import Check, Quantity, Worst
 TOLERANCE = 1e-9
 """Relative."""
 LEAST_INERTIA = 1e-6
-"""Least inertia that errors are relative to, as a share of the robot's mass at its reach."""
+"""Lower bound of the inertia that errors are relative to, as a share of that of the robot's mass at its reach."""
 LEAST_FORCE = 1e-3
-"""Least force that errors are relative to, as a share of the robot's weight at its reach."""
+"""Lower bound of the force that errors are relative to, as a share of that of the robot's weight at its reach."""
 LEAST_LEVER = 0.1
-"""m; least reach in both."""
+"""m; lower bound of the reach in both."""
 
 
 def check_inertias(engine: MujocoEngine, model: RobotModel) -> Check:
-    """Compare mass, centre of mass and inertia of every link in a file with the model's.
+    """Compare mass, centre of mass and inertia of every link in a file with those of the model.
 
     Errors are relative: to the mass, to the reach, and to the inertia's trace. A link without mass must have none.
     """
@@ -61,17 +61,17 @@ def check_dynamics(
     """Compare an engine's dynamic terms with those of MuJoCo on the MJCF.
 
     Args:
-        engine: the engine's name.
-        terms: what it computed for the N states.
-        reference: what MuJoCo computed from the MJCF.
-        model: the robot.
-        q: joint vectors of the states, shape (N, n).
+        engine: The engine's name.
+        terms: What it computed for the N states.
+        reference: What MuJoCo computed from the MJCF.
+        model: The robot.
+        q: Joint vectors of the states, shape (N, n).
 
     Returns:
         A check for each of the three terms. Entries of the mass matrix are relative to sqrt(M_ii M_jj), forces to the
-        greatest force that the same joint sees in any of the states, so that light wrists count like heavy shoulders.
-        Where these are next to nothing, beside what the robot's weight at its reach would make of them, rounding is
-        all there is: they count as ``LEAST_INERTIA`` and ``LEAST_FORCE`` of that.
+        greatest force on the same joint in any of the states, so that light wrists count as much as heavy shoulders.
+        Inertias and forces that are tiny beside those of the robot's mass and weight at its reach are only rounding:
+        they have the lower bounds ``LEAST_INERTIA`` and ``LEAST_FORCE``.
     """
     lever = max(model.reach, LEAST_LEVER)
     diagonal = np.sqrt(np.einsum("kii->ki", reference.mass_matrix))
@@ -88,7 +88,7 @@ def check_dynamics(
 
 
 def _check(engine: str, quantity: Quantity, error: Array, names: Sequence[str], q: Array) -> Check:
-    """Make a check from errors by state and joint, shape (N, n)."""
+    """Return a check of errors by state and joint, shape (N, n)."""
     sample, joint = divmod(int(np.argmax(error)), error.shape[1])
     largest = float(error[sample, joint])
     return Check(

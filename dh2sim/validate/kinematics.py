@@ -1,10 +1,7 @@
-"""Jacobians: central differences of the table against the library, and the library against every engine.
+"""Kinematics: poses and Jacobians of every engine against the table, and the quaternions of an MJCF.
 
-Quaternions as an MJCF writes them: engines normalise them in silence, so a file that is off shows nowhere else.
-
-The library itself as an engine.
-
-Poses of every frame, engine by engine, against the textbook product of the table.
+Poses are compared with the textbook product of the table. The library's Jacobian is compared with central differences
+of that product, and other engines' Jacobians with the library's.
 """
 
 from __future__ import annotations
@@ -29,15 +26,16 @@ from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from dh2sim.validate.report import Check, Quantity, Worst
 
-TOLERANCE = 1e-12
+QUATERNION_TOLERANCE = 1e-12
+"""Of the length."""
 
 
 def check_unit_quaternions(path: Path) -> Check:
-    """Check that every quaternion in a file has length 1."""
+    """Check that every quaternion in a file has length 1; engines normalize them without a word."""
     try:
         elements = list(ET.parse(path).iter())
     except ET.ParseError as error:
-        return _check(False, reason=f"{path}: no well-formed XML, though MuJoCo takes it: {error}")
+        return _quaternion_check(False, reason=f"{path}: is not well-formed XML, although MuJoCo reads it: {error}")
     errors: list[tuple[float, str]] = []
     for element in elements:
         text = element.get("quat")
@@ -47,45 +45,45 @@ def check_unit_quaternions(path: Path) -> Check:
         try:
             errors.append((abs(math.hypot(*map(float, text.split())) - 1.0), name))
         except ValueError:
-            return _check(False, reason=f"{path}: the quaternion of {name} is no list of numbers")
+            return _quaternion_check(False, reason=f"{path}: the quaternion of {name} must be a list of numbers")
     worst, where = max(errors, key=lambda error: math.inf if math.isnan(error[0]) else error[0], default=(0.0, ""))
-    return _check(worst <= TOLERANCE, worst=worst, where=where)
+    return _quaternion_check(worst <= QUATERNION_TOLERANCE, worst=worst, where=where)
 
 
-def _check(ok: bool, *, worst: float | None = None, where: str = "", reason: str | None = None) -> Check:
+def _quaternion_check(ok: bool, *, worst: float | None = None, where: str = "", reason: str | None = None) -> Check:
     return Check(
         engine="mjcf-file",
         quantity=Quantity.UNIT_QUATERNIONS,
         ok=ok,
         reference="1",
         max_error=worst,
-        tolerance=TOLERANCE,
+        tolerance=QUATERNION_TOLERANCE,
         reason=reason,
         worst=Worst(where=where, q=()),
     )
 
 
 class LibraryEngine:
-    """dh2sim's own kinematics, by way of the chain that the writers use."""
+    """dh2sim's kinematics, of the chain that the writers use."""
 
     name = "dh2sim"
 
     def __init__(self, chain: KinematicChain) -> None:
-        """Take a chain."""
+        """Compute with a chain."""
         self._chain = chain
         self.frames = (*(f"dh_{i}" for i in range(len(chain.joints) + 1)), "tool0")
 
     def frame_poses(self, q: Array) -> Array:
-        """Poses of all frames in base_link, shape (N, number of frames, 4, 4); q of shape (N, n)."""
+        """Return the poses of all frames in base_link, shape (N, frames, 4, 4); q of shape (N, n)."""
         return np.concatenate([frame_poses(self._chain, q), forward_kinematics(self._chain, q)[:, None]], axis=1)
 
     def jacobian(self, q: Array) -> Array:
-        """Geometric Jacobian of tool0 in base_link, shape (N, 6, n); q of shape (N, n)."""
+        """Return the geometric Jacobian of tool0 in base_link, shape (N, 6, n); q of shape (N, n)."""
         return geometric_jacobian(self._chain, q)
 
 
 CHUNK_NUMBERS = 2**19
-"""How many doubles of poses are compared at a time: they stay in the cache."""
+"""Doubles of poses that are compared at a time, so that they stay in the cache."""
 
 
 def check_poses(
@@ -101,16 +99,16 @@ def check_poses(
     """Compare an engine's frames with the table's.
 
     Args:
-        engine: the engine.
-        spec: the robot, whose table is the truth.
-        q: joint vectors, rad and m, shape (N, n).
-        tolerance: allowed angle, rad, and distance as a share of max(1 m, reach).
+        engine: The engine.
+        spec: The robot, whose table is the reference.
+        q: Joint vectors, rad and m, shape (N, n).
+        tolerance: Allowed angle, rad, and distance as a share of max(1 m, reach).
         reach: m.
-        threads: how many chunks are compared at once; 0 for one a processor. The engine must allow for it.
-        advance: told after each chunk how many configurations are done with.
+        threads: Number of chunks that are compared at once, 0 for one a processor; the engine must allow it.
+        advance: Called after each chunk with the number of configurations in it.
 
     Returns:
-        The check; of several equally bad errors the first is named.
+        The check; it names the first of several equally bad errors.
     """
     started = time.perf_counter()
     size = max(1, CHUNK_NUMBERS // (16 * len(engine.frames)))
@@ -118,7 +116,7 @@ def check_poses(
 
     def compare(start: int) -> tuple[float, float, float, int, int]:
         part = q[start : start + size]
-        with np.errstate(all="ignore"):  # a file may hold anything; what is not finite fails
+        with np.errstate(all="ignore"):  # a file may contain anything; what is not finite fails
             position, rotation = pose_errors(engine.frame_poses(part), _reference(spec, part, engine.frames))
             badness = np.maximum(position / scale, rotation)
         # a NaN is worse than any number: argmax finds it, and no comparison with a tolerance holds for it
@@ -163,28 +161,28 @@ def _reference(spec: RobotSpec, q: Array, frames: Sequence[str]) -> Array:
     return tool if len(frames) == 1 else np.concatenate([table_frame_poses(spec, q), tool], axis=1)
 
 
-STEP = 1e-5
+DIFFERENCE_STEP = 1e-5
 """rad or m; rounding and truncation are then both about 1e-11 of the reach."""
 DIFFERENCE_TOLERANCE = 1e-8
-"""Of the Jacobian by differences; times the reach for its linear part."""
+"""Of the Jacobian by differences; multiplied by the reach for its linear part."""
 
 
 class JacobianEngine(Protocol):
-    """Whatever has a Jacobian."""
+    """An engine with a Jacobian."""
 
     name: str
 
     def jacobian(self, q: Array) -> Array:
-        """Geometric Jacobian of tool0 in base_link, linear rows first, shape (N, 6, n); q of shape (N, n)."""
+        """Return the geometric Jacobian of tool0, linear rows first, shape (N, 6, n); q of shape (N, n)."""
         ...
 
 
 def table_jacobian(spec: RobotSpec, q: Array) -> Array:
-    """Geometric Jacobian of tool0 by central differences of the table's own product.
+    """Return the geometric Jacobian of tool0 by central differences of the table's product.
 
     Args:
-        spec: the robot.
-        q: joint vectors, rad and m, shape (N, n).
+        spec: The robot.
+        q: Joint vectors, rad and m, shape (N, n).
 
     Returns:
         Shape (N, 6, n). The angular part is the skew part of (R(q + h) - R(q - h)) / 2h · R(q)ᵀ.
@@ -194,8 +192,8 @@ def table_jacobian(spec: RobotSpec, q: Array) -> Array:
     result = np.zeros((len(q), 6, n))
     for j in range(n):
         step = np.zeros(n)
-        step[j] = STEP
-        change = (table_tool_pose(spec, q + step) - table_tool_pose(spec, q - step)) / (2 * STEP)
+        step[j] = DIFFERENCE_STEP
+        change = (table_tool_pose(spec, q + step) - table_tool_pose(spec, q - step)) / (2 * DIFFERENCE_STEP)
         spin = change[:, :3, :3] @ R.transpose(0, 2, 1)
         result[:, :3, j] = change[:, :3, 3]
         result[:, 3, j] = 0.5 * (spin[:, 2, 1] - spin[:, 1, 2])
@@ -217,13 +215,13 @@ def check_jacobian(
     """Compare an engine's Jacobian with a reference of shape (N, 6, n).
 
     Args:
-        engine: the engine.
-        reference: the Jacobians to compare with.
-        q: joint vectors, rad and m, shape (N, n).
-        tolerance: allowed error of an angular entry, and of a linear one as a share of max(1 m, reach).
+        engine: The engine.
+        reference: The Jacobians to compare with.
+        q: Joint vectors, rad and m, shape (N, n).
+        tolerance: Allowed error of an angular entry, and of a linear one as a share of max(1 m, reach).
         reach: m.
-        joints: names of the n joints, for the report.
-        differences: whether the reference was made by central differences.
+        joints: Names of the n joints, for the report.
+        differences: Whether the reference was computed by central differences.
     """
     error = np.abs(engine.jacobian(q) - reference)
     error[:, :3] /= max(1.0, reach)

@@ -1,9 +1,4 @@
-"""What a validation found, and how it is told to programs.
-
-What the physics checks report.
-
-A validation as JUnit XML, which CI systems show.
-"""
+"""Report of a validation, as JSON and as JUnit XML."""
 
 from __future__ import annotations
 
@@ -15,7 +10,7 @@ from typing import Any
 
 
 class Quantity(StrEnum):
-    """What is compared."""
+    """Quantity that is compared."""
 
     POSE = "pose"
     JACOBIAN = "jacobian"
@@ -42,17 +37,17 @@ class Worst:
     q: tuple[float, ...]
     """Joint vector, rad and m; empty where it does not depend on one."""
     sample: int | None = None
-    """Index of the configuration among the samples."""
+    """Index among the sampled configurations."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """One quantity of one engine, compared with its reference."""
+    """Comparison of one quantity of one engine with its reference."""
 
     engine: str
     quantity: Quantity
     ok: bool | None
-    """None: not checked, and ``reason`` says why."""
+    """None if it was not checked, for the ``reason`` given."""
     reference: str = "table"
     samples: int = 0
     frames: int | None = None
@@ -64,12 +59,11 @@ class Check:
     max_error: float | None = None
     """For everything but poses; relative for dynamics."""
     tolerance: float | None = None
-    """As given. For positions and the linear part of a Jacobian it is multiplied by the larger of 1 m and the
-    reach."""
+    """Positions and the linear part of a Jacobian may differ by this times the larger of 1 m and the reach."""
     reason: str | None = None
     worst: Worst | None = None
     seconds: float = field(default=0.0, compare=False)
-    """Time that the comparison took; not part of what is reported as a result."""
+    """Time that the comparison took."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the entry of the ``engines`` list, without what does not apply."""
@@ -109,7 +103,7 @@ class RobotReport:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing that was checked fell short."""
+        """Whether no check failed."""
         return all(check.ok is not False for check in self.checks)
 
     def to_json(self) -> dict[str, Any]:
@@ -131,7 +125,7 @@ class ValidationReport:
 
     @property
     def ok(self) -> bool:
-        """Whether every robot holds."""
+        """Whether no robot failed."""
         return all(robot.ok for robot in self.robots)
 
     def to_json(self) -> dict[str, Any]:
@@ -140,14 +134,14 @@ class ValidationReport:
 
 
 def _finite(value: object) -> object:
-    """JSON has no NaN and no infinity: they become text."""
+    """Return a value as JSON can hold it: NaN and infinity become text."""
     if isinstance(value, float) and not abs(value) < float("inf"):
         return str(value)
     return value
 
 
-ENGINE = "mujoco-rollout"
-"""Name under which the checks stand in a report."""
+MOTION_ENGINE = "mujoco-rollout"
+"""Engine of the checks of motions."""
 
 
 def finding(
@@ -160,10 +154,10 @@ def finding(
     reference: str = "physics",
     worst: Worst | None = None,
 ) -> Check:
-    """Report a measured error; ``failure`` says in words what fell short, if it did."""
+    """Return a check of a motion; ``failure`` is the reason if the error exceeds the tolerance."""
     ok = bool(error <= tolerance)
     return Check(
-        engine=ENGINE,
+        engine=MOTION_ENGINE,
         quantity=quantity,
         ok=ok,
         reference=reference,
@@ -176,8 +170,8 @@ def finding(
 
 
 def impossible(quantity: Quantity, reason: str) -> Check:
-    """Report that something could not be checked, and why."""
-    return Check(engine=ENGINE, quantity=quantity, ok=None, reason=f"{quantity.value}: {reason}")
+    """Return a check of a motion that could not be made."""
+    return Check(engine=MOTION_ENGINE, quantity=quantity, ok=None, reason=f"{quantity.value}: {reason}")
 
 
 _UNWRITABLE = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -206,7 +200,7 @@ def to_junit(report: ValidationReport) -> str:
 
 
 def failure_text(check: Check) -> str:
-    """Say in a line by how much a check fell short, and where."""
+    """Return in one line by how much a check failed, and where."""
     if check.reason is not None:
         return check.reason
     if check.max_position_error is not None and check.max_rotation_error is not None:
@@ -230,5 +224,5 @@ def _counts(checks: list[Check] | tuple[Check, ...]) -> dict[str, str]:
 
 
 def _writable(text: str) -> str:
-    """Replace what XML cannot hold: control characters, and bytes of file names that are no text."""
+    """Replace what XML cannot hold: control characters, and bytes of file names that are not text."""
     return _UNWRITABLE.sub("?", text)

@@ -1,8 +1,9 @@
-"""Validating one robot: from its table and its files to a report."""
+"""Validation of a robot: every engine on its files against its table."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TypeVar
@@ -16,7 +17,9 @@ from dh2sim.errors import EngineCapacityError, EngineError
 from dh2sim.export import export_robot
 from dh2sim.files import signals_deferred
 from dh2sim.kinematics.sampling import random_configurations
+from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
 from dh2sim.validate.dynamics import check_dynamics, check_inertias
 from dh2sim.validate.kinematics import (
@@ -30,28 +33,28 @@ from dh2sim.validate.kinematics import (
 from dh2sim.validate.report import Check, Quantity, RobotReport
 
 SLOW_ROWS = 8000
-"""Engines that loop in Python are asked for at most so many rows of tables: 1000 configurations of 8 rows."""
+"""Most table rows that engines looping in Python compute: 1000 configurations of 8 rows."""
 JACOBIAN_SAMPLES = 200
 DYNAMICS_SAMPLES = 20
 
 Advance = Callable[[int], None]
 Mover = MujocoEngine | PinocchioEngine
-"""An engine that knows velocities and masses."""
+"""An engine with Jacobians and dynamics."""
 Engine = TypeVar("Engine", bound=MujocoEngine | PinocchioEngine | YourdfpyEngine)
 
 
 def slow_samples(samples: int, rows: int) -> int:
-    """How many of the configurations are asked of engines that loop in Python."""
+    """Return the number of configurations that engines looping in Python compute."""
     return min(samples, max(1, SLOW_ROWS // max(8, rows)))
 
 
 def engine_samples(samples: int, rows: int) -> int:
-    """How many configurations ``validate_robot`` compares in all engines together, for a progress bar."""
+    """Return the number of configurations of all engines together, for a progress bar."""
     return 3 * samples + 2 * slow_samples(samples, rows)
 
 
 def validate_robot(
-    model: RobotModel,
+    robot: ModelLike | str | PathLike[str],
     *,
     samples: int = 1000,
     seed: int = 0,
@@ -62,20 +65,21 @@ def validate_robot(
     """Compare every engine with the table.
 
     Args:
-        model: the robot.
-        samples: number of random configurations inside the limits, at least 1.
-        seed: of the configurations.
-        tolerance: allowed angle, rad, and distance as a share of max(1 m, reach).
-        folder: where the robot's files stand; None to export them afresh.
-        advance: told how many configurations an engine has done.
+        robot: The robot, or its file or name.
+        samples: Number of random configurations inside the limits, at least 1.
+        seed: Seed of the configurations.
+        tolerance: Allowed angle, rad, and distance as a share of max(1 m, reach).
+        folder: Folder with the robot's files; None to export them to a temporary one.
+        advance: Called with the number of configurations that an engine has computed.
 
     Returns:
         The report. A file that is missing or that an engine refuses is a check that failed.
 
     Raises:
-        ModelError: a format cannot hold the robot.
-        OutputError: the files cannot be written to the temporary folder.
+        ModelError: A format cannot hold the robot.
+        OutputError: The files cannot be written to the temporary folder.
     """
+    model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
     if folder is not None:
         return _validate(model, folder, samples, seed, tolerance, advance)
     with TemporaryDirectory(prefix="dh2sim-") as temporary:
@@ -99,7 +103,7 @@ def _validate(
 
     checks = [check_poses(library, model.spec, q, tolerance, model.reach, threads=0, advance=advance)]
     for engine in engines:
-        checks += _asked(engine, Quantity.POSE, poses)
+        checks += _checks_of(engine, Quantity.POSE, poses)
     if any(engine.name == "mujoco-mjcf" for engine in engines):
         checks.append(check_unit_quaternions(mjcf))
     movers = [engine for engine in engines if not isinstance(engine, YourdfpyEngine)]
@@ -117,7 +121,7 @@ def _validate(
 
 
 def _read(model: RobotModel, mjcf: Path, urdf: Path) -> tuple[list[Mover | YourdfpyEngine], list[Check]]:
-    """Let every engine read its file; of those that do not, say why."""
+    """Return the engines that read their files, and why others did not."""
     engines: list[Mover | YourdfpyEngine] = []
     unread: list[Check] = []
     names = [joint.name for joint in model.moving_joints]
@@ -132,7 +136,7 @@ def _read(model: RobotModel, mjcf: Path, urdf: Path) -> tuple[list[Mover | Yourd
             unread.append(Check(engine=name, quantity=Quantity.FILE, ok=False, reason=reason))
             continue
         try:
-            # an import that is interrupted would pass for an engine that is not installed
+            # an interrupted import would look like an engine that is not installed
             with signals_deferred(), np.errstate(all="ignore"):
                 engines.append(make(path, names, len(model.joints)))
         except ImportError as error:
@@ -164,7 +168,7 @@ def _jacobians(
         )
     ]
     for engine in engines:
-        checks += _asked(
+        checks += _checks_of(
             engine, Quantity.JACOBIAN, lambda engine: [check_jacobian(engine, own, q, tolerance, model.reach, names)]
         )
     return checks
@@ -178,7 +182,7 @@ def _dynamics(model: RobotModel, engines: list[Mover], q: Array, seed: int) -> l
     gravity = model.spec.gravity
     reference = engines[0].dynamic_terms(q, velocity, gravity)
     for engine in engines[1:]:
-        checks += _asked(
+        checks += _checks_of(
             engine,
             Quantity.MASS_MATRIX,
             lambda engine: check_dynamics(
@@ -188,13 +192,13 @@ def _dynamics(model: RobotModel, engines: list[Mover], q: Array, seed: int) -> l
     return checks
 
 
-def _asked(engine: Engine, quantity: Quantity, question: Callable[[Engine], list[Check]]) -> list[Check]:
-    """Ask an engine; one that breaks down over a file, in whatever way, has failed on it."""
+def _checks_of(engine: Engine, quantity: Quantity, check: Callable[[Engine], list[Check]]) -> list[Check]:
+    """Make checks of an engine; one that raises anything has failed on its file."""
     try:
-        with np.errstate(all="ignore"):  # a file may hold anything; what is not finite fails
-            return question(engine)
+        with np.errstate(all="ignore"):  # a file may contain anything; what is not finite fails
+            return check(engine)
     except MemoryError:
         raise
     except Exception as error:
-        reason = f"{engine.name} broke down: {type(error).__name__}: {' '.join(str(error).split())}"
+        reason = f"{engine.name} failed: {type(error).__name__}: {' '.join(str(error).split())}"
         return [Check(engine=engine.name, quantity=quantity, ok=False, reason=reason)]

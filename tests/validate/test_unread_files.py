@@ -111,7 +111,7 @@ def test_xml_that_only_mujoco_takes_for_well_formed_has_failed(exported: Path) -
     failed = failures(validated(exported / "odd.yaml", exported / "made"))
     assert list(failed) == [("mjcf-file", "unit quaternions")]
     assert failed["mjcf-file", "unit quaternions"]["reason"].startswith(
-        f"{path}: no well-formed XML, though MuJoCo takes it: junk after document element"
+        f"{path}: is not well-formed XML, although MuJoCo reads it: junk after document element"
     )
 
 

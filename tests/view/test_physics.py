@@ -18,7 +18,7 @@ from dh2sim.model.variants import with_actuators
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import ActuatorType, Convention, Dynamics, JointType, LinkSpec, RobotSpec, Row
 from dh2sim.typing import read_only
-from dh2sim.validate.motion.free_motion import frictionless, untouchable
+from dh2sim.validate.motion.free_motion import frictionless, without_contacts
 from dh2sim.validate.motion.mechanics import energy
 from dh2sim.view.motion.applied_force import drag_spring
 from dh2sim.view.motion.physics import STEPS_PER_CLOCK_READING, Drive, Physics
@@ -124,7 +124,7 @@ def test_the_energy_is_that_of_the_table_and_its_masses() -> None:
 
 
 def test_a_free_robot_without_friction_keeps_its_energy() -> None:
-    model = untouchable(frictionless(robot("planar_2r")))
+    model = without_contacts(frictionless(robot("planar_2r")))
     physics = Physics(model, model.home, drive="free")
     physics.apply_force(model.links[-1].name, [0.0, 0.0, 0.0], [3.0, 20.0, 0.0])
     simulated(physics, 0.3)

@@ -1,4 +1,4 @@
-"""What a free motion conserves: energy, as well as the integrator can, and momentum."""
+"""Checks of what a free motion conserves: energy up to the integrator's error, and momentum."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from dh2sim.validate.motion.mechanics import bodies, energy
 from dh2sim.validate.report import Check, Quantity, finding
 
 ORDER = 4
-"""Of RK4: its energy error falls with this power of the timestep, or a higher one."""
+"""Order of RK4: its energy error decreases with this power of the timestep, or a higher one."""
 ORDER_TOLERANCE = 0.5
 ENERGY_STARTS = 4
 SMALL = 1e-7
-"""Relative energy error from which on the power is measured: with greater timesteps it does not show yet, and
-smaller ones take longer."""
+"""Relative energy error below which the order is measured: larger timesteps do not show it yet, and smaller ones take
+longer."""
 MOST_SUBSTEPS = 1024
 HALVINGS = 3
-"""Of the timestep, over which the power is measured."""
+"""Halvings of the timestep over which the order is measured."""
 ROUNDING = 1e-12
-"""Energy errors below this are rounding, relative to what there is of energy, or to the potential energy if more."""
+"""Energy errors below this are rounding, relative to the energy, or to the potential energy if that is larger."""
 MOMENTUM_TOLERANCE = 1e-9
 """Of the sum of all links' momenta."""
 MOMENTUM_STARTS = 2
@@ -31,20 +31,20 @@ MOMENTUM_SUBSTEPS = 256
 
 
 def check_energy(model: RobotModel, compiled: mujoco.MjModel, *, seed: int = 0) -> Check:
-    """Measure how the energy error of the passive, frictionless arm falls with the timestep.
+    """Measure how the energy error of the passive, frictionless arm decreases with the timestep.
 
-    RK4 errs by c h⁴ + O(h⁵): half the timestep h leaves a sixteenth of the error. It falls faster where c happens to
-    vanish, and there may be no error at all (a joint that turns evenly, a slide in free fall). A force that does
-    work, masses that are not the model's, or a lesser integrator make it fall more slowly, or not at all. The energy
-    is computed from the table and the masses, not by MuJoCo.
+    The error of RK4 is c h⁴ + O(h⁵): half the timestep h leaves a sixteenth of it. It decreases faster where c
+    happens to vanish, and there may be no error at all (a joint that turns uniformly, a slide in free fall). A force
+    that does work, masses other than the model's, or an integrator of lower order make it decrease more slowly, or
+    not at all. The energy is computed from the table and the masses, not by MuJoCo.
 
     Args:
-        model: the robot.
-        compiled: what ``free_model`` made of it.
-        seed: of the states from which the arm starts.
+        model: The robot.
+        compiled: The result of ``free_model``.
+        seed: Seed of the initial states.
 
     Returns:
-        A check whose error is by how much the power falls short of 4.
+        A check whose error is by how much the measured order is below 4.
     """
     states = random_states(model, compiled, ENERGY_STARTS, np.random.default_rng([seed, 1]))
     substeps, errors = 1, [np.inf] * (HALVINGS + 1)
@@ -57,24 +57,23 @@ def check_energy(model: RobotModel, compiled: mujoco.MjModel, *, seed: int = 0) 
         shortfall,
         ORDER_TOLERANCE,
         samples=ENERGY_STARTS,
-        failure=f"the energy error under RK4 falls with the power {ORDER - shortfall:.2f} of the timestep, not with "
-        f"{ORDER}: from {errors[0]:.1e} of the energy to {errors[-1]:.1e} when it is halved {HALVINGS} times",
+        failure=f"the energy error with RK4 decreases with the power {ORDER - shortfall:.2f} of the timestep instead "
+        f"of {ORDER}: from {errors[0]:.1e} of the energy to {errors[-1]:.1e} in {HALVINGS} halvings",
     )
 
 
 def check_momentum(model: RobotModel, compiled: mujoco.MjModel, *, seed: int = 0) -> Check:
-    """Require linear and angular momentum of the robot to stay what they are while its motors work.
+    """Require linear and angular momentum of the robot to be constant while its motors work.
 
-    Its base floats without gravity, and has the mass of its shapes. MuJoCo's RK4 is of second order only for a body
-    that turns freely: it adds up angular velocities along axes that have turned meanwhile. So the momentum is
-    extrapolated to timestep zero from two timesteps (Richardson), ever smaller ones until the error is well below
-    the tolerance: what does not come from the timestep stays. Momenta are computed from the table and the masses, not
-    by MuJoCo.
+    Its base floats without gravity, and has the mass of its shapes. MuJoCo's RK4 is only of second order for a body
+    that rotates freely: it adds angular velocities along axes that have rotated meanwhile. So the momentum is
+    extrapolated to timestep zero from two timesteps (Richardson), which are halved until the error is well below the
+    tolerance; errors from other sources remain. Momenta are computed from the table and the masses, not by MuJoCo.
 
     Args:
-        model: the robot.
-        compiled: what ``free_model(model, floating_base=True)`` made of it.
-        seed: of the states from which the robot starts.
+        model: The robot.
+        compiled: The result of ``free_model(model, floating_base=True)``.
+        seed: Seed of the initial states.
 
     Returns:
         A check whose error is relative to the sum of all links' momenta, angular ones about the centre of mass.
@@ -93,7 +92,7 @@ def check_momentum(model: RobotModel, compiled: mujoco.MjModel, *, seed: int = 0
 
 
 def _energy_error(model: RobotModel, compiled: mujoco.MjModel, states: tuple[State, ...], substeps: int) -> float:
-    """Greatest change of the energy, relative to what there is of it; infinite if a simulation is unstable.
+    """Return the greatest change of the energy, relative to the energy; infinite if a simulation is unstable.
 
     0 where it is rounding.
     """
@@ -113,9 +112,9 @@ def _energy_error(model: RobotModel, compiled: mujoco.MjModel, states: tuple[Sta
 
 
 def _power(errors: Array) -> float:
-    """Power of the timestep with which errors fall when it is halved again and again.
+    """Return the power of the timestep with which errors decrease when it is halved repeatedly.
 
-    ``ORDER`` if there are none, or soon are none; 0 if they are not finite.
+    ``ORDER`` if there are none, or none after a few halvings; 0 if they are not finite.
     """
     if not np.isfinite(errors).all():
         return 0.0
@@ -126,7 +125,7 @@ def _power(errors: Array) -> float:
 
 
 def _momentum_errors(model: RobotModel, compiled: mujoco.MjModel, state: State) -> tuple[float, float]:
-    """Relative changes of linear and angular momentum, extrapolated to timestep zero."""
+    """Return the relative changes of linear and angular momentum, extrapolated to timestep zero."""
     substeps = 1
     coarse = _momenta(model, compiled, state, substeps)
     errors = (np.inf, np.inf)
@@ -139,7 +138,7 @@ def _momentum_errors(model: RobotModel, compiled: mujoco.MjModel, state: State) 
 
 
 def _momenta(model: RobotModel, compiled: mujoco.MjModel, state: State, substeps: int) -> tuple[Array, Array]:
-    """Linear and angular momenta of all links, shape (RECORDS + 1, L, 3) each."""
+    """Return the linear and angular momenta of all links, shape (RECORDS + 1, L, 3) each."""
     motion = simulate(compiled, state, substeps)
     with np.errstate(all="ignore"):
         links = bodies(model, motion.q, motion.v, motion.base)
@@ -147,7 +146,7 @@ def _momenta(model: RobotModel, compiled: mujoco.MjModel, state: State, substeps
 
 
 def _change(coarse: Array, fine: Array) -> float:
-    """Greatest change of the sum of links' momenta, relative to the sum of their magnitudes; infinite if unstable."""
+    """Return the greatest change of the total momentum over the sum of links' magnitudes; infinite if unstable."""
     with np.errstate(all="ignore"):
         total = (4.0 * fine.sum(axis=1) - coarse.sum(axis=1)) / 3.0
         size = float(np.linalg.norm(fine, axis=2).sum(axis=1).max())

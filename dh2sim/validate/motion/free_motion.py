@@ -1,7 +1,4 @@
-"""Free motion of a robot from a random state: no friction, no limits, no contacts.
-
-The same robot without what a check must not be spoilt by.
-"""
+"""Free motion of a robot from random states, without friction, limits and contacts."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ from dh2sim.validate.motion.mechanics import BaseMotion
 
 
 def without_dry_friction(model: RobotModel) -> RobotModel:
-    """Return the robot without dry friction, which hides small forces, and which controllers know nothing of."""
+    """Return the robot without dry friction, which hides small forces and is unknown to controllers."""
     joints = tuple(replace(joint, dynamics=replace(joint.dynamics, friction=0.0)) for joint in model.joints)
     return replace(model, joints=joints)
 
@@ -35,31 +32,31 @@ def frictionless(model: RobotModel) -> RobotModel:
     return replace(model, joints=joints)
 
 
-def untouchable(model: RobotModel) -> RobotModel:
-    """Return the robot with links that pass through each other."""
+def without_contacts(model: RobotModel) -> RobotModel:
+    """Return the robot with links that do not collide."""
     names = [link.name for link in model.all_links]
     pairs = (ExcludedPair(link1=a, link2=b, reason=Reason.DEFAULT) for a, b in combinations(names, 2))
     return replace(model, excluded=tuple(pairs))
 
 
 RECORDS = 16
-"""Instants, after the start, at which a motion is looked at."""
-BRISK = np.pi
-"""1/s: joints that turn start with up to so many rad/s, joints that slide with so many times the reach a second."""
+"""Instants after the start at which a motion is recorded."""
+FASTEST = np.pi
+"""1/s: revolute joints start with at most this many rad/s, prismatic ones with this many times the reach a second."""
 SPAN = 2.0
-"""How long a motion is observed, in units of the time in which the fastest joint turns by 1 rad."""
+"""Duration of a motion, in units of the time in which the fastest joint turns by 1 rad."""
 LEAST_SIZE = 0.1
-"""m: size of a robot that reaches less."""
+"""m: lower bound of the reach."""
 
 
 def free_model(model: RobotModel, *, floating_base: bool = False, integrator: str = "RK4") -> mujoco.MjModel:
-    """Compile a robot that nothing but gravity or its motors acts on.
+    """Compile a robot on which only gravity or its motors act.
 
     Args:
-        model: the robot.
-        floating_base: False: base_link stands still, and nothing drives the joints; True: base_link has the mass of
-            its shapes and floats without gravity, and every joint has a motor.
-        integrator: as in ``MjcfOptions``.
+        model: The robot.
+        floating_base: False: base_link is fixed, and nothing drives the joints; True: base_link has the mass of its
+            shapes and floats without gravity, and every joint has a motor.
+        integrator: As in ``MjcfOptions``.
 
     Raises:
         EngineError: MuJoCo refuses the model.
@@ -91,14 +88,14 @@ def compile_model(model: RobotModel, options: MjcfOptions = EXPORTED) -> mujoco.
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class State:
-    """Where a motion starts, and what drives it; coordinates of a base that floats come first."""
+    """Start of a motion, and what drives it; coordinates of a floating base come first."""
 
     qpos: Array
     qvel: Array
     ctrl: Array
-    """Torques and forces of the motors, N·m and N, the same all the time."""
+    """Constant torques and forces of the motors, N·m and N."""
     duration: float
-    """How long the motion is observed, s."""
+    """s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -110,18 +107,18 @@ class Motion:
     v: Array
     """Joint velocities, shape (RECORDS + 1, n)."""
     base: BaseMotion | None
-    """None for a base that stands still."""
+    """None for a fixed base."""
 
 
 def random_states(
     model: RobotModel, compiled: mujoco.MjModel, count: int, generator: np.random.Generator
 ) -> tuple[State, ...]:
-    """Draw states: joints anywhere inside their limits, moving briskly, driven as briskly where there are motors.
+    """Draw states: joints anywhere inside their limits, moving fast, and driven as fast where there are motors.
 
-    How long each is observed comes from its own time scale, so that errors are alike for robots of all sizes.
+    The duration of each motion follows from its own time scale, so that errors are alike for robots of all sizes.
 
     Raises:
-        EngineError: an acceleration is not finite.
+        EngineError: An acceleration is not finite.
     """
     lower, upper = model.travel
     n = len(lower)
@@ -134,13 +131,13 @@ def random_states(
     for _ in range(count):
         q = generator.uniform(lower, upper)
         data.qpos[:] = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], q]) if floating else q
-        data.qvel[:] = generator.uniform(-1.0, 1.0, compiled.nv) * np.concatenate([base, BRISK * sizes])
+        data.qvel[:] = generator.uniform(-1.0, 1.0, compiled.nv) * np.concatenate([base, FASTEST * sizes])
         data.ctrl[:] = 0.0
         mujoco.mj_forward(compiled, data)
         if compiled.nu:
             mass_matrix = np.zeros((compiled.nv, compiled.nv))
             mujoco.mj_fullM(compiled, data, mass_matrix)
-            push = np.diag(mass_matrix)[-n:] * BRISK**2 * sizes
+            push = np.diag(mass_matrix)[-n:] * FASTEST**2 * sizes
             data.ctrl[:] = np.clip(generator.uniform(-push, push), *compiled.actuator_ctrlrange.T)
             mujoco.mj_forward(compiled, data)
         scale = np.concatenate([base, sizes])
@@ -159,7 +156,7 @@ def random_states(
 
 
 def simulate(compiled: mujoco.MjModel, state: State, substeps: int) -> Motion:
-    """Simulate a motion in ``RECORDS * substeps`` time steps; what becomes unstable is not finite."""
+    """Simulate a motion in ``RECORDS * substeps`` time steps; an unstable one is not finite."""
     compiled.opt.timestep = state.duration / (RECORDS * substeps)
     data = mujoco.MjData(compiled)
     data.qpos[:], data.qvel[:], data.ctrl[:] = state.qpos, state.qvel, state.ctrl
@@ -172,13 +169,13 @@ def simulate(compiled: mujoco.MjModel, state: State, substeps: int) -> Motion:
     if compiled.nq == compiled.nv:
         return Motion(q=qpos, v=qvel, base=None)
     R = _rotations(qpos[:, 3:7])
-    turning = np.einsum("kij,kj->ki", R, qvel[:, 3:6])  # MuJoCo gives it along the base's own axes
-    base = BaseMotion(rotation=R, position=qpos[:, :3], velocity=qvel[:, :3], turning=turning)
+    angular = np.einsum("kij,kj->ki", R, qvel[:, 3:6])  # MuJoCo has it along the base's own axes
+    base = BaseMotion(rotation=R, position=qpos[:, :3], velocity=qvel[:, :3], angular_velocity=angular)
     return Motion(q=qpos[:, 7:], v=qvel[:, 6:], base=base)
 
 
 def _rotations(quaternions: Array) -> Array:
-    """Rotation matrices, shape (K, 3, 3), of unit quaternions (w, x, y, z), shape (K, 4)."""
+    """Return the rotation matrices, shape (K, 3, 3), of unit quaternions (w, x, y, z), shape (K, 4)."""
     w, x, y, z = quaternions.T
     rows = np.array(
         [

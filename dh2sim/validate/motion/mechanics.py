@@ -1,4 +1,4 @@
-"""Energy and momentum of a robot from its table and masses alone: the oracle of what MuJoCo conserves."""
+"""Energy and momentum of a robot, computed from its table and masses alone and not by MuJoCo."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from dh2sim.typing import Array
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BaseMotion:
-    """Where base_link is in the world, and how it moves, at K instants."""
+    """Pose and velocity of base_link in the world at K instants."""
 
     rotation: Array
-    """Its axes in the world, shape (K, 3, 3)."""
+    """Axes of base_link in the world, shape (K, 3, 3)."""
     position: Array
-    """Of its origin, m, shape (K, 3)."""
+    """Position of its origin, m, shape (K, 3)."""
     velocity: Array
-    """Of its origin, m/s, along the world's axes, shape (K, 3)."""
-    turning: Array
-    """Angular velocity, rad/s, along the world's axes, shape (K, 3)."""
+    """Velocity of its origin, m/s, along the world's axes, shape (K, 3)."""
+    angular_velocity: Array
+    """rad/s, along the world's axes, shape (K, 3)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Bodies:
-    """The motion of the L links that have mass, at K instants; everything along the world's axes."""
+    """Motion of the L links that have mass at K instants, along the world's axes."""
 
     mass: Array
     """kg, shape (L,)."""
     com: Array
     """Centres of mass, m, shape (K, L, 3)."""
     velocity: Array
-    """Of the centres of mass, m/s, shape (K, L, 3)."""
-    turning: Array
-    """Angular velocities, rad/s, shape (K, L, 3)."""
+    """Velocities of the centres of mass, m/s, shape (K, L, 3)."""
+    angular_velocity: Array
+    """rad/s, shape (K, L, 3)."""
     spin: Array
     """Angular momenta, each about the link's own centre of mass, kg·m²/s, shape (K, L, 3)."""
 
@@ -55,26 +55,26 @@ class Bodies:
 
     @property
     def kinetic_energy(self) -> Array:
-        """J, shape (K,)."""
+        """Of all links, J, shape (K,)."""
         moving = 0.5 * self.mass * (self.velocity**2).sum(axis=2)
-        turning = 0.5 * (self.turning * self.spin).sum(axis=2)
-        return np.asarray((moving + turning).sum(axis=1))
+        rotating = 0.5 * (self.angular_velocity * self.spin).sum(axis=2)
+        return np.asarray((moving + rotating).sum(axis=1))
 
 
 def bodies(model: RobotModel, q: Array, v: Array, base: BaseMotion | None = None) -> Bodies:
-    """Walk along the chain and compute how every link moves.
+    """Compute how every link moves, from the base to the tool.
 
     Args:
-        model: the robot; at least one of its links has mass.
-        q: joint positions, rad and m, shape (K, n).
-        v: their rates, shape (K, n).
-        base: the motion of a base that floats; None for one that stands at the world's origin.
+        model: The robot; at least one of its links has mass.
+        q: Joint positions, rad and m, shape (K, n).
+        v: Joint velocities, shape (K, n).
+        base: Motion of a floating base; None for a base that is fixed at the world's origin.
     """
-    standing = np.zeros((len(q), 3))
+    zero = np.zeros((len(q), 3))
     at = base or BaseMotion(
-        rotation=np.broadcast_to(np.eye(3), (len(q), 3, 3)), position=standing, velocity=standing, turning=standing
+        rotation=np.broadcast_to(np.eye(3), (len(q), 3, 3)), position=zero, velocity=zero, angular_velocity=zero
     )
-    R, p, u, w = at.rotation, at.position, at.velocity, at.turning
+    R, p, u, w = at.rotation, at.position, at.velocity, at.angular_velocity
     found = [] if model.base.inertial is None or base is None else [_Body.of(model.base.inertial, R, p, u, w)]
     column = 0
     for link, joint in zip(model.links, model.chain.joints, strict=True):
@@ -86,7 +86,7 @@ def bodies(model: RobotModel, q: Array, v: Array, base: BaseMotion | None = None
             column += 1
             axis = R[:, :, 2]
             if joint.type.turns:
-                R = R @ _turns(moved)
+                R = R @ _rotations_z(moved)
                 w = w + rate[:, None] * axis
             else:
                 arm = moved[:, None] * axis
@@ -97,7 +97,7 @@ def bodies(model: RobotModel, q: Array, v: Array, base: BaseMotion | None = None
         mass=np.array([body.mass for body in found]),
         com=np.stack([body.com for body in found], axis=1),
         velocity=np.stack([body.velocity for body in found], axis=1),
-        turning=np.stack([body.turning for body in found], axis=1),
+        angular_velocity=np.stack([body.angular_velocity for body in found], axis=1),
         spin=np.stack([body.spin for body in found], axis=1),
     )
 
@@ -109,30 +109,30 @@ class _Body:
     mass: float
     com: Array
     velocity: Array
-    turning: Array
+    angular_velocity: Array
     spin: Array
 
     @classmethod
     def of(cls, body: MassProperties, R: Array, p: Array, u: Array, w: Array) -> _Body:
-        """Place a body in a frame with axes R and origin p, which moves with velocities u and w."""
+        """Return a body in a frame with axes R and origin p that moves with velocity u and angular velocity w."""
         arm = R @ body.com
         own = np.einsum("kji,kj->ki", R, w) @ body.inertia
         return cls(
             mass=body.mass,
             com=p + arm,
             velocity=u + np.cross(w, arm),
-            turning=w,
+            angular_velocity=w,
             spin=np.asarray(np.einsum("kij,kj->ki", R, own)),
         )
 
 
 def energy(model: RobotModel, q: Array, v: Array) -> tuple[Array, Array]:
-    """Potential energy in the robot's gravity, and kinetic energy with that of the rotors, J, shape (K,) each.
+    """Return the potential energy, and the kinetic energy including rotors, J, shape (K,) each.
 
     Args:
-        model: the robot; its base stands still.
-        q: joint positions, rad and m, shape (K, n).
-        v: their rates, shape (K, n).
+        model: The robot, with a fixed base.
+        q: Joint positions, rad and m, shape (K, n).
+        v: Joint velocities, shape (K, n).
     """
     links = bodies(model, q, v)
     armature = np.array([joint.dynamics.armature for joint in model.moving_joints])
@@ -140,8 +140,8 @@ def energy(model: RobotModel, q: Array, v: Array) -> tuple[Array, Array]:
     return potential, links.kinetic_energy + 0.5 * (armature * v**2).sum(axis=1)
 
 
-def _turns(angle: Array) -> Array:
-    """Rotations about z, shape (K, 3, 3)."""
+def _rotations_z(angle: Array) -> Array:
+    """Return rotations about z, shape (K, 3, 3)."""
     R = np.zeros((len(angle), 3, 3))
     R[:, 0, 0] = R[:, 1, 1] = np.cos(angle)
     R[:, 1, 0] = np.sin(angle)

@@ -1,4 +1,4 @@
-"""All physics checks of a robot."""
+"""All checks of how a robot moves."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from dh2sim.validate.motion.tracking import (
 from dh2sim.validate.report import Check, Quantity, finding, impossible
 
 MOST_ROWS = 60
-"""Rows of tables that are checked; the time that simulations take grows with their cube."""
+"""Longest table that is checked; the time that simulations take grows with the cube of its rows."""
 
 
 def check_motion(model: RobotModel, *, seed: int = 0) -> tuple[Check, ...]:
-    """Check that a robot moves as physics has it, when it is simulated.
+    """Check that a simulated robot moves as physics requires.
 
     Args:
-        model: the robot.
-        seed: of all random numbers.
+        model: The robot.
+        seed: Seed of all random numbers.
 
     Returns:
-        A check of energy, momentum, rest, tracking, inverse dynamics and self-contact each. What cannot be checked
-        of this robot has ``ok`` None, and says why.
+        A check each of energy, momentum, rest, tracking, inverse dynamics and self-contact. One that cannot be made
+        of this robot has ``ok`` None, and the reason.
     """
     checks: dict[Quantity, Callable[[], Check]] = {
         Quantity.ENERGY: lambda: check_energy(model, free_model(model), seed=seed),
@@ -58,8 +58,8 @@ def check_motion(model: RobotModel, *, seed: int = 0) -> tuple[Check, ...]:
 
 
 def _timed(quantity: Quantity, check: Callable[[], Check]) -> Check:
-    """Make a check; one that breaks down, in whatever way, has failed."""
-    begun = time.perf_counter()
+    """Make a check; one that raises anything unexpected has failed."""
+    start = time.perf_counter()
     try:
         found = check()
     except Dh2simError as refusal:
@@ -68,4 +68,4 @@ def _timed(quantity: Quantity, check: Callable[[], Check]) -> Check:
         raise
     except Exception as error:
         found = finding(quantity, math.inf, 0.0, samples=0, failure=f"broke down: {type(error).__name__}: {error}")
-    return replace(found, seconds=time.perf_counter() - begun)
+    return replace(found, seconds=time.perf_counter() - start)

@@ -1,4 +1,4 @@
-"""Links that touch by construction must never make contacts, and nothing may touch where the robot rests."""
+"""Check of self-contacts: neither adjacent links nor links in a named configuration may collide."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dh2sim.validate.motion.free_motion import compile_model
 from dh2sim.validate.report import Check, Quantity, Worst, finding
 
 WAYPOINTS = 16
-"""Random configurations of a tour, joined by straight lines in joint space."""
+"""Random configurations of a tour, connected by straight lines in joint space."""
 POINTS = 40
 """Configurations on each line."""
 
@@ -24,8 +24,8 @@ Pair = tuple[str, str]
 
 
 @dataclass(slots=True, kw_only=True)
-class _Offences:
-    """The deepest contact that there must not be."""
+class _ForbiddenContacts:
+    """The pairs of links in forbidden contact, and the deepest contact."""
 
     depth: float = 0.0
     text: str = ""
@@ -41,29 +41,29 @@ class _Offences:
 
 
 def check_self_contact(model: RobotModel, compiled: mujoco.MjModel, *, seed: int = 0) -> Check:
-    """Look for contacts between links that there must not be.
+    """Look for forbidden contacts between links.
 
     - In the configurations of the robot file, and at zero where the limits allow it, no links may touch.
-    - Along a random tour of the workspace no links may make a contact that touch by construction: neighbours on the
-      chain (fixed links count as one with the link that carries them), and links whose shapes overlap at home or at
-      zero when all may collide with all.
-    - No links may make a contact all along the tour: they, too, touch by construction.
+    - Along a random tour of the workspace links that touch by construction may not collide: neighbours on the chain
+      (fixed links count as part of the link that carries them), and links whose shapes overlap at home or at zero
+      when collisions of all links are enabled.
+    - No two links may collide all along the tour: they, too, touch by construction.
 
-    Other contacts on the tour are what an arm may do to itself, and are no fault of its model.
+    Other contacts on the tour are possible for a real arm, and not an error of its model.
 
     Args:
-        model: the robot.
-        compiled: the robot as it is simulated.
-        seed: of the tour.
+        model: The robot.
+        compiled: The robot as it is simulated.
+        seed: Seed of the tour.
 
     Returns:
-        A check whose error is the deepest overlap of two links that must not make a contact, m; none is allowed.
+        A check whose error is the deepest forbidden overlap of two links, m; none is allowed.
     """
-    offences = _Offences()
+    forbidden = _ForbiddenContacts()
     collide = _Collider(compiled)
-    for name, q in _rests(model):
+    for name, q in _named_configurations(model):
         for pair, depth in collide.contacts(q).items():
-            offences.add(pair, depth, q, name)
+            forbidden.add(pair, depth, q, name)
     apart = by_construction(model)
     tour = random_tour(model, seed)
     always: set[Pair] | None = None
@@ -75,25 +75,25 @@ def check_self_contact(model: RobotModel, compiled: mujoco.MjModel, *, seed: int
             deepest[pair] = max(deepest.get(pair, (-1.0, 0)), (depth, sample))
     for pair, (depth, sample) in deepest.items():
         if pair in apart:
-            offences.add(pair, depth, tour[sample], "on a tour of the workspace, and touch by construction", sample)
+            forbidden.add(pair, depth, tour[sample], "on a tour of the workspace, and touch by construction", sample)
         elif always and pair in always:
-            offences.add(pair, depth, tour[sample], "and touch all along a tour of the workspace", sample)
-    more = len(offences.pairs) - 1
-    others = f"; so do other links, {more} pair{'s' if more > 1 else ''} more" if more > 0 else ""
-    touching = float(np.nextafter(0.0, 1.0))  # a contact of no depth is one, too
+            forbidden.add(pair, depth, tour[sample], "and touch all along a tour of the workspace", sample)
+    more = len(forbidden.pairs) - 1
+    others = f", and {more} other pair{'s' if more > 1 else ''} of links" if more > 0 else ""
+    touching = float(np.nextafter(0.0, 1.0))  # a contact of depth zero counts, too
     return finding(
         Quantity.SELF_CONTACT,
-        max(offences.depth, touching) if offences.pairs else 0.0,
+        max(forbidden.depth, touching) if forbidden.pairs else 0.0,
         0.0,
         samples=len(tour),
         reference="table",
-        failure=f"{offences.text}{others}. Simulated, they would push each other away",
-        worst=offences.worst,
+        failure=f"{forbidden.text}{others}. Simulated, they would push each other away",
+        worst=forbidden.worst,
     )
 
 
 def random_tour(model: RobotModel, seed: int) -> Array:
-    """Configurations along straight lines between random ones inside the limits, shape (N, n)."""
+    """Return configurations along straight lines between random ones inside the limits, shape (N, n)."""
     lower, upper = model.travel
     waypoints = np.random.default_rng([seed, 6]).uniform(lower, upper, (WAYPOINTS, len(lower)))
     share = np.linspace(0.0, 1.0, POINTS, endpoint=False)[:, None]
@@ -102,7 +102,7 @@ def random_tour(model: RobotModel, seed: int) -> Array:
 
 
 def by_construction(model: RobotModel) -> set[Pair]:
-    """Pairs of links that touch by construction; found by MuJoCo, without the model's own list of them."""
+    """Return the pairs of links that touch by construction, found by MuJoCo and without the model's list of them."""
     body = [0]
     for row in model.spec.rows:
         body.append(body[-1] + (1 if row.type.moves else 0))
@@ -116,8 +116,8 @@ def by_construction(model: RobotModel) -> set[Pair]:
     return pairs
 
 
-def _rests(model: RobotModel) -> Iterator[tuple[str, Array]]:
-    """Configurations in which a robot stands, each with words for it; zero only if it is inside the limits."""
+def _named_configurations(model: RobotModel) -> Iterator[tuple[str, Array]]:
+    """Yield configurations with words for them; zero only if it is inside the limits."""
     lower, upper = model.travel
     zero = np.zeros_like(model.home)
     if np.all((lower <= zero) & (zero <= upper)):
@@ -127,14 +127,14 @@ def _rests(model: RobotModel) -> Iterator[tuple[str, Array]]:
 
 
 class _Collider:
-    """Finds which links of a model make contacts."""
+    """Finds the colliding links of a model."""
 
     def __init__(self, compiled: mujoco.MjModel) -> None:
         self._model = compiled
         self._data = mujoco.MjData(compiled)
 
     def contacts(self, q: Array) -> dict[Pair, float]:
-        """Pairs of links that overlap, and how deep, m."""
+        """Return pairs of links that overlap with the depth, m."""
         self._data.qpos[:] = q
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)

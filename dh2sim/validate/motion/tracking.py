@@ -1,9 +1,4 @@
-"""Computed torque follows its reference as closely as sampled control can.
-
-Inverse dynamics of what was recorded give the forces that were recorded.
-
-An arm whose motors balance gravity stays where it is.
-"""
+"""Checks of controlled motion: rest under gravity compensation, tracking by computed torque, inverse dynamics."""
 
 from __future__ import annotations
 
@@ -15,7 +10,7 @@ import numpy as np
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.simulate.run import rollout
 from dh2sim.typing import Array
-from dh2sim.validate.motion.free_motion import frictionless, untouchable, without_dry_friction
+from dh2sim.validate.motion.free_motion import frictionless, without_contacts, without_dry_friction
 from dh2sim.validate.report import Check, Quantity, Worst, finding, impossible
 
 if TYPE_CHECKING:
@@ -24,11 +19,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CONTROLLERS = ("sine", "computed-torque")
-"""One that looks at no state, with position actuators, and one that does, with motors."""
+"""An open-loop one with position actuators, and a closed-loop one with motors."""
 INVERSE_ARMS = 2
 INVERSE_STEPS = 200
 INVERSE_TOLERANCE = 1e-9
-"""Of the greatest force that the joint sees."""
+"""Of the greatest force on the joint."""
 
 
 def recorded_rollouts(model: RobotModel, *, seed: int = 0) -> tuple[xr.Dataset, ...]:
@@ -48,17 +43,17 @@ def recorded_rollouts(model: RobotModel, *, seed: int = 0) -> tuple[xr.Dataset, 
 
 
 def check_inverse(runs: Sequence[xr.Dataset]) -> Check:
-    """Require ``mj_inverse``, given positions, velocities and accelerations, to return the actuators' forces.
+    """Require ``mj_inverse`` of positions, velocities and accelerations to return the actuators' forces.
 
-    Instants at which a limit or a contact pushes are left out: there ``mj_inverse`` and the simulation agree as well
-    as MuJoCo's solver has converged, and no better. So are those after a rollout became unstable.
+    Instants at which a limit or a contact is active are left out: there ``mj_inverse`` and the simulation agree only
+    as far as MuJoCo's solver has converged. So are those after a rollout became unstable.
 
     Args:
-        runs: what ``recorded_rollouts`` returned; the model is the one in their attributes.
+        runs: The result of ``recorded_rollouts``; the model is the one in their attributes.
 
     Returns:
-        A check whose error is relative to the greatest force that the joint sees in the run: actuators', inertial, or
-        Coriolis, centrifugal and gravity forces together.
+        A check whose error is relative to the greatest force on the joint in the run: that of the actuator, the
+        inertial force, or Coriolis, centrifugal and gravity forces together.
     """
     worst, where, count = -1.0, Worst(where="", q=()), 0
     for run in runs:
@@ -79,15 +74,15 @@ def check_inverse(runs: Sequence[xr.Dataset]) -> Check:
             worst = float(error[instant, joint])
             where = Worst(where=str(run["joint"].values[joint]), q=tuple(columns[0][free][instant].tolist()))
     if not count:
-        return impossible(Quantity.INVERSE, "limits or contacts push at every recorded instant")
+        return impossible(Quantity.INVERSE, "limits or contacts are active at every recorded instant")
     return finding(
         Quantity.INVERSE,
         worst,
         INVERSE_TOLERANCE,
         samples=count,
         reference="mj_inverse",
-        failure=f"the force recorded of {where.where} differs by {worst:.2g} of its greatest from what the recorded "
-        f"acceleration takes (tolerance {INVERSE_TOLERANCE:g})",
+        failure=f"the recorded force on {where.where} differs by {worst:.2g} of its greatest from that of the "
+        f"recorded acceleration (tolerance {INVERSE_TOLERANCE:g})",
         worst=where,
     )
 
@@ -98,9 +93,9 @@ def _finite(columns: list[Array]) -> list[Array]:
 
 
 def _inverse(model: mujoco.MjModel, q: Array, v: Array, a: Array) -> tuple[np.ndarray, Array, Array]:
-    """For N instants: whether no constraint is active, shape (N,), and the inverse dynamics' forces, shape (N, nv).
+    """Return for N instants whether no constraint is active, shape (N,), and the inverse dynamics, shape (N, nv).
 
-    The third are the greatest of the forces that add up to the second.
+    The third result is the greatest of the forces whose sum is the second.
     """
     data = mujoco.MjData(model)
     free = np.empty(len(q), dtype=bool)
@@ -124,9 +119,9 @@ REST_TOLERANCE = 1e-9
 
 
 def resting_rollouts(model: RobotModel, *, controller: str = "gravity-compensation", seed: int = 0) -> xr.Dataset:
-    """Let a robot stand in random poses, without friction, which would hide what is not balanced."""
+    """Hold a robot in random poses, without friction, which would hide unbalanced forces."""
     return rollout(
-        untouchable(frictionless(model)),
+        without_contacts(frictionless(model)),
         rollouts=POSES,
         duration=DURATION,
         controller=controller,
@@ -140,11 +135,10 @@ def check_rest(run: xr.Dataset) -> Check:
     """Require an arm to stay where it started.
 
     Args:
-        run: what ``resting_rollouts`` returned. Rollouts in which a motor is too weak for the weight that it carries
-            are left out.
+        run: The result of ``resting_rollouts``. Rollouts in which a motor is too weak to hold its load are left out.
 
     Returns:
-        A check whose error is the farthest that any joint moved in a second, rad or m.
+        A check whose error is the greatest motion of a joint in a second, rad or m.
     """
     held = ~(run["saturation"].values > 0).any(axis=1)
     if not held.any():
@@ -169,23 +163,23 @@ def check_rest(run: xr.Dataset) -> Check:
 
 TRACKING_ARMS = 8
 PERIODS = (1.0, 2.0, 4.0, 8.0, 16.0)
-"""s: durations of a motion from waypoint to waypoint, tried in turn until no motor is too weak for it."""
+"""s: durations of a motion from waypoint to waypoint, tried in turn until no motor is too weak."""
 TRACKING_STEPS = 250
-"""Time steps of such a motion; there are two of them."""
+"""Time steps of each of two such motions."""
 BANDWIDTH = 20.0
-"""Of the controller, rad/s, times the duration."""
+"""Bandwidth of the controller, rad/s, times the duration."""
 TRACKING_TOLERANCE = 0.2
-"""Of the way that a joint makes in a time step at its greatest speed. Theory gives 0.14 whatever the arm: the errors
-of computed torque know nothing of its masses, and only come from controls that are constant during a time step."""
-STANDING = 1e-9
-"""rad or m: way of a joint that stands still, as errors go."""
+"""Of the distance that a joint moves in a time step at its greatest speed. Theory gives 0.14 for any arm: the errors
+of computed torque do not depend on its masses, and come only from controls that are constant during a time step."""
+LEAST_STEP = 1e-9
+"""rad or m: lower bound of that distance."""
 
 
 def tracking_rollouts(model: RobotModel, *, controller: str = "computed-torque", seed: int = 0) -> xr.Dataset:
-    """Let a robot follow smooth random references, without friction and contacts, as fast as its motors allow."""
+    """Follow smooth random references, without friction and contacts, as fast as the motors allow."""
     for period in PERIODS:
         run = rollout(
-            untouchable(frictionless(model)),
+            without_contacts(frictionless(model)),
             rollouts=TRACKING_ARMS,
             steps=2 * TRACKING_STEPS,
             timestep=period / TRACKING_STEPS,
@@ -200,14 +194,14 @@ def tracking_rollouts(model: RobotModel, *, controller: str = "computed-torque",
 
 
 def check_tracking(run: xr.Dataset) -> Check:
-    """Require every joint to be close to its reference all the time.
+    """Require every joint to stay close to its reference.
 
     Args:
-        run: what ``tracking_rollouts`` returned. Rollouts in which a motor is too weak are left out.
+        run: The result of ``tracking_rollouts``. Rollouts in which a motor is too weak are left out.
 
     Returns:
-        A check whose error is in units of the way that the joint makes in a time step at its greatest speed, so that
-        it means the same for slides and for joints that turn, for small robots and for large ones.
+        A check whose error is in units of the distance that the joint moves in a time step at its greatest speed, so
+        that it is comparable for prismatic and revolute joints, and for small and large robots.
     """
     strong = ~(run["saturation"].values > 0).any(axis=1)
     if not strong.any():
@@ -216,7 +210,7 @@ def check_tracking(run: xr.Dataset) -> Check:
     error = np.abs(run["qpos"].values - run["qpos_ref"].values)
     error = np.where(np.isfinite(error), error, np.inf).max(axis=1)
     speed = np.abs(run["qvel_ref"].values).max(axis=(0, 1))
-    relative = error / np.maximum(speed * float(run.attrs["timestep"]), STANDING)
+    relative = error / np.maximum(speed * float(run.attrs["timestep"]), LEAST_STEP)
     row, joint = (int(k) for k in np.unravel_index(np.argmax(relative), relative.shape))
     name, unit = str(run["joint"].values[joint]), str(run["joint_unit"].values[joint])
     return finding(
@@ -224,7 +218,7 @@ def check_tracking(run: xr.Dataset) -> Check:
         float(relative[row, joint]),
         TRACKING_TOLERANCE,
         samples=len(error),
-        failure=f"{name} is {error[row, joint]:.2g} {unit} off its reference, {relative[row, joint]:.2g} of the way "
-        f"that it makes in a time step (tolerance {TRACKING_TOLERANCE:g})",
+        failure=f"{name} is {error[row, joint]:.2g} {unit} off its reference, {relative[row, joint]:.2g} of its "
+        f"motion in a time step (tolerance {TRACKING_TOLERANCE:g})",
         worst=Worst(where=name, q=tuple(run["qpos"].values[row, 0].tolist()), sample=int(run["rollout"].values[row])),
     )

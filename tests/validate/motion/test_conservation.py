@@ -62,7 +62,7 @@ def test_an_integrator_of_first_order_is_found_out(integrator: str) -> None:
     assert check.ok is False
     assert error(check) == pytest.approx(3.0, abs=0.1)
     assert check.reason is not None
-    assert check.reason.startswith("the energy error under RK4 falls with the power 1.0")
+    assert check.reason.startswith("the energy error with RK4 decreases with the power 1.0")
 
 
 def spoilt(compiled: mujoco.MjModel, how: str) -> mujoco.MjModel:
@@ -106,8 +106,8 @@ def test_an_unstable_simulation_conserves_nothing() -> None:
     check = check_energy(model, compiled)
     assert check.ok is False
     assert check.reason == (
-        "the energy error under RK4 falls with the power 0.00 of the timestep, not with 4: from inf of the energy to "
-        "inf when it is halved 3 times"
+        "the energy error with RK4 decreases with the power 0.00 of the timestep instead of 4: from inf of the "
+        "energy to inf in 3 halvings"
     )
 
 

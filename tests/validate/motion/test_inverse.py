@@ -60,8 +60,8 @@ def test_a_record_of_another_instant_is_found(runs: tuple[xr.Dataset, ...], name
     assert check.max_error > 1e-6
     assert check.worst is not None
     assert check.reason == (
-        f"the force recorded of {check.worst.where} differs by {check.max_error:.2g} of its greatest from what the "
-        "recorded acceleration takes (tolerance 1e-09)"
+        f"the recorded force on {check.worst.where} differs by {check.max_error:.2g} of its greatest from that of "
+        "the recorded acceleration (tolerance 1e-09)"
     )
 
 
@@ -98,7 +98,7 @@ def test_nothing_is_checked_where_friction_acts_all_the_time() -> None:
     run = rollout(built(FRICTION), rollouts=1, steps=20, controller="sine", record=RECORD)
     check = check_inverse([run])
     assert check.ok is None
-    assert check.reason == "inverse dynamics: limits or contacts push at every recorded instant"
+    assert check.reason == "inverse dynamics: limits or contacts are active at every recorded instant"
 
 
 def test_what_follows_after_a_rollout_became_unstable_is_left_out(runs: tuple[xr.Dataset, ...]) -> None:

@@ -58,7 +58,7 @@ def test_momenta_of_a_floating_robot_are_those_of_mujoco(robot: str) -> None:
         rotation=R[None],
         position=data.qpos[None, :3],
         velocity=data.qvel[None, :3],
-        turning=(R @ data.qvel[3:6])[None],
+        angular_velocity=(R @ data.qvel[3:6])[None],
     )
     links = bodies(model, q, v, base)
     root = compiled.body("base_link").id

@@ -87,8 +87,8 @@ def test_a_configuration_in_which_links_touch_is_named() -> None:
     assert check.worst.q == (0.0, 2.1, 2.1)
     assert check.max_error is not None
     assert check.reason == (
-        f"link_1 and link_3 overlap by {check.max_error:.2g} m in configuration 'folded'; so do other links, 1 pair "
-        "more. Simulated, they would push each other away"
+        f"link_1 and link_3 overlap by {check.max_error:.2g} m in configuration 'folded', and 1 other pair of "
+        "links. Simulated, they would push each other away"
     )
 
 

@@ -65,7 +65,7 @@ def test_dry_friction_that_a_controller_knows_nothing_of_is_found_out() -> None:
     assert check.worst is not None
     assert check.reason is not None
     assert check.reason.startswith(f"{check.worst.where} is ")
-    assert check.reason.endswith(" of the way that it makes in a time step (tolerance 0.2)")
+    assert check.reason.endswith(" of its motion in a time step (tolerance 0.2)")
 
 
 def test_what_is_not_finite_is_off_its_reference() -> None:
