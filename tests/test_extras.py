@@ -91,7 +91,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("plot", "frames axes.yaml -q --picture frames.svg", "a picture of frames"),
         ("video", "render run.zarr", "rendering"),
         ("video", "render rpr", "rendering"),
-        ("data", "runs run.zarr", "a run as an xarray dataset"),
         ("data", "runs run.zarr --to parquet", "Parquet"),
         ("data", "runs run.zarr --to hdf5", "HDF5"),
         ("data", "validate rpr --dynamics", "--dynamics"),
@@ -144,10 +143,12 @@ def test_nothing_is_simulated_that_could_not_be_returned(folder: Path) -> None:
         "convert rpr --to modified -q",
         "frames axes.yaml -q",
         "rollout rpr --out other.zarr --rollouts 2 --steps 5",
+        "runs run.zarr",
     ],
 )
 def test_the_core_works_without_any_extra(folder: Path, tmp_path: Path, command: str) -> None:
     shutil.copy(folder / "axes.yaml", tmp_path)
+    shutil.copytree(folder / "run.zarr", tmp_path / "run.zarr")
     done = Blocked(OPTIONAL, tmp_path).dh2sim(*command.split())
     assert (done.status, done.err) == (0, "")
 
