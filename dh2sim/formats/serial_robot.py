@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, TypeAlias
+from typing import Final
 
 from dh2sim.kinematics.serial_chain import SerialChain
 from dh2sim.messages import Notes, listed
 from dh2sim.model.mass import MassProperties, is_possible
+from dh2sim.model.robot_model import Color
 from dh2sim.robot.fields import MESH_SUFFIXES
 from dh2sim.robot.spec import ActuatorSpec, Dynamics, Limits
 from dh2sim.typing import Array, read_only
@@ -19,8 +20,6 @@ GREATEST: Final = 1e30
 """Of any number in a file: a product of a few of them is still a finite double."""
 _SAME_SCALE: Final = 1e-6
 """By which the three scales of a mesh may differ, relative to the greatest."""
-Color: TypeAlias = tuple[float, float, float, float]
-"""Red, green, blue, alpha, each from 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -148,10 +147,3 @@ def can_show(suffix: str, scale: Sequence[float], name: str, notes: Notes) -> bo
         notes.group("Meshes that are mirrored or scaled unevenly are not carried over: {}.", name, detail)
         return False
     return True
-
-
-def properties(link: SerialLink) -> MassProperties | None:
-    """Return a link's mass properties in its frame, or None where the file does not give all of them."""
-    if link.mass is None or link.com is None or link.inertia is None:
-        return None
-    return MassProperties(mass=link.mass, com=link.com, inertia=link.inertia)

@@ -10,10 +10,11 @@ import numpy as np
 
 from dh2sim.formats.mjcf.compile import Compiled, MeshFile
 from dh2sim.formats.mjcf.tree import WORLD, MjcfBody, MjcfTree, pose
-from dh2sim.formats.serial_robot import Color, Inertial, Look, SerialMesh, can_show, possible_inertial
+from dh2sim.formats.serial_robot import Inertial, Look, SerialMesh, can_show, possible_inertial
 from dh2sim.kinematics.transforms import compose, invert, rotate_tensor
 from dh2sim.messages import Notes, listed
 from dh2sim.model.mass import MassProperties, combine, in_frame
+from dh2sim.model.robot_model import Color
 from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:

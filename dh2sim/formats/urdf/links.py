@@ -11,13 +11,14 @@ from typing import Final
 import numpy as np
 
 from dh2sim.formats.mesh_paths import FindMesh
-from dh2sim.formats.serial_robot import Color, Inertial, Look, SerialMesh, can_show, possible_inertial
+from dh2sim.formats.serial_robot import Inertial, Look, SerialMesh, can_show, possible_inertial
 from dh2sim.formats.urdf.chain import Selection
 from dh2sim.formats.urdf.tree import UrdfJoint, UrdfTree, read_number, read_numbers, read_only_child, read_pose
 from dh2sim.formats.xml_read import Element, XmlReport, place
 from dh2sim.kinematics.transforms import compose, identity, move_point, rotate_tensor
 from dh2sim.messages import Notes, shown
 from dh2sim.model.mass import MassProperties, combine, is_possible
+from dh2sim.model.robot_model import Color
 from dh2sim.typing import Array, read_only
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dh2sim.errors import ImportedFileError
-from dh2sim.formats.serial_robot import SerialLink, SerialRobot, properties
+from dh2sim.formats.serial_robot import SerialLink, SerialRobot
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.robot.spec import Limits
 from tests.formats.urdf.samples import joint, links, read, robot
@@ -111,11 +111,11 @@ def test_an_inertia_is_turned_into_the_axes_of_its_link() -> None:
     link = found.links[0]
     R = pose_from_rpy([0, 0, 0], rpy)[:3, :3]
     I = np.array([[0.2, 0.01, 0], [0.01, 0.3, -0.02], [0, -0.02, 0.25]])  # noqa: E741
-    body = properties(link)
-    assert body is not None
-    assert body.mass == 2.0
-    np.testing.assert_array_equal(body.com, [1, 2, 3])
-    np.testing.assert_allclose(body.inertia, R @ I @ R.T, rtol=0, atol=1e-15)
+    assert link.mass == 2.0
+    assert link.com is not None
+    assert link.inertia is not None
+    np.testing.assert_array_equal(link.com, [1, 2, 3])
+    np.testing.assert_allclose(link.inertia, R @ I @ R.T, rtol=0, atol=1e-15)
     assert mass_notes(found) == []
 
 
