@@ -26,7 +26,7 @@ class RunBlocks:
 
     dataset: xr.Dataset = field(repr=False)
     """All of it; coordinates are loaded, variables are not."""
-    run: StoredRun
+    stored: StoredRun
 
     def __iter__(self) -> Iterator[tuple[range, xr.Dataset]]:
         """Yield ranges of rollouts with their part of the dataset, loaded; blank where a block is not committed.
@@ -34,11 +34,11 @@ class RunBlocks:
         Raises:
             RunDamagedError: A chunk is damaged.
         """
-        for block in range(self.run.manifest.blocks):
-            rollouts = self.run.manifest.part(block)
+        for block in range(self.stored.manifest.blocks):
+            rollouts = self.stored.manifest.part(block)
             part = self.dataset.isel(rollout=rollouts)
-            if self.run.committed(block) is not None:
-                with reading(self.run.path):
+            if self.stored.committed(block) is not None:
+                with reading(self.stored.path):
                     part = part.load()
             else:
                 part = _blank(part)
@@ -56,7 +56,7 @@ def open_blocks(path: Path) -> RunBlocks:
         dataset = dataset.assign_coords({name: labels.load() for name, labels in dataset.coords.items()})
     if not all(labels.is_unique for labels in dataset.indexes.values()):
         raise RunDamagedError(damaged_run(path))
-    return RunBlocks(dataset=dataset, run=open_run(path))
+    return RunBlocks(dataset=dataset, stored=open_run(path))
 
 
 def _blank(part: xr.Dataset) -> xr.Dataset:

@@ -1,10 +1,4 @@
-"""A run as one HDF5 file in the netCDF-4 layout, which xarray reads as the same dataset.
-
-A file that the HDF5 library writes to without ever being told of an error.
-
-When a write fails, HDF5 cannot close its file: it keeps trying, prints, and may crash at exit. So the file
-remembers the error and takes the rest without writing it; whoever asks for the writing looks after the error.
-"""
+"""Conversion of a run to one HDF5 file in the netCDF-4 layout, which xarray reads as the same dataset."""
 
 from __future__ import annotations
 
@@ -27,30 +21,115 @@ if TYPE_CHECKING:
     import xarray as xr
     from _typeshed import ReadableBuffer, WriteableBuffer
 
+SUFFIX = ".h5"
+CHUNK_BYTES = 4 << 20
+"""Largest chunk: HDF5 reads and unpacks whole chunks, and a single rollout is often read."""
+LEVEL = 1
+"""Of gzip; higher levels are much slower and save a few per cent."""
 
-class Sink(io.RawIOBase):
-    """A new file, read and written, that keeps its first error to itself until ``check``."""
+
+def to_hdf5(
+    path: Path,
+    out: Path,
+    *,
+    overwrite: bool = False,
+    advance: Callable[[int], None] = no_progress,
+) -> tuple[Path, ...]:
+    """Write a run as an HDF5 file.
+
+    Args:
+        path: The run.
+        out: The file.
+        overwrite: Whether an existing file is replaced.
+        advance: Called with the number of rollouts that were written.
+
+    Returns:
+        The file written.
+
+    Raises:
+        MissingExtraError: h5netcdf or h5py is not installed.
+        RunError: There is no run, or it is damaged.
+        OutputError: The file exists, or cannot be written.
+    """
+    require_extra("data", "xarray", "h5netcdf", "h5py", what="HDF5")
+    run = open_blocks(path)
+    with output_files([out], run=path, overwrite=overwrite) as [staged], _opened(staged) as (file, sink):
+        with signals_deferred():  # HDF5 calls Python for every write, and does not survive an exception there
+            _define(file, run)
+        for rollouts, block in run:
+            for name in block.data_vars:
+                with signals_deferred():
+                    file.variables[str(name)][rollouts.start : rollouts.stop] = block[name].values
+                sink.check()
+            advance(len(rollouts))
+    return (out,)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[h5netcdf.File, _Sink]]:
+    import h5netcdf
+
+    with closing(_Sink(path)) as sink:
+        file = h5netcdf.File(sink, "w")
+        try:
+            yield file, sink
+        except Exception:
+            sink.check()  # the cause, if there is one, says more
+            raise
+        finally:
+            with signals_deferred():
+                file.close()
+        sink.check()
+
+
+def chunk_shape(shape: tuple[int, ...], itemsize: int, block: int) -> tuple[int, ...]:
+    """Return the shape of the chunks of a variable.
+
+    A chunk holds whole rollouts, as many as fit into ``CHUNK_BYTES`` and divide a block. If not even one fits, it
+    holds as many of its records as do.
+
+    Args:
+        shape: Of the variable, rollouts first.
+        itemsize: Bytes of a number.
+        block: Rollouts in a block.
+    """
+    one = itemsize * math.prod(shape[1:])
+    if one > CHUNK_BYTES and len(shape) > 1:
+        records = max(1, CHUNK_BYTES * shape[1] // one)
+        return (1, records, *shape[2:])
+    block = min(block, shape[0])
+    fitting = max(1, min(block, CHUNK_BYTES // max(1, one)))
+    rollouts = max(count for count in range(1, fitting + 1) if block % count == 0)
+    return (rollouts, *shape[1:])
+
+
+class _Sink(io.RawIOBase):
+    """A new file that HDF5 reads and writes without learning of an error.
+
+    When a write fails, HDF5 cannot close its file: it keeps trying, prints, and may crash at exit. So this file keeps
+    its first error until ``check`` raises it, and drops what is written after it.
+    """
 
     def __init__(self, path: Path) -> None:
-        """Make the file.
+        """Create the file.
 
         Raises:
-            OSError: it cannot be made.
+            OSError: It cannot be created.
         """
         self._file = open(path, "xb+", buffering=0)  # noqa: SIM115
         self._error: OSError | None = None
 
     def check(self) -> None:
-        """Raise the error that there was.
+        """Raise the first error, if any.
 
         Raises:
-            OSError: something could not be written.
+            OSError: Something could not be written.
         """
         if self._error is not None:
             raise self._error
 
     def write(self, data: ReadableBuffer, /) -> int:
-        """Write all of the data, if nothing went wrong before."""
+        """Write all of the data, unless there was an error."""
         view = memoryview(data).cast("B")
         done = 0
         while done < len(view) and self._error is None:
@@ -68,15 +147,15 @@ class Sink(io.RawIOBase):
         return len(view)
 
     def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
-        """Move to a place."""
+        """Change the position."""
         return self._file.seek(offset, whence)
 
     def tell(self) -> int:
-        """Return the place."""
+        """Return the position."""
         return self._file.tell()
 
     def truncate(self, size: int | None = None, /) -> int:
-        """Make the file as long as that."""
+        """Change the length of the file."""
         try:
             return self._file.truncate(size)
         except OSError as error:
@@ -89,89 +168,8 @@ class Sink(io.RawIOBase):
         super().close()
 
 
-SUFFIX = ".h5"
-CHUNK_BYTES = 4 << 20
-"""Of a chunk at most: HDF5 reads and unpacks whole chunks, and looks into one rollout are common."""
-LEVEL = 1
-"""Of gzip; higher ones are slower by far, and gain a few per cent."""
-
-
-def to_hdf5(
-    path: Path,
-    out: Path,
-    *,
-    overwrite: bool = False,
-    advance: Callable[[int], None] = no_progress,
-) -> tuple[Path, ...]:
-    """Write a run as an HDF5 file.
-
-    Args:
-        path: the run.
-        out: the file.
-        overwrite: whether a file that stands there is replaced.
-        advance: told of rollouts as they are written.
-
-    Returns:
-        The file written.
-
-    Raises:
-        Dh2simError: h5netcdf or h5py is not installed, there is no run or a damaged one, the file exists already or
-            cannot be written.
-    """
-    require_extra("data", "xarray", "h5netcdf", "h5py", what="HDF5")
-    run = open_blocks(path)
-    with output_files([out], run=path, overwrite=overwrite) as [staged], _opened(staged) as (file, sink):
-        with signals_deferred():  # HDF5 calls Python for every write, and is lost if that raises
-            _define(file, run)
-        for rollouts, block in run:
-            for name in block.data_vars:
-                with signals_deferred():
-                    file.variables[str(name)][rollouts.start : rollouts.stop] = block[name].values
-                sink.check()
-            advance(len(rollouts))
-    return (out,)
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[tuple[h5netcdf.File, Sink]]:
-    import h5netcdf
-
-    with closing(Sink(path)) as sink:
-        file = h5netcdf.File(sink, "w")
-        try:
-            yield file, sink
-        except Exception:
-            sink.check()  # where that is the reason, it says more
-            raise
-        finally:
-            with signals_deferred():
-                file.close()
-        sink.check()
-
-
-def chunk_shape(shape: tuple[int, ...], itemsize: int, block: int) -> tuple[int, ...]:
-    """Return the shape of the chunks of a variable.
-
-    Whole rollouts, as many as fit into ``CHUNK_BYTES`` and divide a block, so that a block is whole chunks; of a
-    rollout that does not fit as many records as do.
-
-    Args:
-        shape: of the variable, rollouts first.
-        itemsize: bytes of a number.
-        block: rollouts in a block.
-    """
-    one = itemsize * math.prod(shape[1:])
-    if one > CHUNK_BYTES and len(shape) > 1:
-        records = max(1, CHUNK_BYTES * shape[1] // one)
-        return (1, records, *shape[2:])
-    block = min(block, shape[0])
-    fitting = max(1, min(block, CHUNK_BYTES // max(1, one)))
-    rollouts = max(count for count in range(1, fitting + 1) if block % count == 0)
-    return (rollouts, *shape[1:])
-
-
 def _define(file: h5netcdf.File, run: RunBlocks) -> None:
-    """Write everything but the variables' numbers."""
+    """Write everything except the numbers of variables."""
     dataset = run.dataset
     file.dimensions = {str(name): size for name, size in dataset.sizes.items()}
     for key, value in dataset.attrs.items():
@@ -181,7 +179,7 @@ def _define(file: h5netcdf.File, run: RunBlocks) -> None:
     for name, variable in dataset.data_vars.items():
         stored: dict[str, Any] = {}
         if variable.size:
-            chunks = chunk_shape(variable.shape, variable.dtype.itemsize, run.run.manifest.block)
+            chunks = chunk_shape(variable.shape, variable.dtype.itemsize, run.stored.manifest.block)
             stored = {"chunks": chunks, "compression": "gzip", "compression_opts": LEVEL, "shuffle": True}
         made = file.create_variable(str(name), tuple(map(str, variable.dims)), variable.dtype, **stored)
         for key, value in _attributes(variable).items():
@@ -209,7 +207,7 @@ def _write_coordinate(file: h5netcdf.File, name: str, coordinate: xr.DataArray) 
 
 
 def _attributes(variable: xr.DataArray) -> Mapping[str, Any]:
-    """Return a variable's attributes; flags get the variable's own type, as the CF conventions want."""
+    """Return a variable's attributes; flags have the type of the variable, as the CF conventions require."""
     return {
         str(key): np.asarray(value, dtype=variable.dtype) if key == "flag_values" else _attribute(value)
         for key, value in variable.attrs.items()
@@ -217,7 +215,7 @@ def _attributes(variable: xr.DataArray) -> Mapping[str, Any]:
 
 
 def _attribute(value: object) -> str | int | float:
-    """Return an attribute as HDF5 can hold it: texts and numbers as they are, anything else as JSON."""
+    """Return an attribute for HDF5: text and numbers as they are, anything else as JSON."""
     value = plain(value)
     if isinstance(value, str | float) or (isinstance(value, int) and not isinstance(value, bool) and value < 2**63):
         return value

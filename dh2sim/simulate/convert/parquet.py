@@ -1,12 +1,8 @@
-"""A run as Parquet tables, in the long form that data frames and databases want.
+"""Conversion of a run to Parquet tables, in the long form that data frames and databases use.
 
-Three files, one for each kind of row: ``RUN.parquet`` has a row for every rollout, step and joint,
+There are three files, one for each kind of row: ``RUN.parquet`` has a row for every rollout, step and joint,
 ``RUN.steps.parquet`` one for every rollout and step, ``RUN.rollouts.parquet`` one for every rollout. What was not
-recorded is null: the last step of what belongs to intervals, all that follows an early stop, rollouts not yet run.
-
-Tables of a run's numbers: columns, keys, and the rows of a part of the run. Needs pyarrow.
-
-Which variable of a run goes into which Parquet table, and how its columns are named. Needs pyarrow.
+recorded is null: the last step of interval variables, all that follows an early stop, rollouts not yet simulated.
 """
 
 from __future__ import annotations
@@ -35,15 +31,15 @@ if TYPE_CHECKING:
 
 SUFFIX = ".parquet"
 GROUP_ROWS = 1 << 20
-"""Rows of a row group at most; what is held in memory beside a block."""
+"""Largest row group; it is held in memory beside a block."""
 LEVEL = 3
 """Of zstd."""
 UNLIMITED = (-math.inf, math.inf)
-"""Which JSON knows nothing of."""
+"""Limits that JSON cannot represent."""
 
 
 def parquet_files(out: Path) -> tuple[Path, Path, Path]:
-    """Return the files of a conversion to ``out``: of joints, which is ``out`` itself, of steps, and of rollouts."""
+    """Return the files of a conversion to ``out``: those of joints (``out`` itself), of steps and of rollouts."""
     stem = out.name.removesuffix(SUFFIX)
     return out, out.with_name(f"{stem}.steps{SUFFIX}"), out.with_name(f"{stem}.rollouts{SUFFIX}")
 
@@ -58,17 +54,18 @@ def to_parquet(
     """Write a run as Parquet tables.
 
     Args:
-        path: the run.
-        out: file of the table of joints; those of steps and rollouts come beside it.
-        overwrite: whether files that stand there are replaced.
-        advance: told of rollouts as they are written.
+        path: The run.
+        out: File of the table of joints; those of steps and rollouts are written beside it.
+        overwrite: Whether existing files are replaced.
+        advance: Called with the number of rollouts that were written.
 
     Returns:
         The files written.
 
     Raises:
-        Dh2simError: pyarrow is not installed, there is no run or a damaged one, a file exists already or cannot be
-            written.
+        MissingExtraError: pyarrow is not installed.
+        RunError: There is no run, or it is damaged.
+        OutputError: A file exists, or cannot be written.
     """
     require_extra("data", "xarray", "pyarrow", what="Parquet")
     import pyarrow.parquet as pq
@@ -95,7 +92,7 @@ def to_parquet(
 
 
 def _batches(table: Table, block: xr.Dataset, rollouts: int) -> Iterator[pa.RecordBatch]:
-    """Yield a block's rows, no more at a time than a row group holds (but those of one rollout)."""
+    """Yield the rows of a block, at most a row group at a time, but at least one rollout."""
     if not table.columns:
         return
     step = max(1, GROUP_ROWS // table.rows)
@@ -104,7 +101,7 @@ def _batches(table: Table, block: xr.Dataset, rollouts: int) -> Iterator[pa.Reco
 
 
 def _options(schema: pa.Schema) -> dict[str, Any]:
-    """Return how columns are stored: floating-point numbers byte by byte, what repeats itself as a dictionary."""
+    """Return how columns are stored: floating-point numbers split into bytes, all else as a dictionary."""
     import pyarrow as pa
 
     floats = [field.name for field in schema if pa.types.is_floating(field.type) and field.name != "time"]
@@ -117,7 +114,7 @@ def _options(schema: pa.Schema) -> dict[str, Any]:
 
 
 def _metadata(dataset: xr.Dataset) -> Mapping[str, str]:
-    """Return the run's attributes, and what it tells of joints and actuators."""
+    """Return the attributes of the run and the labels of joints and actuators, as text."""
     labels = {
         str(name): attribute_text([None if label in UNLIMITED else label for label in plain(coordinate.values)])
         for name, coordinate in dataset.coords.items()

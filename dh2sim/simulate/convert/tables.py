@@ -1,4 +1,4 @@
-"""Which variable of a run goes into which Parquet table, and how its columns are computed from a part of the run."""
+"""Parquet tables of a run: which variable goes into which table, and the columns of a part of the run."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ LABEL = pa.dictionary(pa.int32(), pa.string())
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Column:
-    """A column that holds numbers of the run."""
+    """A column of a table."""
 
     name: str
     type: pa.DataType
     values: Callable[[xr.Dataset], NDArray[Any]] = field(repr=False)
-    """Takes a part of the run; returns as many values as it has rows, in the order of the rows."""
+    """Returns the values of a part of the run, one for each row and in their order."""
     missing: int | None = None
-    """What an integer is where nothing was recorded; a floating-point number is NaN there."""
-    words: Sequence[str] | None = None
-    """What the values are numbers of, if the column is to hold the words themselves."""
+    """Integer that means that nothing was recorded; floating-point numbers are NaN."""
+    labels: Sequence[str] | None = None
+    """Labels that the values are indices of, if the column contains labels."""
     metadata: Mapping[str, str] = field(default_factory=dict)
 
     def array(self, part: xr.Dataset) -> pa.Array:
         """Return the column of a part of the run, null where nothing was recorded."""
         values = self.values(part).reshape(-1)
-        if self.words is not None:
-            return pa.DictionaryArray.from_arrays(pa.array(values.astype(np.int32)), pa.array(self.words))
+        if self.labels is not None:
+            return pa.DictionaryArray.from_arrays(pa.array(values.astype(np.int32)), pa.array(self.labels))
         mask = np.isnan(values) if values.dtype.kind == "f" else values == self.missing
         return pa.array(values, type=self.type, mask=mask if np.any(mask) else None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Table:
-    """A table: what tells its rows apart, and what they hold."""
+    """A table: the keys of its rows, and its columns."""
 
     steps: NDArray[np.float64] | None = None
-    """Times of the steps that a rollout has rows for, s; None: it has but one row."""
+    """Times of the steps that a rollout has rows for, s; None: it has a single row."""
     joints: Sequence[str] | None = None
-    """Names of the joints that a step has rows for; None: it has but one row."""
+    """Names of the joints that a step has rows for; None: it has a single row."""
     columns: tuple[Column, ...]
 
     @property
@@ -55,7 +55,7 @@ class Table:
         return (1 if self.steps is None else len(self.steps)) * (1 if self.joints is None else len(self.joints))
 
     def schema(self) -> pa.Schema:
-        """Return names and types; units and meanings are the fields' metadata."""
+        """Return names and types of the columns, with units and descriptions as metadata of the fields."""
         keys = [pa.field("rollout", pa.int64(), nullable=False)]
         if self.steps is not None:
             keys.append(pa.field("step", pa.int64(), nullable=False))
@@ -89,16 +89,16 @@ ORDER = (
     *("tool_pose", "energy", "contacts", "base_pose", "base_twist"),
     *("status", "stop_step", "saturation"),
 )
-"""Of columns; others follow by name."""
+"""Order of columns; others follow by name."""
 NO_INTEGER = -1
-"""Stands in a run's integers where nothing was recorded."""
+"""Integer of a run that means that nothing was recorded."""
 
 
 def make_tables(dataset: xr.Dataset) -> tuple[Table, Table, Table]:
     """Return the tables of joints, of steps and of rollouts.
 
     Raises:
-        Dh2simError: a variable has dimensions that no table has a place for.
+        Dh2simError: A variable has dimensions that fit no table.
     """
     joints: list[Column] = []
     steps: list[Column] = []
@@ -111,11 +111,11 @@ def make_tables(dataset: xr.Dataset) -> tuple[Table, Table, Table]:
             case ("rollout", "step" | "interval", *other) if len(other) <= 1:
                 steps += _wide(dataset, name, other)
             case ("rollout",) if "flag_meanings" in dataset[name].attrs:
-                rollouts.append(_of_words(dataset, name))
+                rollouts.append(_of_flags(dataset, name))
             case ("rollout", *other) if len(other) <= 1:
                 rollouts += _wide(dataset, name, other)
             case dims:
-                raise Dh2simError(f"variable '{name}' has the dimensions {', '.join(dims)}, which no table has")
+                raise Dh2simError(f"variable '{name}' has the dimensions {', '.join(dims)}, which fit no table")
     times = np.asarray(dataset["time"].values)
     return (
         Table(steps=times, joints=_labels(dataset, "joint"), columns=tuple(joints)),
@@ -125,7 +125,7 @@ def make_tables(dataset: xr.Dataset) -> tuple[Table, Table, Table]:
 
 
 def _of_joints(dataset: xr.Dataset, name: str) -> Column:
-    """A column of the table of joints. What belongs to an actuator stands at the joint that it drives."""
+    """Return a column of the table of joints; values of an actuator are in the row of the joint that it drives."""
     last = _labels(dataset, str(dataset[name].dims[2]))
     if dataset[name].dims[2] == "actuator":
         last = [label.rpartition("_")[0] for label in last]  # an actuator is named after its joint and its type
@@ -165,10 +165,10 @@ def _wide(dataset: xr.Dataset, name: str, dimension: list[str]) -> Iterator[Colu
         yield column(f"{prefix}_{label}", index)
 
 
-def _of_words(dataset: xr.Dataset, name: str) -> Column:
-    """A column that holds the words that a variable's numbers stand for."""
+def _of_flags(dataset: xr.Dataset, name: str) -> Column:
+    """Return a column of the names of a variable's flags."""
     attributes = dataset[name].attrs
-    words = attributes["flag_meanings"].split()
+    labels = attributes["flag_meanings"].split()
     numbers = np.asarray(attributes["flag_values"])
     order = np.argsort(numbers)
 
@@ -176,11 +176,11 @@ def _of_words(dataset: xr.Dataset, name: str) -> Column:
         found: NDArray[Any] = order[np.searchsorted(numbers[order], part[name].values)]
         return found
 
-    return Column(name=name, type=LABEL, values=values, words=words, metadata=_metadata(dataset[name]))
+    return Column(name=name, type=LABEL, values=values, labels=labels, metadata=_metadata(dataset[name]))
 
 
 def _every_step(part: xr.Dataset, name: str) -> NDArray[Any]:
-    """Return a variable's records; those of intervals with nothing for the last step."""
+    """Return the records of a variable for every step; interval variables have none for the last one."""
     values = np.asarray(part[name].values)
     if part[name].dims[1] == "step":
         return values

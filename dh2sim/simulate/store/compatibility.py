@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 from dh2sim.messages import listed, shown
@@ -11,16 +11,22 @@ from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.store.manifest import Manifest
 
 _OF_ROBOT: Final = ("home", "velocity_limits", "kp", "kv")
-"""Settings that come from the robot."""
-_DIGESTS: Final = {
-    "controller_digest": ("controller", "the controller's code or a file that it reads has changed"),
-    "start_digest": ("start", "the initial states have changed"),
+_CONSEQUENCES: Final = {
+    "robot": ("robot_file_sha256", *_OF_ROBOT),
+    "robot_file_sha256": _OF_ROBOT,
+    "controller": ("controller_digest",),
+    "start": ("start_digest",),
 }
-"""Settings that are no use in a message; the setting that each comes from, and what to say instead."""
-_BESIDE_SETTINGS: Final = ("timestep", "integrator")
-"""Settings that are attributes of their own."""
-_NAMES: Final = {"velocity_limits": "velocity limit"}
-_PACKAGES: Final = {"dh2sim": "dh2sim", "mujoco": "MuJoCo", "numpy": "NumPy"}
+"""What changes with another setting, and is not reported beside it."""
+_PHRASES: Final = {
+    "robot_file_sha256": "the robot file has changed (SHA-256 {}, now {})",
+    "controller_digest": "the controller's code or a file that it reads has changed",
+    "start_digest": "the initial states have changed",
+    "mjcf": "the model has changed",
+    "velocity_limits": "velocity limit was {} and is now {}",
+    "mujoco": "MuJoCo was {} and is now {}",
+    "numpy": "NumPy was {} and is now {}",
+}
 _SHOWN_DIGITS: Final = 12
 
 
@@ -29,76 +35,42 @@ def differences(manifest: Manifest, layout: Layout) -> list[str]:
 
     What follows from another difference is left out. The size of blocks, the time and the command may differ.
     """
-    old, new = manifest.attributes, json.loads(json.dumps(dict(layout.attributes)))
-    found = list(_robot(old, new))
-    found += [
-        *_settings(_all_settings(old), _all_settings(new), same_robot=not found),
-        *_versions(old.get("versions") or {}, new.get("versions") or {}),
+    old, new = _compared(manifest.attributes), _compared(json.loads(json.dumps(dict(layout.attributes))))
+    changed = [name for name in {**old, **new} if old.get(name) != new.get(name)]
+    hidden = {name for cause in changed for name in _CONSEQUENCES.get(cause, ())}
+    if changed != ["mjcf"]:
+        hidden.add("mjcf")
+    found = [
+        _PHRASES.get(name, f"{name} was {{}} and is now {{}}").format(*(_value(name, side) for side in (old, new)))
+        for name in changed
+        if name not in hidden
     ]
-    if not found and old.get("mjcf") != new.get("mjcf"):
-        found.append("the model has changed")
-    if not found and _variables(manifest) != _wanted_variables(layout):
-        names = [", ".join(_variables(manifest)), ", ".join(_wanted_variables(layout))]
-        found.append(f"the variables were {names[0]} and are now {names[1]}")
+    stored = {name: (each.dtype, each.dimensions, each.shape) for name, each in manifest.variables.items()}
+    asked = {each.name: (each.dtype.name, each.dimensions, layout.shape(each)) for each in layout.variables}
+    if not found and stored != asked:
+        found.append(f"the variables were {', '.join(stored)} and are now {', '.join(asked)}")
     return found
 
 
-def _variables(manifest: Manifest) -> dict[str, tuple[Any, ...]]:
-    return {name: (stored.dtype, stored.dimensions, stored.shape) for name, stored in manifest.variables.items()}
-
-
-def _wanted_variables(layout: Layout) -> dict[str, tuple[Any, ...]]:
+def _compared(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the attributes that must not differ, in the order in which they are reported."""
+    versions = attributes.get("versions") or {}
     return {
-        variable.name: (variable.dtype.name, variable.dimensions, layout.shape(variable))
-        for variable in layout.variables
+        **{name: attributes.get(name) for name in ("robot", "robot_file_sha256")},
+        **(attributes.get("settings") or {}),
+        **{name: attributes.get(name) for name in ("timestep", "integrator")},
+        **{name: versions.get(name) for name in ("dh2sim", "mujoco", "numpy")},
+        "mjcf": attributes.get("mjcf"),
     }
 
 
-def _robot(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
-    if old.get("robot") != new.get("robot"):
-        yield _change("robot", old.get("robot"), new.get("robot"))
-    elif old.get("robot_file_sha256") != new.get("robot_file_sha256"):
-        digests = [_digest(side.get("robot_file_sha256")) for side in (old, new)]
-        yield f"the robot file has changed (SHA-256 {digests[0]}, now {digests[1]})"
-
-
-def _all_settings(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    return {**(attributes.get("settings") or {}), **{name: attributes.get(name) for name in _BESIDE_SETTINGS}}
-
-
-def _settings(old: Mapping[str, Any], new: Mapping[str, Any], *, same_robot: bool) -> Iterator[str]:
-    changed = _changed(tuple({**old, **new}), old, new)
-    for name in changed:
-        if name in _DIGESTS:
-            origin, words = _DIGESTS[name]
-            if origin not in changed:
-                yield words
-        elif same_robot or name not in _OF_ROBOT:
-            yield _change(name, old.get(name), new.get(name))
-
-
-def _versions(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
-    for name in _changed(tuple(_PACKAGES), old, new):
-        yield f"{_PACKAGES[name]} was {old.get(name)} and is now {new.get(name)}"
-
-
-def _changed(names: tuple[str, ...], old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    return [name for name in names if old.get(name) != new.get(name)]
-
-
-def _change(name: str, old: object, new: object) -> str:
-    return f"{_NAMES.get(name, name)} was {_value(old)} and is now {_value(new)}"
-
-
-def _value(value: object) -> str:
-    match value:
-        case dict():
-            return ",".join(f"{key}={number}" for key, number in value.items()) or "none"
-        case list() | tuple():
-            return listed(map(str, value), between=",")
-        case _:
+def _value(name: str, settings: Mapping[str, Any]) -> str:
+    match settings.get(name):
+        case str(digest) if name.endswith("sha256"):
+            return f"{digest[:_SHOWN_DIGITS]}…" if digest else "none"
+        case dict(items):
+            return ",".join(f"{key}={number}" for key, number in items.items()) or "none"
+        case list(items):
+            return listed(map(str, items), between=",")
+        case value:
             return shown(value)
-
-
-def _digest(value: object) -> str:
-    return f"{value[:_SHOWN_DIGITS]}…" if isinstance(value, str) and value else "none"

@@ -109,9 +109,7 @@ def is_run(path: Path) -> bool:
     Raises:
         RunError: Its metadata may not be read.
     """
-    return _MARK in _attributes(read_node(path / METADATA)) or _STORE_MARK in _attributes(
-        read_node(path / BLOCKS / METADATA)
-    )
+    return _marked(*_group_nodes(path))
 
 
 def read_manifest(path: Path) -> Manifest:
@@ -123,9 +121,9 @@ def read_manifest(path: Path) -> Manifest:
     """
     if not path.exists():
         raise RunError(f"there is no '{path}'")
-    if not is_run(path):
+    root, blocks = _group_nodes(path)
+    if not _marked(root, blocks):
         raise RunError(f"'{path}' is not a run of dh2sim")
-    root, blocks = (read_node(folder / METADATA) for folder in (path, path / BLOCKS))
     if root is None or blocks is None:
         raise damaged_metadata((path if root is None else path / BLOCKS) / METADATA)
     stored, attributes = _attributes(blocks), _attributes(root)
@@ -199,6 +197,14 @@ class BlockRecord:
             return BlockRecord(**json.loads(text))
         except (TypeError, ValueError):
             return None
+
+
+def _group_nodes(path: Path) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+    return read_node(path / METADATA), read_node(path / BLOCKS / METADATA)
+
+
+def _marked(root: dict[str, Any] | None, blocks: dict[str, Any] | None) -> bool:
+    return _MARK in _attributes(root) or _STORE_MARK in _attributes(blocks)
 
 
 def _attributes(node: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -154,8 +153,3 @@ def lasting(run: Path) -> dict[str, bytes]:
         if name.startswith("blocks/record/c."):
             files[name] = re.sub(rb'"seconds": [^,]*', b"", data[8:-4])
     return files
-
-
-def with_setting(of: Layout, **settings: Any) -> Layout:
-    """The same run with other settings in its attributes."""
-    return replace(of, attributes={**of.attributes, "settings": {**of.attributes["settings"], **settings}})

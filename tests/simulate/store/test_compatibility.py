@@ -53,7 +53,7 @@ def _refusal(path: Path, of: Layout) -> str:
         ({"robot": "puma560", "robot_file_sha256": "6" * 64}, "robot was 'small' and is now 'puma560'"),
         (
             {"versions": {"dh2sim": "0.2.0", "mujoco": "3.18.0", "numpy": "2.4.0", "python": "3.11.0"}},
-            "dh2sim was 0.1.0 and is now 0.2.0; MuJoCo was 3.17.0 and is now 3.18.0",
+            "dh2sim was '0.1.0' and is now '0.2.0'; MuJoCo was '3.17.0' and is now '3.18.0'",
         ),
     ],
 )
