@@ -187,11 +187,12 @@ def verify(model: RobotModel, folder: Path, formats: Collection[Format]) -> list
         path = folder / f"{model.name}.{'urdf' if format_ is Format.URDF else 'xml'}"
         try:
             engine = MujocoEngine(path, names, len(model.joints))
+            poses = engine.frame_poses(q)
         except EngineError as error:
             reason = str(error).replace(str(path), path.name)  # without the temporary folder
             raise EngineError(f"{model.name}: {reason}; nothing was written") from error
         reference = table if len(engine.frames) > 1 else table[:, -1:]
-        position, rotation = pose_errors(engine.frame_poses(q), reference)
+        position, rotation = pose_errors(poses, reference)
         result = Verified(
             format=format_, position_error=float(np.max(position)), rotation_error=float(np.max(rotation))
         )

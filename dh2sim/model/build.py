@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass
 from typing import Protocol, TypeAlias
 
+import numpy as np
+
+from dh2sim.errors import ModelError
 from dh2sim.kinematics.chain import HasChain, Joint, KinematicChain, SpecLike, build_chain, spec_of
 from dh2sim.model.actuators import actuator_model, seen_inertias
 from dh2sim.model.collision_exclusions import excluded_pairs
@@ -17,6 +21,8 @@ from dh2sim.model.shapes import Shape
 from dh2sim.robot.configurations import named_configurations
 from dh2sim.robot.spec import JointType, RobotSpec, Row
 
+LARGEST = 1e20
+"""Size of the largest number that a model is built from, and one over the least mass, density or radius."""
 SLENDERNESS = 0.16
 """Radius of the base's shapes as a share of the mean segment."""
 TAPER = 0.45
@@ -66,8 +72,10 @@ def build_model(spec: SpecLike) -> RobotModel:
 
     Raises:
         MeshError: a mesh file cannot be used.
+        ModelError: a number is too large or too small to compute with.
     """
     spec = spec_of(spec)
+    _check_sizes(spec)
     chain = build_chain(spec)
     ranges = position_ranges(chain, spec.rows)
     shapes = _shapes(spec, chain, ranges)
@@ -106,6 +114,34 @@ def build_model(spec: SpecLike) -> RobotModel:
         reach=reach_bound(chain, spec.rows),
         home=home,
     )
+
+
+def _check_sizes(spec: RobotSpec) -> None:
+    """Refuse numbers whose products would leave the range of doubles.
+
+    Raises:
+        ModelError: one is too large, or too small where it is divided by.
+    """
+    parts = {f"joints[{index}]": row for index, row in enumerate(spec.rows)}
+    for part, value in {**parts, "base": spec.base.pose, "tool": spec.tool, "gravity": spec.gravity}.items():
+        for path, number in _numbers(part, value):
+            divides = path.endswith(("mass", "density", "radius"))
+            if abs(number) > LARGEST or (divides and number < 1 / LARGEST):
+                bound = f"at most {LARGEST:g}" if abs(number) > LARGEST else f"at least {1 / LARGEST:g}"
+                raise ModelError(f"{spec.name}: {path} is {number:g}; a model needs numbers of {bound}")
+
+
+def _numbers(path: str, value: object) -> Iterator[tuple[str, float]]:
+    """Yield every number in a part of a spec with its path."""
+    match value:
+        case int() | float():
+            yield path, value
+        case np.ndarray() | tuple():
+            for index, item in enumerate(value):
+                yield from _numbers(f"{path}[{index}]", item)
+        case _ if is_dataclass(value):
+            for field in fields(value):
+                yield from _numbers(f"{path}.{field.name}", getattr(value, field.name))
 
 
 def _shapes(spec: RobotSpec, chain: KinematicChain, ranges: Sequence[Range | None]) -> tuple[tuple[Shape, ...], ...]:

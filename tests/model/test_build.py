@@ -6,17 +6,19 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from dh2sim.errors import ModelError
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.actuators import ASSUMED_BANDWIDTH, ActuatorModel, seen_inertias
 from dh2sim.model.build import BASE_COLOR, JOINT_COLOR, PALETTE, build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType, BaseSpec, Dynamics, LinkSpec, RobotSpec, Row
+from dh2sim.robot.spec import ActuatorSpec, ActuatorType, BaseSpec, Dynamics, JointType, LinkSpec, RobotSpec, Row
 from tests.model.samples import ODD_ROBOT, REVOLUTE, STANDARD, model
 from tests.robots.samples import NAMES
 
@@ -153,3 +155,24 @@ def test_a_model_keeps_its_robot_and_its_chain() -> None:
     assert built.name == "odd"
     assert [link.name for link in built.all_links] == ["base_link", *(f"link_{i}" for i in range(1, 7))]
     assert [joint.name for joint in built.moving_joints] == ["one", "two", "four", "five", "six"]
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ({"a": 1e200}, "arm: joints[0].a is 1e+200; a model needs numbers of at most 1e+20"),
+        (
+            {"link": LinkSpec(radius=1e-200)},
+            "arm: joints[0].link.radius is 1e-200; a model needs numbers of at least 1e-20",
+        ),
+        (
+            {"dynamics": Dynamics(armature=1e30)},
+            "arm: joints[0].dynamics.armature is 1e+30; a model needs numbers of at most 1e+20",
+        ),
+    ],
+)
+def test_a_number_whose_products_are_no_doubles_is_refused(row: dict[str, Any], message: str) -> None:
+    spec = RobotSpec(name="arm", rows=(Row(name="one", type=JointType.REVOLUTE, convention=STANDARD, **row),))
+    with pytest.raises(ModelError) as caught:
+        build_model(spec)
+    assert str(caught.value) == message
