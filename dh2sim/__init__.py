@@ -21,6 +21,7 @@ _HOMES = {
     "Prismatic": "robot_facade",
     "Revolute": "robot_facade",
     "Robot": "robot_facade",
+    "RobotError": "errors",
     "RobotFileError": "errors",
     "RobotModel": "model.robot_model",
     "RobotSpec": "robot.spec",
@@ -48,6 +49,7 @@ __all__ = [*_HOMES]
 
 if TYPE_CHECKING:
     from dh2sim.errors import Dh2simError as Dh2simError
+    from dh2sim.errors import RobotError as RobotError
     from dh2sim.errors import RobotFileError as RobotFileError
     from dh2sim.formats.mjcf.scene import to_scene as to_scene
     from dh2sim.formats.mjcf.write import to_mjcf as to_mjcf

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.errors import ConfigurationError, OutputError
+from dh2sim.errors import ConfigurationError, OutputError, Problem, RobotError
 from dh2sim.messages import did_you_mean, listed, member, shown
 from dh2sim.robot.configurations import named_configurations
 from dh2sim.robot.spec import (
@@ -49,6 +49,8 @@ if TYPE_CHECKING:
     from dh2sim.view.server import Viewer
 
 FilePath: TypeAlias = str | os.PathLike[str]
+_RIGID: Final = 1e-9
+"""By which entries of R Rᵀ may differ from those of the identity."""
 PoseLike: TypeAlias = Pose | ArrayLike
 """A pose; or a position, m, shape (3,); or a homogeneous transform, shape (4, 4)."""
 
@@ -69,12 +71,12 @@ class TableRow:
     """Second twist; of a Hayati row alone."""
     flip: bool = False
     """True: the joint coordinate subtracts instead."""
-    limits: Sequence[float] | Limits = field(default_factory=Limits)
+    limits: Sequence[float] | Limits | None = None
     """Lower and upper joint coordinate, rad or m; or :class:`Limits`, which hold velocity and effort too."""
     dynamics: Dynamics = field(default_factory=Dynamics)
     link: LinkSpec = field(default_factory=LinkSpec)
     """Mass, inertia and looks of the link that the joint moves."""
-    actuator: ActuatorSpec | None = None
+    actuator: ActuatorSpec = field(default_factory=ActuatorSpec)
     """What drives the joint; by default position control with gains that dh2sim chooses."""
     convention: Convention | str | None = None
     """By default the robot's."""
@@ -140,20 +142,20 @@ class Robot:
             source: Where the numbers come from.
 
         Raises:
-            Dh2simError: Something of it is wrong; the text says what and where.
+            RobotError: Something is wrong; the text says what and where, a line for each problem.
         """
-        default = member(Convention, convention, "convention")
-        spec = RobotSpec(
-            name=name,
-            rows=tuple(_row(row, i, default) for i, row in enumerate(rows)),
-            description=description,
-            source=source,
-            convention=default,
-            base=BaseSpec(pose=_pose(base)),
-            tool=_pose(tool),
-            gravity=read_only(gravity),
-            configurations=MappingProxyType({key: read_only(q) for key, q in configurations.items()}),
-        )
+        given: dict[str, Any] = {
+            "name": name,
+            "rows": _rows(rows),
+            "description": description,
+            "source": source,
+            "convention": convention,
+            "base": BaseSpec(pose=_pose("base", base)),
+            "tool": _pose("tool", tool),
+            "gravity": gravity,
+            "configurations": configurations,
+        }
+        spec = RobotSpec(**given)
         self._set(spec)
 
     def _set(self, spec: RobotSpec, notes: Iterable[str] = ()) -> None:
@@ -163,8 +165,10 @@ class Robot:
     @classmethod
     def from_spec(cls, spec: RobotSpec, *, notes: Iterable[str] = ()) -> Self:
         """Return the robot that a :class:`RobotSpec` describes."""
+        from dh2sim.kinematics.chain import spec_of
+
         robot = cls.__new__(cls)
-        robot._set(spec, notes)
+        robot._set(spec_of(spec), notes)
         return robot
 
     @classmethod
@@ -552,34 +556,46 @@ class Robot:
         return table_latex(self.spec)
 
 
-def _row(row: TableRow | Row, index: int, convention: Convention) -> Row:
-    """Return a row with what its robot fills in."""
-    if isinstance(row, Row):
+def _rows(rows: object) -> object:
+    """Return rows as a specification holds them; what is wrong with them is for the specification to say.
+
+    Raises:
+        RobotError: A text is given.
+    """
+    if isinstance(rows, str):
+        message = f"expected a list of rows, found {shown(rows)}; Robot.load reads a robot file"
+        raise RobotError([Problem(path="joints", message=message)])
+    return [_row(row) for row in rows] if isinstance(rows, Iterable) else rows
+
+
+def _row(row: object) -> object:
+    if not isinstance(row, TableRow):
         return row
-    own = row.convention
-    return Row(
-        name=f"joint_{index + 1}" if row.name is None else row.name,
-        type=row.type,
-        convention=convention if own is None else member(Convention, own, f"rows[{index}].convention"),
-        a=row.a,
-        alpha=row.alpha,
-        d=row.d,
-        theta=row.theta,
-        beta=row.beta,
-        flip=row.flip,
-        limits=row.limits if isinstance(row.limits, Limits) else Limits(position=(row.limits[0], row.limits[1])),
-        dynamics=row.dynamics,
-        link=row.link,
-        actuator=row.actuator or ActuatorSpec(),
-    )
+    given = {field.name: getattr(row, field.name) for field in fields(row)}
+    return Row(type=row.type, **{**given, "limits": Limits() if row.limits is None else row.limits})
 
 
-def _pose(pose: PoseLike) -> Pose:
+def _pose(name: str, pose: PoseLike) -> Pose:
+    """Return the pose of base or tool.
+
+    Raises:
+        RobotError: A matrix is given that is not a rigid transform.
+    """
     if isinstance(pose, Pose):
         return pose
-    array = np.asarray(pose, dtype=np.float64)
-    if array.shape == (4, 4):
-        from dh2sim.kinematics.transforms import rpy_from_rotation
+    try:
+        T = np.asarray(pose, dtype=np.float64)
+    except (TypeError, ValueError):
+        T = np.zeros(())
+    if T.shape in ((), (3,)):
+        return Pose(xyz=cast("Array", pose))  # what is wrong with it is for the specification to say
+    if T.shape != (4, 4):
+        message = f"expected a Pose, a position of shape (3,) or a transform of shape (4, 4), found shape {T.shape}"
+        raise RobotError([Problem(path=name, message=message)])
+    R = T[:3, :3]
+    if not (np.abs(R @ R.T - np.eye(3)).max() < _RIGID and np.linalg.det(R) > 0 and T[3].tolist() == [0, 0, 0, 1]):
+        message = "the matrix is not a rigid transform: a rotation and a position above 0, 0, 0, 1"
+        raise RobotError([Problem(path=name, message=message)])
+    from dh2sim.kinematics.transforms import rpy_from_rotation
 
-        return Pose(xyz=read_only(array[:3, 3]), rpy=read_only(rpy_from_rotation(array[:3, :3])))
-    return Pose(xyz=read_only(array))
+    return Pose(xyz=T[:3, 3], rpy=np.array(rpy_from_rotation(R)))

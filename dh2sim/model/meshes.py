@@ -48,14 +48,15 @@ def load_mesh(mesh: MeshSpec, link_name: str) -> MeshAsset:
 
     Raises:
         MeshError: it cannot be read, has no faces or too many, fewer than four corners, no area, or numbers that
-            are not finite; the text names the row of the robot file.
+            are not finite; the text names the row of the robot file, or the link.
     """
+    place = mesh.location or link_name
     try:
         original = mesh.file.read_bytes()
         surface = _read(mesh)
     except Exception as error:  # trimesh's readers raise many types
-        raise MeshError(f"{mesh.location}: cannot read the mesh '{mesh.file}': {_words(error)}") from error
-    _check(surface, mesh)
+        raise MeshError(f"{place}: cannot read the mesh '{mesh.file}': {_words(error)}") from error
+    _check(surface, mesh, place)
     suffix = mesh.file.suffix.lower()
     if suffix == ".stl" and len(original) == STL_HEADER + STL_FACE * len(surface.faces):
         data, converted = original, None
@@ -76,28 +77,26 @@ def _read(mesh: MeshSpec) -> trimesh.Trimesh:
     return trimesh.load_mesh(mesh.file, process=False)
 
 
-def _check(surface: trimesh.Trimesh, mesh: MeshSpec) -> None:
+def _check(surface: trimesh.Trimesh, mesh: MeshSpec, place: str) -> None:
     import numpy as np
 
     faces = len(getattr(surface, "faces", ()))
     if faces == 0:
-        raise MeshError(f"{mesh.location}: the mesh '{mesh.file}' has no faces")
+        raise MeshError(f"{place}: the mesh '{mesh.file}' has no faces")
     if faces > MAX_FACES:
         raise MeshError(
-            f"{mesh.location}: the mesh '{mesh.file}' has {faces} faces; MuJoCo reads at most {MAX_FACES}. "
+            f"{place}: the mesh '{mesh.file}' has {faces} faces; MuJoCo reads at most {MAX_FACES}. "
             "Simplify it, for instance with Blender's Decimate or trimesh's simplify_quadric_decimation"
         )
     corners = np.asarray(surface.vertices)[np.unique(surface.faces)]
     if not (np.abs(corners) <= np.finfo(np.float32).max).all():  # STL files hold single precision
-        raise MeshError(f"{mesh.location}: the mesh '{mesh.file}' has coordinates that are not finite")
+        raise MeshError(f"{place}: the mesh '{mesh.file}' has coordinates that are not finite")
     if len(np.unique(corners.astype(np.float32), axis=0)) < MIN_CORNERS:
-        raise MeshError(
-            f"{mesh.location}: the mesh '{mesh.file}' has fewer than {MIN_CORNERS} corners; MuJoCo refuses it"
-        )
+        raise MeshError(f"{place}: the mesh '{mesh.file}' has fewer than {MIN_CORNERS} corners; MuJoCo refuses it")
     area = float(surface.area) * mesh.scale**2
     if not area >= MIN_AREA:
         raise MeshError(
-            f"{mesh.location}: the mesh '{mesh.file}' has an area of {area:.3g} m² with scale {mesh.scale!r}; MuJoCo "
+            f"{place}: the mesh '{mesh.file}' has an area of {area:.3g} m² with scale {mesh.scale!r}; MuJoCo "
             f"needs at least {MIN_AREA!r}"
         )
 

@@ -419,7 +419,7 @@ class Internal(Kind):
         """Return the value."""
         if isinstance(value, self.of):
             return value
-        return scope.wrong(loc, f"expected a {self.of.__name__}, found {shown(value)}")
+        return scope.wrong(loc, f"expected {_article(self.of)}, found {shown(value)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -446,7 +446,7 @@ class Part(Kind):
         if self.list_is and isinstance(value, list):
             value = {self.list_is: value}
         if not isinstance(value, dict):
-            expected = f"a mapping with the keys {listed(keys)}" if scope.in_file else f"a {self.of.__name__}"
+            expected = f"a mapping with the keys {listed(keys)}" if scope.in_file else _article(self.of)
             return scope.wrong(loc, f"expected {expected}, found {shown(value)}")
         unknown = [key for key in value if key not in keys]
         for key in unknown:
@@ -495,6 +495,11 @@ class Parts(Kind):
     def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
         """Return a tuple of parts in SI units."""
         return tuple(self.item.to_si(tree, units, turns=turns) for tree in value)
+
+
+def _article(part: type) -> str:
+    """Return the name of a class with its article: a Row, an ActuatorSpec."""
+    return f"{'an' if part.__name__[0] in 'AEIO' else 'a'} {part.__name__}"
 
 
 def fields_of(part: type) -> Mapping[str, Kind]:
@@ -557,7 +562,8 @@ def plain_part(part: Any) -> dict[str, object]:
         default = defaults[name]
         if value is default or (type(value) is type(default) and value == default):
             continue
-        inner = plain(value)
+        other = isinstance(kind, Part) and dataclasses.is_dataclass(value) and not isinstance(value, kind.of)
+        inner = value if other else plain(value)  # a part of another kind is for the check to refuse
         if isinstance(kind, Part) and isinstance(inner, dict):
             tree |= inner if kind.inline else {kind.key or name: inner} if inner else {}
         else:
