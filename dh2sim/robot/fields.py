@@ -25,7 +25,7 @@ from typing import Annotated, Any, Final, Protocol, TypeAlias
 import numpy as np
 
 from dh2sim.messages import Loc, closest, did_you_mean, listed, shown
-from dh2sim.robot.expressions import NumberError, is_name, parameter_name_problem, to_number
+from dh2sim.robot.expressions import NumberError, is_name, names_in, parameter_name_problem, to_number
 from dh2sim.typing import Array, read_only
 
 Tree: TypeAlias = dict[str, Any]
@@ -76,6 +76,12 @@ class Scope:
     """Of the expressions in a file; NaN for a parameter that is wrong. None for robots made in code."""
     directory: Path | None
     """Where relative paths start; None where meshes are not allowed."""
+    angle: str = "rad"
+    """Unit of the file's angles."""
+    length: str = "m"
+    """Unit of the file's lengths."""
+    joint_type: object = None
+    """Of the row that the value is in, as given."""
 
     @property
     def in_file(self) -> bool:
@@ -200,7 +206,8 @@ class Number(Kind):
         try:
             number = to_number(value, scope.parameters)
         except NumberError as error:
-            return scope.wrong(loc, str(error))
+            hint = number_hint(value, self.dimension, loc, scope) if isinstance(value, str) else None
+            return scope.wrong(loc, hint or str(error))
         if problem := self._problem(number):
             result = f" = {number!r}" if isinstance(value, str) else ""
             return scope.wrong(loc, f"{problem}, found {shown(value)}{result}")
@@ -218,6 +225,59 @@ class Number(Kind):
     def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
         """Return the number in SI units."""
         return units.to_si(value, self.dimension, turns=turns)
+
+
+_WITH_UNIT: Final = re.compile(
+    r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*"
+    r"(deg|degrees?|°|rad|radians?|mm|cm|m|in|inch|inches|kg|g|Nm|N·m|N)"
+)
+_SPELLINGS: Final = {
+    "°": "deg",
+    "degree": "deg",
+    "degrees": "deg",
+    "radian": "rad",
+    "radians": "rad",
+    "inch": "in",
+    "inches": "in",
+}
+_METRES: Final = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}
+_VARIABLE: Final = re.compile(r"(?:q|theta|th|t|θ|ϑ|d)_?(?:[0-9]+|i)?\*?")
+"""Names of joint variables in textbooks."""
+
+
+def number_hint(text: str, dimension: Dimension | None, loc: Loc, scope: Scope) -> str | None:
+    """Return what is wrong with a number that has a unit or is the joint variable; None for other mistakes."""
+    turns = scope.joint_type in ("revolute", "continuous")
+    moving = "theta" if turns else "d" if scope.joint_type == "prismatic" else None
+    if moving is not None and loc[-1] == moving:
+        whole = _VARIABLE.fullmatch(text.strip())
+        names = [text] if whole else [name for name in names_in(text) if _VARIABLE.fullmatch(name)]
+        unknown = [name for name in names if name not in (scope.parameters or {})]
+        if unknown:
+            what = shown(text) if whole else f"in {shown(text)}: {shown(unknown[0])}"
+            zero = ", or write 0" if whole else ""
+            return f"{what} looks like the joint variable; leave it out{zero}: the joint coordinate adds to {moving}"
+    found = _WITH_UNIT.fullmatch(text.strip())
+    if found is None:
+        return None
+    number, unit = found[1], _SPELLINGS.get(found[2], found[2])
+    if dimension is Dimension.COORDINATE:
+        dimension = Dimension.ANGLE if turns else Dimension.LENGTH
+    if dimension is None:
+        return f"{shown(text)} has a unit; write the number alone, {number}"
+    what, own, units = ("angles", scope.angle, ["deg", "rad"])
+    if dimension is Dimension.LENGTH:
+        what, own, units = "lengths", scope.length, [*_METRES]
+    here = f"{shown(text)} has a unit; {what} of this file are in {own}"
+    if unit not in units:
+        return f"{here}, written as numbers alone"
+    if unit == own:
+        return f"{here}: write {number}"
+    if dimension is Dimension.LENGTH:
+        converted = f"{float(number) * _METRES[unit] / _METRES[own]:.12g}"
+    else:
+        converted = f"{number} * pi / 180" if own == "rad" else f"{number} * 180 / pi"
+    return f"{here}: write {converted}, or set 'units: {{{what.removesuffix('s')}: {unit}}}' for all"
 
 
 @dataclass(frozen=True, slots=True)
@@ -448,6 +508,9 @@ class Part(Kind):
         if not isinstance(value, dict):
             expected = f"a mapping with the keys {listed(keys)}" if scope.in_file else _article(self.of)
             return scope.wrong(loc, f"expected {expected}, found {shown(value)}")
+        kind = keys.get("type")
+        if isinstance(kind, Choice) and isinstance(given := value.get("type"), str):
+            scope = dataclasses.replace(scope, joint_type=kind.short.get(given.casefold(), given))
         unknown = [key for key in value if key not in keys]
         for key in unknown:
             if not scope.in_file and key in fields_of(self.of):  # an inline part that is none

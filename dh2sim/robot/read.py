@@ -7,6 +7,7 @@ import math
 import os
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,7 +16,7 @@ from dh2sim.messages import Loc, did_you_mean, listed, path_of, shown
 from dh2sim.robot.checks import check
 from dh2sim.robot.expressions import NumberError, is_name, names_in, parameter_name_problem, to_number
 from dh2sim.robot.fields import WRONG, Part, Scope, Tree
-from dh2sim.robot.spec import ROBOT, RobotSpec, SourceFile, Units, robot_fields
+from dh2sim.robot.spec import ROBOT, AngleUnit, LengthUnit, RobotSpec, SourceFile, Units, robot_fields
 from dh2sim.robot.yaml_tree import MAX_BYTES, Entry, Node, Report, check_size, compose, decode
 
 _PACKAGE: Final = Path(__file__).resolve().parent.parent
@@ -136,7 +137,19 @@ def file_scope(root: Node, report: Report, directory: Path | None) -> Scope:
         report: Where problems are noted.
         directory: Where paths in the file start; None where it may name no files.
     """
-    return Scope(report=Places(root, report), parameters=evaluate_parameters(root, report), directory=directory)
+    return Scope(
+        report=Places(root, report),
+        parameters=evaluate_parameters(root, report),
+        directory=directory,
+        angle=_unit(root.at("units", "angle"), AngleUnit),
+        length=_unit(root.at("units", "length"), LengthUnit),
+    )
+
+
+def _unit(node: Node | None, units: type[StrEnum]) -> str:
+    """Return a unit of the file; the default one where it names none, or a wrong one."""
+    allowed = [unit.value for unit in units]
+    return str(node.value) if node is not None and node.value in allowed else allowed[0]
 
 
 def check_file(kind: Part, root: Node, scope: Scope) -> Any:

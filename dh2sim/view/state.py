@@ -8,10 +8,9 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final, TypeAlias
 
-import numpy as np
-
 from dh2sim.draw.projection import Pinhole
 from dh2sim.model.robot_model import JointModel, RobotModel
+from dh2sim.robot.configurations import named_configurations
 from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Units
 from dh2sim.view.scene.items import Vector
 
@@ -204,9 +203,5 @@ def _within(joint: JointModel, value: float) -> float:
 
 def configurations(model: RobotModel) -> dict[str, tuple[float, ...]]:
     """Return the named configurations inside the limits, rad and m: home, zero and the robot file's."""
-    zero = (0.0,) * model.chain.n
-    named = {name: tuple(np.asarray(vector).tolist()) for name, vector in model.spec.configurations.items()}
-    return {
-        name: within(model, vector)
-        for name, vector in {"home": tuple(model.home.tolist()), "zero": zero, **named}.items()
-    }
+    named = named_configurations(model.spec)
+    return {name: within(model, tuple(vector.tolist())) for name, vector in named.items()}
