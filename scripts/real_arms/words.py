@@ -39,7 +39,8 @@ ELSEWHERE = """\
 ## Files that are not the robot of the table
 
 An import contains what is in the file. Compared with a published table, that shows where a file describes another
-robot. """
+robot.
+"""
 
 FINDINGS = """\
 ### ABB IRB 140
@@ -60,4 +61,5 @@ descriptions, imports every arm, and writes this page; `--check` compares with i
 errors that are rounding. The lists of arms and of published tables are in `scripts/real_arms`.
 `tests/importing/test_real_robots.py` imports the same arms out of those of the packages that are installed, and
 takes them all the way: file → table → URDF → pinocchio. `tests/test_imported_robots_page.py` computes the poses of
-the tables that are printed here. """
+the tables that are printed here.
+"""
