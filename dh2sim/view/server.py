@@ -17,7 +17,7 @@ import time
 import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 from urllib.parse import urlsplit
 
 from dh2sim.errors import Dh2simError
@@ -93,6 +93,7 @@ class Viewer:
 
         Raises:
             RunError: The run cannot be read, or is of a robot with other joints.
+            Dh2simError: The origin of requests cannot be checked with this version of viser.
         """
         self._state = state
         self._host = host
@@ -107,7 +108,8 @@ class Viewer:
         _configure(self._server, state)
         self._preload = threading.Thread(target=_preload, name="preload", daemon=True)
         self._preload.start()
-        self._server._websock_server.on_client_connect(self._check_origin)
+        self._websockets = _websockets(self._server)
+        self._websockets.on_client_connect(self._check_origin)
         self._server.on_client_connect(self._open)
         self._server.on_client_disconnect(self._close)
 
@@ -140,8 +142,7 @@ class Viewer:
 
     async def _check_origin(self, connection: infra.WebsockClientConnection) -> None:
         """Close a connection from another site's page before anything is sent to it."""
-        # viser has no public access to the request's headers
-        live = self._server._websock_server._live_connections.get(connection.client_id)
+        live = self._websockets._live_connections.get(connection.client_id)
         if live is not None and live.request is not None and self._is_foreign(live.request.headers):
             await live.close(1008, "not a page of this server")
 
@@ -174,6 +175,21 @@ class Viewer:
         if page is not None:
             page.close()
             self._leaving = [*(left for left in self._leaving if left.is_alive), page]
+
+
+def _websockets(server: viser.ViserServer) -> infra.WebsockServer:
+    """Return the part of a server that knows the headers of requests, to which viser gives no public access.
+
+    Raises:
+        Dh2simError: viser has changed; the server is stopped, since it would serve other sites' pages.
+    """
+    websockets = getattr(server, "_websock_server", None)
+    if not hasattr(websockets, "_live_connections"):
+        import viser
+
+        stop_server(server)
+        raise Dh2simError(f"viser {viser.__version__} is not supported: the origin of requests cannot be checked")
+    return cast("infra.WebsockServer", websockets)
 
 
 def free_port(host: str, port: int) -> int:

@@ -65,8 +65,8 @@ def test_a_value_that_the_state_refuses_is_restored(typed: Field) -> None:
 def test_typing_before_the_field_was_written_is_shown_again(typed: Field) -> None:
     bound, type_in, seen = typed
     type_in("typed")
-    bound.show("told")
-    assert bound.handle.value == "told"
+    bound.show("written")
+    assert bound.handle.value == "written"
     seen[0]()
     bound.show("typed")
     assert bound.handle.value == "typed"

@@ -1,4 +1,4 @@
-"""Where the eye stands: the whole robot is seen, in every window, until the user moves it."""
+"""The camera shows the whole robot in every window, until the user moves it."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_a_camera_that_the_user_has_moved_stays(open_page: Callable[[], Page], v
     page = open_page()
     (served,) = viewer.pages
     wait_until(lambda: is_seen(page, served), "it is seen")
-    moved = move_the_eye(page, served, 120.0)
+    moved = move_the_camera(page, served, 120.0)
     page.set_viewport_size({"width": 700, "height": 640})
     wait_until(lambda: served.client.camera.aspect < 0.6, "the window is narrow")
     page.wait_for_timeout(500)
@@ -109,8 +109,8 @@ def test_a_camera_that_the_user_has_moved_stays(open_page: Callable[[], Page], v
     page.set_viewport_size({"width": 900, "height": 640})
 
 
-def move_the_eye(page: Page, served: ServedPage, pixels: float) -> Array:
-    """Drag the scene to the right, and return where the eye comes to rest."""
+def move_the_camera(page: Page, served: ServedPage, pixels: float) -> Array:
+    """Drag the scene to the right, and return where the camera comes to rest."""
     box = page.locator("canvas").first.bounding_box()
     assert box is not None
     before = served.client.camera.position.copy()
@@ -119,7 +119,7 @@ def move_the_eye(page: Page, served: ServedPage, pixels: float) -> Array:
     page.mouse.down()
     page.mouse.move(x + pixels, y, steps=5)
     page.mouse.up()
-    wait_until(lambda: math.dist(served.client.camera.position, before) > 0.1, "the user moves the eye")
+    wait_until(lambda: math.dist(served.client.camera.position, before) > 0.1, "the user moves the camera")
     last: list[Array] = []
 
     def rests() -> bool:
@@ -127,7 +127,7 @@ def move_the_eye(page: Page, served: ServedPage, pixels: float) -> Array:
         page.wait_for_timeout(500)
         return len(last) > 1 and math.dist(last[-1], last[-2]) < 1e-6
 
-    wait_until(rests, "the eye comes to rest")
+    wait_until(rests, "the camera comes to rest")
     return last[-1]
 
 
@@ -142,13 +142,13 @@ def test_the_labels_of_a_row_can_be_read_wherever_the_camera_is(
     wait_until(lambda: "/row/a_label" in served._painter._drawn, "the row is explained")
     before = served.state.pinhole
     for pixels in (90.0, -170.0):
-        move_the_eye(page, served, pixels)
+        move_the_camera(page, served, pixels)
         assert served.state.pinhole not in (None, before)
         wait_until(lambda: not covered(page, served), f"{covered(page, served)} cover each other")
 
 
 def covered(page: Page, served: ServedPage) -> list[tuple[str, str]]:
-    """Which labels cover each other by more than the eye may move without them: a few pixels."""
+    """Which labels cover each other by more than the camera may move without them: a few pixels."""
     labels = {item.text: item for item in tuple(served._painter._drawn.values()) if isinstance(item, Label)}
     found = []
     for (here, a), (there, b) in combinations(labels.items(), 2):

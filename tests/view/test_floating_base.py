@@ -38,7 +38,7 @@ def in_world(scene: Scene, name: str) -> Array:
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A robot that nobody holds falls, and turns as its joints move."""
+    """A robot that is not held falls, and turns as its joints move."""
     out = tmp_path_factory.mktemp("runs") / "run.zarr"
     options = ("--rollouts", "2", "--duration", "1", "--every", "25", "--record", "qpos", "--floating-base")
     done = dh2sim("rollout", "stanford", "--out", out, *options, "--quiet")
@@ -104,7 +104,7 @@ def test_everything_in_base_link_moves_with_it_and_the_ground_does_not() -> None
         for name in inside:
             assert np.allclose(in_world(there, name), moved @ in_world(here, name), rtol=0, atol=1e-12), name
     unchanged = [name for name in here if here[name] == there[name]]
-    assert {*here} - {*unchanged} == {*IN_BASE_LINK}, "only what carries the rest is drawn anew"
+    assert {*here} - {*unchanged} == {*IN_BASE_LINK}, "only what carries the rest is drawn again"
 
 
 def test_whoever_takes_the_joints_back_takes_base_link_back_too() -> None:

@@ -1,4 +1,4 @@
-"""What is told of a pose and a Jacobian, against the table and its differences."""
+"""The readout of a pose and a Jacobian, against the table and its differences."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def jacobian_by_differences(spec: RobotSpec, q: tuple[float, ...], step: float =
 def test_manipulability_and_distance_to_singularity_are_those_of_the_table(robot: str) -> None:
     spec = load_robot(robot)
     state = reduce(open_state(spec), RandomConfiguration(seed=3))
-    told, J = readout_of(state), jacobian_by_differences(spec, state.q)
+    readout, J = readout_of(state), jacobian_by_differences(spec, state.q)
     gram = J @ J.T if J.shape[1] >= 6 else J.T @ J
     size = max(1.0, state.model.reach) ** 3
-    assert told.manipulability == pytest.approx(math.sqrt(max(np.linalg.det(gram), 0.0)), abs=1e-6 * size)
+    assert readout.manipulability == pytest.approx(math.sqrt(max(np.linalg.det(gram), 0.0)), abs=1e-6 * size)
     least = math.sqrt(max(float(np.linalg.eigvalsh(gram)[0]), 0.0))
-    assert told.smallest_singular_value == pytest.approx(least, abs=1e-5 * size)
+    assert readout.smallest_singular_value == pytest.approx(least, abs=1e-5 * size)
 
 
 def test_the_distance_to_singularity_is_zero_with_a_stretched_wrist() -> None:
@@ -59,13 +59,13 @@ def test_a_pose_is_given_in_three_notations_that_agree_with_the_table(frame: str
     state = reduce(reduce(open_state(spec), RandomConfiguration(seed=5)), ChooseFrame(name=frame))
     frames = table_frame_poses(spec, state.q)
     expected = table_tool_pose(spec, state.q) if frame == "tool0" else frames[int(frame.removeprefix("dh_"))]
-    told = readout_of(state)
-    assert np.allclose(told.T_base_frame, expected, rtol=0, atol=1e-12)
-    assert np.allclose(told.xyz, expected[:3, 3], rtol=0, atol=1e-12)
+    readout = readout_of(state)
+    assert np.allclose(readout.T_base_frame, expected, rtol=0, atol=1e-12)
+    assert np.allclose(readout.xyz, expected[:3, 3], rtol=0, atol=1e-12)
     # rpy: about the fixed axes x, y and z in turn, as URDF has it; quaternion: the scalar first
-    turns = [turn_about(axis, angle) for axis, angle in enumerate(told.rpy)]
+    turns = [turn_about(axis, angle) for axis, angle in enumerate(readout.rpy)]
     assert np.allclose(turns[2] @ turns[1] @ turns[0], expected[:3, :3], rtol=0, atol=1e-12)
-    w, *vector = told.quaternion
+    w, *vector = readout.quaternion
     v, cross = np.array(vector), np.cross(np.eye(3), vector)
     assert np.allclose((w * w - v @ v) * np.eye(3) + 2.0 * np.outer(v, v) + 2.0 * w * cross, expected[:3, :3])
 

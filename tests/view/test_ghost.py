@@ -93,8 +93,8 @@ def test_a_ghost_stops_at_its_limits() -> None:
 def test_another_robot_is_described_by_its_tool_and_the_joints_that_differ() -> None:
     here, there = build_model(robot("puma560")), build_model(robot("planar_2r"))
     q = np.radians([10.0, -40.0, 20.0, 30.0, 50.0, 60.0])
-    stands = ghost_configuration(there, here, q)
-    ours, theirs = table_tool_pose(robot("puma560"), q), table_tool_pose(robot("planar_2r"), stands.q)
+    configuration = ghost_configuration(there, here, q)
+    ours, theirs = table_tool_pose(robot("puma560"), q), table_tool_pose(robot("planar_2r"), configuration.q)
     distance = np.linalg.norm(theirs[:3, 3] - ours[:3, 3])
     angle = np.degrees(np.arccos(0.5 * (np.trace(ours[:3, :3].T @ theirs[:3, :3]) - 1.0)))
     assert ghost_text(there, here, q) == (f"planar_2r has tool0 {distance:.3g} m away and turned by {angle:.3g}°.")

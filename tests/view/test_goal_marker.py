@@ -1,4 +1,4 @@
-"""A goal of the tool that is not reached is told and shown; one that is, is not."""
+"""A goal that the tool does not reach is described and marked."""
 
 from __future__ import annotations
 

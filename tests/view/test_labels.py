@@ -75,7 +75,7 @@ def test_a_label_without_free_space_nearby_stays() -> None:
 def test_labels_behind_the_camera_stay_and_take_no_space() -> None:
     labels = {
         "behind": Label(text="x", position=(0.0, -20.0, 0.0)),
-        "at the eye": Label(text="x", position=FROM_AFAR.position),
+        "at the camera": Label(text="x", position=FROM_AFAR.position),
         "ahead": Label(text="x", position=(0.0, 0.0, 0.0)),
     }
     assert spread_labels(labels, FROM_AFAR) == labels
@@ -83,7 +83,7 @@ def test_labels_behind_the_camera_stay_and_take_no_space() -> None:
 
 
 def seen_at_first(state: ViewState) -> Pinhole:
-    """How a page of 800 pixels sees a robot before its user moves the eye; by cross products of its own."""
+    """How a page of 800 pixels sees a robot before its user moves the camera; by cross products of its own."""
     eye = viewpoint_of(state.model)
     ahead = np.subtract(eye.look_at, eye.position)
     ahead /= np.linalg.norm(ahead)

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import socket
 import threading
+from typing import TYPE_CHECKING
 
 import pytest
 
+from dh2sim.errors import Dh2simError
 from dh2sim.robot.read import load_robot
+from dh2sim.view import server
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import is_disconnect
-from dh2sim.view.server import Viewer
+from dh2sim.view.server import Viewer, start_server
 from tests.view.on_page import wait_until
 from tests.view.without_browser import speaking
+
+if TYPE_CHECKING:
+    import viser
 
 
 @pytest.mark.parametrize(
@@ -61,3 +68,28 @@ def test_a_page_that_is_closed_leaves_what_is_queued() -> None:
             assert not done.is_set()
     finally:
         viewer.stop()
+
+
+def test_no_page_is_served_if_the_origin_of_requests_cannot_be_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    import viser
+
+    started = start_server("127.0.0.1", 0)
+    monkeypatch.setattr(server, "start_server", lambda _host, _port: Changed(started))
+    with pytest.raises(Dh2simError) as caught:
+        Viewer(open_state(load_robot("stanford")))
+    message = f"viser {viser.__version__} is not supported: the origin of requests cannot be checked"
+    assert str(caught.value) == message
+    with pytest.raises(OSError, match="refused"):
+        socket.create_connection(("127.0.0.1", started.get_port()), timeout=10.0)
+
+
+class Changed:
+    """A viser server without private parts."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+
+    def __getattr__(self, name: str) -> object:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self._server, name)

@@ -61,10 +61,10 @@ class Tab:
         context = self.browser.new_context(viewport={"width": WIDTH, "height": HEIGHT}, offline=True)
         context.route("**/*", lambda route: self._route(route))
         self.page = context.new_page()
-        self.page.on("console", lambda told: self.errors.append(told.text) if told.type == "error" else None)
+        self.page.on("console", lambda entry: self.errors.append(entry.text) if entry.type == "error" else None)
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.goto(path.as_uri())
-        # that this browser draws without a graphics card is told over part of the picture
+        # the notice that this browser has no graphics card covers part of the picture
         self.page.add_style_tag(content=".mantine-Notifications-root { display: none; }")
 
     def _route(self, route: Route) -> None:
@@ -189,10 +189,10 @@ def test_an_animation_loops_and_can_be_searched(tab: Tab, tmp_path: Path) -> Non
     clock.wait_for()
     assert begins_again(tab, clock)
     stop(tab, clock)
-    for told, channel in (("0.5", 1), ("0.1", 0), ("0.8", 2), ("0.2", 0)):
-        clock.fill(told)
-        assert middle_is(channel)(tab.picture_when(middle_is(channel))), told
-        assert clock.input_value() == told, "it stands still there"
+    for moment, channel in (("0.5", 1), ("0.1", 0), ("0.8", 2), ("0.2", 0)):
+        clock.fill(moment)
+        assert middle_is(channel)(tab.picture_when(middle_is(channel))), moment
+        assert clock.input_value() == moment, "it stays there"
     track = tab.page.locator(".mantine-Slider-track").bounding_box()
     assert track is not None
     tab.page.mouse.click(track["x"] + 0.6 * track["width"], track["y"] + 0.5 * track["height"])
@@ -205,11 +205,11 @@ def stop(tab: Tab, clock: Locator) -> None:
     tab.page.keyboard.press("Space")
     end = time.monotonic() + DEADLINE
     while time.monotonic() < end:
-        told = clock.input_value()
+        before = clock.input_value()
         tab.page.wait_for_timeout(1000)
-        if clock.input_value() == told:
+        if clock.input_value() == before:
             return
-    raise AssertionError("the animation does not stand still")
+    raise AssertionError("the animation does not stop")
 
 
 def begins_again(tab: Tab, clock: Locator) -> bool:
@@ -242,7 +242,7 @@ def test_a_rollout_moves_the_robot_in_the_page(puma: RobotModel, tab: Tab, tmp_p
     clock.fill("0.01")
     again = orange(tab.picture_when(lambda seen: (orange(seen) != first).mean() < 0.0005))
     assert first.mean() > 0.005
-    assert later.mean() > 0.001, "the arm points at the eye"
+    assert later.mean() > 0.001, "the arm points at the camera"
     assert (later != first).mean() > 0.005, "it moves"
     assert (again != first).mean() < 0.0005, "and is back at the beginning"
     assert tab.errors == []

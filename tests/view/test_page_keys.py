@@ -83,17 +83,17 @@ def test_an_arrow_key_held_on_a_slider_moves_the_joint_and_not_the_camera(serve:
     wait_until(lambda: camera.aspect < 1.0, "the panel is beside the scene")
     wait_until(
         lambda: np.allclose(camera.position, viewpoint_of(served.state.model, camera.aspect).position, atol=1e-6),
-        "the eye is where it begins",
+        "the camera is where it starts",
     )
-    eye = camera.position.copy()
+    position = camera.position.copy()
     page.get_by_role("slider").first.focus()
     page.keyboard.down("ArrowRight")
-    page.wait_for_timeout(1000)  # viser would turn the eye by 50 degrees
+    page.wait_for_timeout(1000)  # viser would turn the camera by 50 degrees
     page.keyboard.up("ArrowRight")
     wait_until(lambda: served.state.q[0] > STANFORD.configurations["home"][0], "the joint moves")
     page.wait_for_timeout(500)
-    assert np.allclose(camera.position, eye, rtol=0, atol=1e-6)
+    assert np.allclose(camera.position, position, rtol=0, atol=1e-6)
     page.evaluate("document.activeElement.blur()")
     page.keyboard.down("ArrowRight")
-    wait_until(lambda: not np.allclose(camera.position, eye, rtol=0, atol=0.1), "it turns elsewhere")
+    wait_until(lambda: not np.allclose(camera.position, position, rtol=0, atol=0.1), "it turns elsewhere")
     page.keyboard.up("ArrowRight")

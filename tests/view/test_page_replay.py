@@ -54,8 +54,8 @@ def stand_at(page: Page, percent: int, rollout: int) -> float:
     page.get_by_role("button", name="Play").wait_for()
     field(page, "Time [%]").fill(str(percent))
     time = 0.01 * percent * DURATION
-    told = f"Rollout {rollout}: {time:.2f} of {DURATION:.2f} s."
-    wait_until(lambda: shown(page, "motion") == told, f"{shown(page, 'motion')}, not {told}")
+    status = f"Rollout {rollout}: {time:.2f} of {DURATION:.2f} s."
+    wait_until(lambda: shown(page, "motion") == status, f"{shown(page, 'motion')}, not {status}")
     return time
 
 

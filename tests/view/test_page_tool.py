@@ -88,9 +88,9 @@ def test_tool0_follows_its_handle_and_the_page_says_where_it_cannot(
 
     drag(page, served, 0, 2.0)
     wait_until(lambda: not goal_of(served).reached, "that is out of reach")
-    told = r"The handle is out of reach, or too far for one step: tool0 is (\S+) m away and turned by (\S+)°\."
-    wait_until(lambda: re.fullmatch(told, shown(page, "notice")) is not None, shown(page, "notice"))
-    found = re.fullmatch(told, shown(page, "notice"))
+    notice = r"The handle is out of reach, or too far for one step: tool0 is (\S+) m away and turned by (\S+)°\."
+    wait_until(lambda: re.fullmatch(notice, shown(page, "notice")) is not None, shown(page, "notice"))
+    found = re.fullmatch(notice, shown(page, "notice"))
     assert found is not None
     tool, goal = table_tool_pose(STANFORD, served.state.q), np.array(goal_of(served).T_base_link_tool0)
     assert np.isclose(float(found.group(1)), np.linalg.norm(tool[:3, 3] - goal[:3, 3]), rtol=1e-2)

@@ -62,7 +62,9 @@ def test_the_same_table_read_in_another_convention_is_another_robot(serve: Serve
     open_tab(page, "Table")
     page.get_by_text("Whole table").click()
     page.get_by_role("button", name="modified").first.click()
-    wait_until(lambda: {row.convention for row in served.state.spec.rows} == {Convention.MODIFIED}, "it is read anew")
+    wait_until(
+        lambda: {row.convention for row in served.state.spec.rows} == {Convention.MODIFIED}, "it is read again"
+    )
     assert [row.alpha for row in served.state.spec.rows] == [row.alpha for row in STANFORD.rows]
     assert not np.allclose(table_tool_pose(served.state.spec, HOME), table_tool_pose(STANFORD, HOME), atol=0.1)
     open_tab(page, "Joints")

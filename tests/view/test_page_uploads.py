@@ -61,10 +61,10 @@ def test_a_robot_file_is_opened_an_invalid_one_reported_and_the_first_reopened(
     open_tab(page, "Files")
     upload(page, OPEN, "wrong.yaml", MINE.replace("a: 0.5", "a: 0.5 +").replace("prismatic", "prismatik"))
     wait_until(lambda: "wrong.yaml" in shown(page, "notice"), "the errors are shown")
-    told = shown(page, "notice").split("\n")
-    assert told[0] == "Robot unchanged."
-    assert told[1] == "wrong.yaml:5:37: joints[0].a: in '0.5 +': it ends too early"
-    assert told[2].startswith("wrong.yaml:6:25: joints[1].type: found 'prismatik'. Did you mean 'prismatic'?")
+    lines = shown(page, "notice").split("\n")
+    assert lines[0] == "Robot unchanged."
+    assert lines[1] == "wrong.yaml:5:37: joints[0].a: in '0.5 +': it ends too early"
+    assert lines[2].startswith("wrong.yaml:6:25: joints[1].type: found 'prismatik'. Did you mean 'prismatic'?")
     assert served.state.text == MINE.replace("a: 0.5", "a: 0.75")
 
     page.get_by_role("button", name="Reopen the first file").click()

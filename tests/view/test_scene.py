@@ -1,4 +1,4 @@
-"""The scene of a state: where things stand is what the table says."""
+"""The scene of a state: things are where the table has them."""
 
 from __future__ import annotations
 

@@ -302,8 +302,8 @@ def test_a_motion_is_paused_and_stepped_and_a_new_one_runs() -> None:
         assert (stepped.paused, stepped.steps) == (True, 2)
         going = after(stepped, events.Pause(on=False))
         assert (going.paused, going.steps) == (False, 2)
-        anew = after(stepped, events.SetMode(mode=mode))
-        assert (anew.paused, anew.steps) == (False, 0)
+        restarted = after(stepped, events.SetMode(mode=mode))
+        assert (restarted.paused, restarted.steps) == (False, 0)
 
 
 def test_only_links_of_a_simulated_robot_can_be_dragged() -> None:

@@ -167,7 +167,7 @@ def test_of_many_problems_the_first_and_the_number_of_others_are_reported() -> N
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         (b"", "1:1: the file is empty; a robot needs at least name, convention and joints"),
         (b"name: \x00", "1:7: control character U+0000 is not allowed"),
@@ -182,12 +182,12 @@ def test_of_many_problems_the_first_and_the_number_of_others_are_reported() -> N
     ],
     ids=["empty", "NUL", "escaped NUL", "a picture", "latin 1", "UTF-16", "large", "tag", "deep", "no text"],
 )
-def test_something_that_is_not_a_robot_file_is_refused(text: bytes, told: str) -> None:
+def test_something_that_is_not_a_robot_file_is_refused(text: bytes, message: str) -> None:
     state = after(STANFORD, upload(text))
     assert state.model is STANFORD.model
     first = state.notice.split("\n")[1]
     assert first.startswith("mine.yaml:")
-    assert told in first or (len(text) > 100_000 and "the line has" in first)
+    assert message in first or (len(text) > 100_000 and "the line has" in first)
 
 
 def test_an_entity_bomb_is_refused_at_once() -> None:
@@ -274,8 +274,8 @@ def test_the_name_of_an_uploaded_file_is_fit_to_be_shown(given: str, called: str
 def test_names_are_shown_as_text_and_not_as_html() -> None:
     name = file_name("<img src=x onerror=alert(1)>.yaml")
     state = after(STANFORD, upload("name: <b>x</b>\n", name))
-    told = markup.lines_of_text(state.notice)
-    assert "<img" not in told
-    assert "&lt;img src=x onerror=alert(1)&gt;.yaml:1:7: name: a name is made of" in told
-    assert "&lt;b&gt;x&lt;/b&gt;" in told
-    assert told.count("<br>") == state.notice.count("\n")
+    shown = markup.lines_of_text(state.notice)
+    assert "<img" not in shown
+    assert "&lt;img src=x onerror=alert(1)&gt;.yaml:1:7: name: a name is made of" in shown
+    assert "&lt;b&gt;x&lt;/b&gt;" in shown
+    assert shown.count("<br>") == state.notice.count("\n")
