@@ -178,9 +178,14 @@ def plot(
 ) -> None:
     """Plot a rollout.
 
-    joints: positions, velocities and forces, with limits shaded, references dashed and controls thin.
-    tool: the pose of tool0 over time, and its path. energy: potential, kinetic and total energy, and its drift.
-    tracking: the errors of joints that follow a reference; intervals with a saturated actuator are marked.
+    \b
+    --what joints     positions, velocities and forces; limits shaded,
+                      references dashed, controls thin
+    --what tool       pose of tool0 over time, and its path
+    --what energy     potential, kinetic and total energy, and its drift
+    --what tracking   errors of joints that follow a reference; saturated
+                      actuators marked
+
     The same run gives the same bytes.
 
     \b

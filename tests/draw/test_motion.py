@@ -46,7 +46,7 @@ def test_a_rollout_that_stopped_early_ends_there() -> None:
     assert len(motion_of_run(rollout(stopped(swinging(), 1, 4), 0)).time) == STEPS // 2 + 1, "the other goes on"
 
 
-def test_a_rollout_that_was_not_run_is_told() -> None:
+def test_a_rollout_that_was_not_run_is_refused() -> None:
     run = swinging().copy(deep=True)
     run["status"][1] = -1
     with pytest.raises(PictureError) as caught:
@@ -75,7 +75,7 @@ def test_a_run_without_positions_says_how_to_record_them() -> None:
     )
 
 
-def test_attributes_that_hold_no_model_are_told() -> None:
+def test_attributes_without_a_model_are_refused() -> None:
     run = swinging().copy()
     del run.attrs["scene"]
     with pytest.raises(PictureError) as caught:

@@ -191,7 +191,7 @@ def test_saturation_is_marked_where_it_is() -> None:
 
 
 @pytest.mark.parametrize(
-    ("what", "gone", "told"),
+    ("what", "gone", "reason"),
     [
         ("joints", ("qpos", "qvel"), "needs qpos, which the run does not contain; record again with qpos "),
         (
@@ -212,12 +212,12 @@ def test_saturation_is_marked_where_it_is() -> None:
         ),
     ],
 )
-def test_what_was_not_recorded_is_told_with_how_to_record_it(what: str, gone: tuple[str, ...], told: str) -> None:
+def test_what_was_not_recorded_is_named_with_how_to_record_it(what: str, gone: tuple[str, ...], reason: str) -> None:
     run = swinging(without=gone)
     there = [name for name in ("qpos", "qvel", "qpos_ref", "tool_pose", "energy", "ctrl", "torque") if name in run]
     with pytest.raises(PictureError) as caught:
         KINDS[what](rollout(run), None)
-    assert str(caught.value) == f"run.zarr: this plot {told}(recorded: {', '.join(there)})"
+    assert str(caught.value) == f"run.zarr: this plot {reason}(recorded: {', '.join(there)})"
 
 
 @pytest.mark.slow
@@ -255,7 +255,7 @@ def test_a_users_own_settings_of_matplotlib_change_nothing_and_stay(tmp_path: Pa
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
 
 
-def test_plots_and_endings_that_there_are_not_are_told(tmp_path: Path) -> None:
+def test_unknown_plots_and_endings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(PictureError) as caught:
         require_kind("joint")
     assert str(caught.value) == (

@@ -28,7 +28,7 @@ OPTIONS = PictureOptions(width=160, height=120)
 
 
 def decoded(path: Path) -> tuple[str, NDArray[np.uint8]]:
-    """What ffmpeg says of a film of 160x120, and its pictures."""
+    """What ffmpeg reports of a video of 160x120, and its pictures."""
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     done = subprocess.run(command, capture_output=True, check=True, timeout=60)
     [about] = [line for line in done.stderr.decode().split("Output")[0].splitlines() if "Video:" in line]
@@ -38,35 +38,35 @@ def decoded(path: Path) -> tuple[str, NDArray[np.uint8]]:
 @pytest.mark.slow
 def test_an_mp4_is_h264_of_the_right_size_speed_and_length_and_shows_what_was_drawn(tmp_path: Path) -> None:
     require_gl()
-    out = tmp_path / "film.mp4"
-    told: list[int] = []
+    out = tmp_path / "video.mp4"
+    reported: list[int] = []
     motion, speed = moving(), VideoSpeed(fps=30.0, speed=0.25)
-    count = write_video(out, motion, OPTIONS, speed, told.append)
+    count = write_video(out, motion, OPTIONS, speed, reported.append)
     about, pictures = decoded(out)
     assert count == len(pictures) == 15, "0.12 s at a quarter of the speed"
-    assert told == [1] * 15
+    assert reported == [1] * 15
     for part in ("h264", "yuv420p(tv, bt709", "160x120", "30 fps"):
         assert part in about
     with open_motion(motion, OPTIONS) as renderer:
         for number in (0, 14):
             drawn = renderer.picture(video_positions(motion, speed)[number]).astype(float)
             assert np.abs(pictures[number] - drawn).mean() < 4.0
-    assert [path.name for path in tmp_path.iterdir()] == ["film.mp4"]
+    assert [path.name for path in tmp_path.iterdir()] == ["video.mp4"]
 
 
 @pytest.mark.slow
 def test_a_gif_has_the_right_size_times_and_colours(tmp_path: Path) -> None:
     require_gl()
-    out = tmp_path / "film.gif"
+    out = tmp_path / "video.gif"
     motion, speed = moving(), VideoSpeed(fps=30.0, speed=0.25)
     assert write_video(out, motion, OPTIONS, speed) == 15
-    with Image.open(out) as film, open_motion(motion, OPTIONS) as renderer:
-        assert (film.size, film.info["loop"]) == ((160, 120), 0)
+    with Image.open(out) as video, open_motion(motion, OPTIONS) as renderer:
+        assert (video.size, video.info["loop"]) == ((160, 120), 0)
         shown = 0
-        for _ in ImageSequence.Iterator(film):
+        for _ in ImageSequence.Iterator(video):
             drawn = renderer.picture(video_positions(motion, speed)[round(shown * 30 / 1000)]).astype(float)
-            assert np.abs(np.asarray(film.convert("RGB")) - drawn).mean() < 6.0
-            shown += film.info["duration"]
+            assert np.abs(np.asarray(video.convert("RGB")) - drawn).mean() < 6.0
+            shown += video.info["duration"]
         assert shown == 500, "thirtieths of a second do not add up to something else"
 
 
@@ -147,7 +147,7 @@ def test_a_gif_that_is_too_fast_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("ending", ["mp4", "gif"])
 def test_an_interrupted_video_leaves_nothing_but_what_was_there_before(tmp_path: Path, ending: str) -> None:
     require_gl()
-    out = tmp_path / f"film.{ending}"
+    out = tmp_path / f"video.{ending}"
     out.write_bytes(b"older")
 
     def interrupt(_: int) -> None:
