@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, TypeAlias, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from dh2sim.importing.sources import ImportOptions
     from dh2sim.kinematics.chain import KinematicChain
     from dh2sim.model.robot_model import RobotModel
+    from dh2sim.simulate.options import RolloutKeywords
     from dh2sim.validate.report import RobotReport
     from dh2sim.view.server import Viewer
 
@@ -432,53 +433,36 @@ class Robot:
 
     def rollout(
         self,
-        rollouts: int = 256,
+        rollouts: int | None = None,
+        /,
         *,
-        controller: str = "sine",
-        seed: int = 0,
         out: FilePath | None = None,
-        steps: int | None = None,
-        duration: float | None = None,
-        timestep: float = 0.002,
-        integrator: str = "implicitfast",
-        start: str = "home",
-        record: Sequence[str] = ("qpos", "qvel", "ctrl", "tool_pose", "reference"),
-        every: int = 1,
-        randomize: Mapping[str, float] = MappingProxyType({}),
-        floating_base: bool = False,
         threads: int = 0,
         resume: bool = False,
         overwrite: bool = False,
+        **options: Unpack[RolloutKeywords],
     ) -> xr.Dataset:
         """Simulate many rollouts with MuJoCo; the arguments are those of :func:`dh2sim.simulate.rollout`.
+
+        Args:
+            rollouts: Number of rollouts, 256 by default.
+            out: Folder to write the run to; None to keep it in memory.
+            threads: Number of threads, 0 for one a processor. The result does not depend on it.
+            resume: Whether to continue the run at ``out``, if there is one.
+            overwrite: Whether to replace the run at ``out``.
+            **options: What is simulated and recorded: the fields of ``RolloutOptions``, or the ``duration``, s.
 
         Returns:
             The dataset, as ``docs/dataset.md`` describes it; read lazily from ``out`` if that is given.
 
         Raises:
-            Dh2simError: The settings cannot be met, or the run cannot be written.
+            Dh2simError: The options are wrong, or the run cannot be written.
         """
         from dh2sim.simulate.run import rollout
 
-        return rollout(
-            self.model,
-            out=None if out is None else Path(out),
-            rollouts=rollouts,
-            steps=steps,
-            duration=duration,
-            timestep=timestep,
-            integrator=integrator,
-            controller=controller,
-            start=start,
-            seed=seed,
-            record=record,
-            every=every,
-            randomize=randomize,
-            floating_base=floating_base,
-            threads=threads,
-            resume=resume,
-            overwrite=overwrite,
-        )
+        if rollouts is not None:
+            options["rollouts"] = rollouts
+        return rollout(self.model, out=out, threads=threads, resume=resume, overwrite=overwrite, **options)
 
     def convert(self, convention: Convention | str) -> Self:
         """Return the same arm with its table in another convention, 'standard' or 'modified'.

@@ -10,7 +10,6 @@ from typing import Any, get_type_hints
 import numpy as np
 import pytest
 
-import dh2sim
 from dh2sim.errors import SettingsError
 from dh2sim.simulate.options import RANDOMIZABLE, RECORDABLE, RolloutKeywords, RolloutOptions
 
@@ -164,7 +163,6 @@ def test_every_option_is_a_keyword_and_on_the_command_line() -> None:
     names = {option.name for option in fields(RolloutOptions)} | {"duration"}
     assert set(get_type_hints(RolloutKeywords)) == names
     assert names <= set(inspect.signature(command).parameters)
-    assert names <= set(inspect.signature(dh2sim.Robot.rollout).parameters)
 
 
 def test_defaults_on_the_command_line_are_those_of_the_options() -> None:

@@ -59,15 +59,6 @@ BUILT_IN: Final[Mapping[str, type]] = MappingProxyType(
 )
 
 
-def controllers() -> Mapping[str, str]:
-    """Return the names of all controllers, each with a line of help; no installed package is imported."""
-    known = {name: (found.__doc__ or "").splitlines()[0].rstrip(".") for name, found in BUILT_IN.items()}
-    for name, entries in plugins().items():
-        packages = sorted({entry.dist.name if entry.dist is not None else entry.module for entry in entries})
-        known.setdefault(name, f"of the installed package {listed(packages)}")
-    return MappingProxyType(known)
-
-
 def choose(text: str) -> ControllerChoice:
     """Return the controller that a text names.
 

@@ -7,7 +7,7 @@ import pytest
 from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, OpenLoop
-from dh2sim.simulate.controllers.registry import BUILT_IN, choose, controllers
+from dh2sim.simulate.controllers.registry import BUILT_IN, choose
 from tests.simulate.controllers.samples import arm, make
 
 NAMES = ["passive", "hold", "gravity-compensation", "pd", "computed-torque", "sine", "random", "replay"]
@@ -18,15 +18,6 @@ def refused(text: str) -> str:
     with pytest.raises(ControllerError) as caught:
         choose(text)
     return str(caught.value)
-
-
-def test_every_controller_is_listed_with_a_line_of_help() -> None:
-    listed = controllers()
-    assert list(listed)[: len(NAMES)] == NAMES
-    assert listed["hold"] == "Position actuators hold the start, with setpoints that balance gravity there"
-    for name in NAMES:
-        assert listed[name]
-        assert not listed[name].endswith(".")
 
 
 @pytest.mark.parametrize(
