@@ -179,7 +179,7 @@ def test_a_run_whose_metadata_were_damaged_by_hand_is_computed_again_elsewhere(
 ) -> None:
     _finish(run)
     (run / "zarr.json").write_text("")
-    told = f"'{run / 'zarr.json'}' is missing or damaged, and the run cannot be used without it; "
+    told = f"'{run / 'zarr.json'}' is missing or damaged and cannot be restored; "
     for arguments in (["runs", str(run)], _command(run, "--resume")):
         outcome = dh2sim(*arguments)
         assert (outcome.status, outcome.out) == (BAD_INPUT, "")

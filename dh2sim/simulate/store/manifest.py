@@ -154,7 +154,7 @@ def damaged_metadata(*files: Path) -> RunDamagedError:
     """Return the error for metadata that are not what was written; of several files one is damaged."""
     names = " or ".join(f"'{file}'" for file in files)
     return RunDamagedError(
-        f"{names} is missing or damaged, and the run cannot be used without it; "
+        f"{names} is missing or damaged and cannot be restored; "
         "resume with the same options in a new folder, which computes the same bits"
     )
 

@@ -93,7 +93,7 @@ def test_damaged_metadata_can_be_computed_again_elsewhere(tmp_path: Path) -> Non
     with pytest.raises(RunDamagedError) as caught:
         RunWriter.resume(path, SMALL)
     assert str(caught.value) == (
-        f"'{path / 'zarr.json'}' is missing or damaged, and the run cannot be used without it; "
+        f"'{path / 'zarr.json'}' is missing or damaged and cannot be restored; "
         "resume with the same options in a new folder, which computes the same bits"
     )
     assert resume(tmp_path / "new.zarr", SMALL) == (0, 1)
@@ -193,7 +193,7 @@ def test_a_reader_names_the_metadata_that_are_damaged(
     _truncate(path / file)
     with pytest.raises(RunDamagedError) as caught:
         look(path)
-    assert str(caught.value).startswith(f"'{path / file}' is missing or damaged, ")
+    assert str(caught.value).startswith(f"'{path / file}' is missing or damaged and ")
 
 
 def test_metadata_that_do_not_belong_together_are_both_named(tmp_path: Path) -> None:
@@ -203,7 +203,7 @@ def test_metadata_that_do_not_belong_together_are_both_named(tmp_path: Path) -> 
     with pytest.raises(RunDamagedError) as caught:
         open_dataset(path)
     assert str(caught.value).startswith(
-        f"'{path / 'zarr.json'}' or '{path / 'blocks' / 'zarr.json'}' is missing or damaged, "
+        f"'{path / 'zarr.json'}' or '{path / 'blocks' / 'zarr.json'}' is missing or damaged and "
     )
 
 

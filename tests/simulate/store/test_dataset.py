@@ -143,7 +143,7 @@ def test_a_coordinate_that_is_damaged_is_named(tmp_path: Path, damage: Callable[
     damage(path / "joint_unit" / "c.0")
     with pytest.raises(RunDamagedError) as caught:
         open_dataset(path)
-    assert str(caught.value).startswith(f"'{path / 'joint_unit' / 'c.0'}' is missing or damaged, ")
+    assert str(caught.value).startswith(f"'{path / 'joint_unit' / 'c.0'}' is missing or damaged and ")
 
 
 def test_zarr_walks_a_run_without_a_warning_and_reads_its_records(tmp_path: Path) -> None:
