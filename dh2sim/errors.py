@@ -81,7 +81,7 @@ class EngineCapacityError(Dh2simError):
 
 
 class OutputError(Dh2simError):
-    """Files could not be written; what stood there before stands untouched."""
+    """Files could not be written; what was there is unchanged."""
 
 
 class MismatchError(Dh2simError):
@@ -97,19 +97,19 @@ class MissingExtraError(Dh2simError, ImportError):
 
 
 class RunError(Dh2simError):
-    """Something is no run of dh2sim, or a run cannot be read."""
+    """A folder is not a run of dh2sim, or a run cannot be read."""
 
 
 class RunExistsError(RunError):
-    """A run would be written where something stands already."""
+    """A run would be written where there is something already."""
 
 
 class RunDiffersError(RunError):
-    """A run cannot be resumed with these settings: it was made with others."""
+    """A run cannot be resumed, because it was made with other settings."""
 
 
 class RunDamagedError(RunError):
-    """A run's files do not hold what was written to them."""
+    """Files of a run are missing or are not what was written."""
 
 
 class RunBusyError(RunError):
