@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 SSRMS, STANFORD = load_robot("ssrms"), load_robot("stanford")
 PAIRS = [("1", "3"), ("4", "6"), ("7", "9"), ("r", "y"), ("f", "h"), ("v", "n"), ("g", "Shift+G")]
-"""What is pressed for less and for more of joints 1 to 7."""
+"""Keys that decrease and increase joints 1 to 7."""
 STEP = math.radians(3.0)
 
 

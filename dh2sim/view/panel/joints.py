@@ -57,7 +57,7 @@ def add_keys(client: viser.ClientHandle, send: Send) -> None:
 def _add(client: viser.ClientHandle, send: Send, key: str, joint: int, direction: Literal[-1, 1]) -> None:
     *modifier, letter = key.split("+")
     command = client.gui.add_command(
-        f"Joint {joint + 1}: {'more' if direction > 0 else 'less'}",
+        f"Joint {joint + 1}: {'increase' if direction > 0 else 'decrease'}",
         description="3 degrees, or 1 % of a prismatic joint's travel",
         hotkey=letter,  # type: ignore[arg-type]
         modifier="shift" if modifier else None,

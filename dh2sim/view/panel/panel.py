@@ -115,7 +115,9 @@ class ShowTab:
         self._ghost = bind(chooser, send, partial(_compare, files.compare))
         add_upload_button(gui, send, "Compare with a robot file", files.compare_uploaded)
         self._offset = gui.add_html("")
-        pairs = [(f"joint {i}", f"{pair.down} less, {pair.up} more") for i, pair in enumerate(KEYS, start=1)]
+        pairs = [
+            (f"joint {i}", f"{pair.down} to decrease, {pair.up} to increase") for i, pair in enumerate(KEYS, start=1)
+        ]
         with gui.add_folder("Keys", expand_by_default=False):
             gui.add_html(markup.lines(pairs, name="keys"))
 
