@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Bring the README up to date: what its commands print, and the accuracy table.
+"""Update the README, where it shows what commands print, and the accuracy table of docs/validation.md.
 
-Every block that begins with ``$ dh2sim …`` is run anew, in an empty folder and 80 columns wide. The accuracy table is
-the worst pose error of every engine on every robot, over 1000 configurations; its last digits depend on the machine.
+Every block that begins with ``$ dh2sim …`` is run, all in one folder and 80 columns wide. The accuracy table is the
+worst pose error of every engine on every robot, over 1000 configurations; its last digits depend on the machine.
 """
 
 from __future__ import annotations
@@ -15,12 +15,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from dh2sim import build_model, load_robot
+from dh2sim.cli.new import DEFAULT_JOINTS, TYPES, template
 from dh2sim.robot.read import builtin_robots
+from dh2sim.robot.spec import Convention
 from dh2sim.validate.report import Quantity, RobotReport
 from dh2sim.validate.run import validate_robot
 
-README = Path(__file__).resolve().parent.parent / "README.md"
-CONSOLE = re.compile(r"^```console\n\$ (.*?)\n.*?^```", flags=re.MULTILINE | re.DOTALL)
+ROOT = Path(__file__).resolve().parent.parent
+README, VALIDATION = ROOT / "README.md", ROOT / "docs" / "validation.md"
+CONSOLE = re.compile(r"^```console\n\$ (.*?)\n.*?```$", flags=re.MULTILINE | re.DOTALL)
 TABLE = re.compile(r"(<!-- accuracy: begin -->\n).*(<!-- accuracy: end -->)", flags=re.DOTALL)
 MARKDOWN = re.compile(r"^```markdown\n(.*?)^```", flags=re.MULTILINE | re.DOTALL)
 ROBOT_FILE = re.compile(r"^```yaml\n(name: my_arm\n.*?)^```", flags=re.MULTILINE | re.DOTALL)
@@ -43,7 +46,12 @@ def files(text: str) -> dict[str, str]:
     """The files that the page's commands read, by name."""
     table = MARKDOWN.search(text)
     assert table is not None
-    return {"my_arm.yaml": wrong_robot(text), "ur5.md": table.group(1)}
+    types = [TYPES[letter] for letter in DEFAULT_JOINTS]
+    return {
+        "my_arm.yaml": template("my_arm", types, Convention.STANDARD),
+        "wrong.yaml": wrong_robot(text),
+        "ur5.md": table.group(1),
+    }
 
 
 def run(command: str, folder: Path) -> str:
@@ -76,14 +84,17 @@ def _line(report: RobotReport, engines: list[str]) -> str:
 
 
 def main() -> None:
-    """Rewrite the page."""
+    """Rewrite both pages."""
     text = README.read_text(encoding="utf-8")
     with TemporaryDirectory() as name:
         folder = Path(name)
         for file, content in files(text).items():
-            (folder / file).write_text(content, encoding="utf-8")
+            if file != "my_arm.yaml":  # which the page's first command writes
+                (folder / file).write_text(content, encoding="utf-8")
         text = CONSOLE.sub(lambda found: f"```console\n$ {found[1]}\n{run(found[1], folder)}```", text)
-    README.write_text(TABLE.sub(lambda found: found[1] + accuracy() + found[2], text), encoding="utf-8")
+    README.write_text(text, encoding="utf-8")
+    page = VALIDATION.read_text(encoding="utf-8")
+    VALIDATION.write_text(TABLE.sub(lambda found: found[1] + accuracy() + found[2], page), encoding="utf-8")
 
 
 if __name__ == "__main__":

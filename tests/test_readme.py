@@ -47,18 +47,18 @@ def test_commands_print_what_the_readme_shows(command: str, output: str, tmp_pat
             (tmp_path / name).write_text(content, encoding="utf-8")
     done = dh2sim_process(*arguments, cwd=tmp_path, variables={"COLUMNS": "80"})
     printed = without_rounding_noise(done.out + done.err)
-    # a first export of the page's folder writes what later ones leave as it is
-    assert [line.replace(" unchanged", "") for line in printed] == without_rounding_noise(output)
+    assert printed == without_rounding_noise(output)
 
 
 def test_there_are_commands_to_check() -> None:
     assert [command.split()[1] for command, _ in shown_commands()] == [
+        "new",
         "export",
         "validate",
+        "info",
         "fk",
         "import",
         "rollout",
-        "info",
     ]
 
 
@@ -84,8 +84,13 @@ def test_the_python_of_the_readme_runs() -> None:
     names: dict[str, object] = {}
     exec(compile(code, "README.md", "exec"), names)
     assert str(names["urdf"]).startswith("<?xml")
-    shapes = [getattr(names[name], "shape", None) for name in ("T_base_tool", "T_base_dh", "J")]
-    assert shapes == [(1000, 4, 4), (1000, 7, 4, 4), (1000, 6, 6)]
+    assert [getattr(names[name], "shape", None) for name in ("T_base_tool", "J")] == [(1000, 4, 4), (1000, 6, 3)]
+
+
+def test_the_readmes_first_commands_write_into_no_tracked_file() -> None:
+    exports = [line for line in README.splitlines() if re.match(r"(\$ |python3 .*/)dh2sim export", line)]
+    assert len(exports) == 2
+    assert all("--out build" in line for line in exports)
 
 
 def test_every_link_of_the_pages_leads_somewhere() -> None:
