@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, TypeAlias, Unpack,
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.errors import ConfigurationError, OutputError, Problem, RobotError
+from dh2sim.errors import ConfigurationError, Dh2simError, OutputError, Problem, RobotError
 from dh2sim.messages import did_you_mean, listed, member, shown
 from dh2sim.robot.configurations import named_configurations
 from dh2sim.robot.spec import (
@@ -50,6 +50,14 @@ if TYPE_CHECKING:
     from dh2sim.view.server import Viewer
 
 FilePath: TypeAlias = str | os.PathLike[str]
+_READERS: Final = {
+    ".urdf": "from_urdf",
+    ".xml": "from_mjcf",
+    ".md": "from_table",
+    ".csv": "from_table",
+    ".tsv": "from_table",
+}
+"""The methods that read files of other formats, by their suffix."""
 _RIGID: Final = 1e-9
 """By which entries of R Rᵀ may differ from those of the identity."""
 PoseLike: TypeAlias = Pose | ArrayLike
@@ -181,6 +189,9 @@ class Robot:
         """
         from dh2sim.robot.read import load_robot
 
+        reader = _READERS.get(Path(path_or_name).suffix.lower())
+        if reader is not None:
+            raise Dh2simError(f"{os.fspath(path_or_name)}: not a robot file; read it with Robot.{reader}")
         return cls.from_spec(load_robot(path_or_name))
 
     @classmethod
@@ -335,11 +346,12 @@ class Robot:
 
         return frame_pose(self.chain, frame, self._vectors(q))
 
-    def jacobian(self, q: ArrayLike) -> Array:
-        """Return the geometric Jacobian of tool0 in base_link.
+    def jacobian(self, q: ArrayLike, frame: str = "tool0") -> Array:
+        """Return the geometric Jacobian of a frame in base_link.
 
         Args:
             q: Joint vectors, rad and m, shape (..., n); or the name of a configuration.
+            frame: tool0, base_link, dh_0 … dh_n or link_1 … link_n.
 
         Returns:
             Shape (..., 6, n): rows 0-2 linear, rows 3-5 angular.
@@ -349,7 +361,7 @@ class Robot:
         """
         from dh2sim.kinematics.forward import geometric_jacobian
 
-        return geometric_jacobian(self.chain, self._vectors(q))
+        return geometric_jacobian(self.chain, self._vectors(q), frame=frame)
 
     def _vectors(self, q: ArrayLike) -> ArrayLike:
         if not isinstance(q, str):
@@ -406,7 +418,8 @@ class Robot:
             verify: Whether to compare the written files with the table before they are put in place.
 
         Returns:
-            What was written, how well it matches, and what the formats cannot carry.
+            What was written and how well it matches, what the formats cannot hold, and what was estimated or
+            assumed.
 
         Raises:
             Dh2simError: The robot cannot be exported; what was there before is untouched.
@@ -442,15 +455,17 @@ class Robot:
         overwrite: bool = False,
         **options: Unpack[RolloutKeywords],
     ) -> xr.Dataset:
-        """Simulate many rollouts with MuJoCo; the arguments are those of :func:`dh2sim.simulate.rollout`.
+        """Simulate many rollouts with MuJoCo.
 
         Args:
             rollouts: Number of rollouts, 256 by default.
-            out: Folder to write the run to; None to keep it in memory.
+            out: Folder to write the run to, by convention named ``….zarr``; None to keep it in memory.
             threads: Number of threads, 0 for one a processor. The result does not depend on it.
             resume: Whether to continue the run at ``out``, if there is one.
             overwrite: Whether to replace the run at ``out``.
-            **options: What is simulated and recorded: the fields of ``RolloutOptions``, or the ``duration``, s.
+            **options: What is simulated and recorded, as for :func:`dh2sim.simulate.rollout`: ``controller``,
+                ``seed``, ``duration`` or ``steps``, ``timestep``, ``integrator``, ``start``, ``record``, ``every``,
+                ``randomize``, ``floating_base``.
 
         Returns:
             The dataset, as ``docs/dataset.md`` describes it; read lazily from ``out`` if that is given.
@@ -472,7 +487,7 @@ class Robot:
         """
         from dh2sim.importing.convert import convert_robot
 
-        converted = convert_robot(self.spec, member(Convention, convention, "convention"))
+        converted = convert_robot(self.spec, convention)
         return self.from_spec(converted.spec, notes=converted.notes)
 
     def save(self, path: FilePath, *, overwrite: bool = False) -> None:

@@ -67,6 +67,7 @@ def test_kinematics_take_any_batch_and_agree_with_the_functions(name: str) -> No
     q = robot.random_configurations(6, seed=3).reshape(2, 3, robot.n)
     assert np.array_equal(robot.fk(q), dh2sim.forward_kinematics(robot.chain, q))
     assert np.array_equal(robot.jacobian(q), dh2sim.geometric_jacobian(robot.chain, q))
+    assert np.array_equal(robot.jacobian(q, "dh_2"), dh2sim.geometric_jacobian(robot.chain, q, frame="dh_2"))
     for i, frame in enumerate(["dh_0", "dh_1", "dh_2"]):
         assert np.array_equal(robot.fk(q, frame=frame), dh2sim.frame_poses(robot.chain, q)[..., i, :, :])
     assert np.array_equal(robot.fk(q, frame="base_link"), np.broadcast_to(np.eye(4), (2, 3, 4, 4)))
@@ -122,6 +123,7 @@ def test_validation_rollouts_and_conversion_work_on_a_robot_made_in_code(arm: Ro
     assert arm.validate(samples=10).ok
     run = arm.rollout(3, controller="hold", seed=7, steps=5, out=tmp_path / "run.zarr")
     assert run.sizes["rollout"] == 3
+    assert arm.rollout(rollouts=2, steps=5).sizes["rollout"] == 2
     modified = arm.convert("modified")
     assert {row.convention for row in modified.spec.rows} == {Convention.MODIFIED}
     q = arm.random_configurations(10)
@@ -158,6 +160,16 @@ def test_a_robot_is_made_of_a_urdf_and_of_an_mjcf(name: str) -> None:
         np.testing.assert_allclose(robot.fk(q), original.fk(q), atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("path", "reader"),
+    [("scara/scara.urdf", "from_urdf"), ("scara/scara.xml", "from_mjcf"), ("table.CSV", "from_table")],
+)
+def test_a_file_of_another_format_is_sent_to_its_reader(path: str, reader: str) -> None:
+    with pytest.raises(Dh2simError) as caught:
+        Robot.load(GENERATED / path)
+    assert str(caught.value) == f"{GENERATED / path}: not a robot file; read it with Robot.{reader}"
+
+
 def test_a_robot_is_made_of_a_table(tmp_path: Path) -> None:
     path = tmp_path / "arm.md"
     path.write_text("| a | alpha | d | theta |\n|---|---|---|---|\n| 0 | -90 | 0.4 | q1 |\n| 0.2 | 0 | 0 | q2 |\n")
@@ -172,6 +184,9 @@ def test_an_unknown_word_is_named_with_those_that_are_allowed(arm: Robot) -> Non
     assert str(caught.value) == (
         "unknown convention 'modfied'. Did you mean 'modified'? Allowed: standard, modified, hayati"
     )
+    with pytest.raises(Dh2simError) as caught:
+        arm.convert("hayati")
+    assert str(caught.value) == "a table can be converted to standard or modified, not to hayati"
     with pytest.raises(Dh2simError, match="unknown format 'sdf'"):
         arm.export("build", formats=["sdf"])
 
@@ -224,7 +239,7 @@ def test_functions_take_a_robot_in_any_form(arm: Robot) -> None:
     ("given", "described"),
     [
         ("stanford", "'stanford'; Robot.load reads a file, or a robot that comes with dh2sim"),
-        (3.0, "a float"),
+        (3.0, "float"),
         (None, "None"),
     ],
 )

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from dh2sim.errors import MismatchError
+from dh2sim.errors import Dh2simError, MismatchError
 from dh2sim.kinematics.chain import SpecLike, build_chain, spec_of
 from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.frame_assignment.recover import CONFIGURATIONS, SEED
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
+from dh2sim.messages import member
 from dh2sim.model.limits import reach_bound
 from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import Convention, RobotSpec
@@ -49,7 +50,7 @@ class Converted:
         )
 
 
-def convert_robot(spec: SpecLike, to: Convention, *, folder: Path | None = None) -> Converted:
+def convert_robot(spec: SpecLike, to: Convention | str, *, folder: Path | None = None) -> Converted:
     """Write a robot's table in another convention, and compare the text's tool poses with the robot's own.
 
     Args:
@@ -61,6 +62,9 @@ def convert_robot(spec: SpecLike, to: Convention, *, folder: Path | None = None)
         MismatchError: The poses differ by more than rounding.
     """
     spec = spec_of(spec)
+    to = member(Convention, to, "convention")
+    if to is Convention.HAYATI:
+        raise Dh2simError("a table can be converted to standard or modified, not to hayati")
     conversion = convert_rows(spec, to)
     notes = list(conversion.notes)
     if spec.parameters:

@@ -101,7 +101,7 @@ def chain_of(robot: ChainLike) -> KinematicChain:
 def _described(value: object) -> str:
     if isinstance(value, str | os.PathLike):
         return f"{value!r}; Robot.load reads a file, or a robot that comes with dh2sim"
-    return f"a {type(value).__name__}" if value is not None else "None"
+    return "None" if value is None else type(value).__name__
 
 
 def build_chain(spec: SpecLike) -> KinematicChain:
