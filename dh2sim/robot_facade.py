@@ -538,6 +538,12 @@ class Robot:
             webbrowser.open(viewer.url)
         return viewer
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let a robot be pickled and deep-copied: read-only mappings cannot be."""
+        given = {field.name: getattr(self.spec, field.name) for field in fields(self.spec)}
+        plain = {key: dict(value) if isinstance(value, Mapping) else value for key, value in given.items()}
+        return _restored, (type(self), plain, self.notes)
+
     def __repr__(self) -> str:
         """Return the name, the joints as letters, and the convention."""
         joints = "".join(row.type.value[0].upper() for row in self.spec.rows)
@@ -553,6 +559,10 @@ class Robot:
 
     def _repr_latex_(self) -> str:
         return table_latex(self.spec)
+
+
+def _restored(kind: type[Robot], given: dict[str, Any], notes: tuple[str, ...]) -> Robot:
+    return kind.from_spec(RobotSpec(**given), notes=notes)
 
 
 def _rows(rows: object) -> object:

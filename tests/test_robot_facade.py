@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from collections.abc import Callable
 from html.parser import HTMLParser
 from math import pi
@@ -194,6 +196,15 @@ def test_an_unknown_word_is_named_with_those_that_are_allowed(arm: Robot) -> Non
 def test_a_robot_cannot_be_changed(arm: Robot) -> None:
     with pytest.raises(AttributeError):
         arm.spec = Robot.load("stanford").spec  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda robot: pickle.loads(pickle.dumps(robot))])
+def test_a_robot_can_be_copied_and_sent_to_another_process(copied: Callable[[Robot], Robot]) -> None:
+    robot = Robot.load("puma560")
+    again = copied(robot)
+    assert again.mjcf() == robot.mjcf()
+    assert again.spec.parameters == robot.spec.parameters
+    assert not again.spec.gravity.flags.writeable
 
 
 def test_a_robot_prints_its_table(arm: Robot) -> None:
