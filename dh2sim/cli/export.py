@@ -49,34 +49,34 @@ def export(
       dh2sim export my_arm.yaml --out build --format urdf
       dh2sim export robots/*.yaml --check        # in CI: are the files up to date?
     """
-    wanted = _formats(formats)
+    chosen = _formats(formats)
     models = build_all(robots)
     if check:
-        return _check(models, out, wanted, dh_frames=not no_dh_frames)
+        return _check(models, out, chosen, dh_frames=not no_dh_frames)
     from dh2sim.export import export_robot
 
     status = DONE
     for model in models:
         try:
-            report = export_robot(model, out, formats=wanted, dh_frames=not no_dh_frames, verified=not no_verify)
+            report = export_robot(model, out, formats=chosen, dh_frames=not no_dh_frames, verified=not no_verify)
         except OutputError:
             raise  # the next robot would fare no better
         except Dh2simError as error:
             status = max(status, complain(error))
         else:
-            _tell(report, out, model)
+            _print_report(report, out, model)
     return status
 
 
 def _formats(names: list[str] | None) -> list[Format]:
     from dh2sim.export import Format
 
-    wanted = []
+    chosen = []
     for name in names or [format_.value for format_ in Format]:
         if name not in list(Format):
             raise typer.BadParameter(f"unknown format '{name}'; allowed are urdf, mjcf", param_hint="--format")
-        wanted.append(Format(name))
-    return list(dict.fromkeys(wanted))
+        chosen.append(Format(name))
+    return list(dict.fromkeys(chosen))
 
 
 def _check(models: list[RobotModel], out: Path, formats: list[Format], *, dh_frames: bool) -> int:
@@ -98,8 +98,8 @@ def _check(models: list[RobotModel], out: Path, formats: list[Format], *, dh_fra
     return status
 
 
-def _tell(report: ExportReport, out: Path, model: RobotModel) -> None:
-    """Print a table of files with their errors, then what was lost, estimated and assumed."""
+def _print_report(report: ExportReport, out: Path, model: RobotModel) -> None:
+    """Print a table of the files with their errors, then what was lost, estimated and assumed."""
     folder = out / report.name
     errors = {check.format.value: check for check in report.verified}
     lines = [("file", "size", "worst pose error", "")]
@@ -107,14 +107,14 @@ def _tell(report: ExportReport, out: Path, model: RobotModel) -> None:
         name = file.path.relative_to(folder).as_posix()
         kind = {f"{report.name}.urdf": "urdf", f"{report.name}.xml": "mjcf"}.get(name)
         check = errors.get(kind or "")
-        told = "not verified" if kind else ""
+        worst = "not verified" if kind else ""
         if check is not None:
-            told = f"{check.position_error:.1e} m, {check.rotation_error:.1e} rad"
-        lines.append((name, f"{file.size:,} B", told, "" if file.changed else "unchanged"))
+            worst = f"{check.position_error:.1e} m, {check.rotation_error:.1e} rad"
+        lines.append((name, f"{file.size:,} B", worst, "" if file.changed else "unchanged"))
     widths = [max(len(line[i]) for line in lines) for i in range(3)]
     print(f"{report.name}: {folder}")
-    for name, size, told, state in lines:
-        print(f"  {name:{widths[0]}}  {size:>{widths[1]}}  {told:{widths[2]}}  {state}".rstrip())
+    for name, size, worst, state in lines:
+        print(f"  {name:{widths[0]}}  {size:>{widths[1]}}  {worst:{widths[2]}}  {state}".rstrip())
     _list("not carried over", map(str, report.losses))
     _list("estimated from the shapes", (f"{entry}." for entry in model.estimates))
     _list("assumed", (f"{entry}." for entry in model.assumptions))

@@ -168,7 +168,7 @@ def frames(
     from dh2sim.robot.axes_file import read_axes
     from dh2sim.robot.spec import Convention
 
-    wanted = choice(convention, Convention, "--convention", without=(Convention.HAYATI,))
+    chosen = choice(convention, Convention, "--convention", without=(Convention.HAYATI,))
     allowed = tolerance_of(tolerance)
     if picture is not None:
         _require_frame_figure(picture)
@@ -184,7 +184,7 @@ def frames(
             print(f"dh2sim: no picture is drawn: {error}", file=sys.stderr)
     require_free(drawing, force=force)
     folder = Path.cwd() if out is None else out.resolve().parent
-    imported = import_axes(spec, convention=wanted, tolerance=allowed, explain=explain, folder=folder)
+    imported = import_axes(spec, convention=chosen, tolerance=allowed, explain=explain, folder=folder)
     hand_over(imported.text, out, summary=summary(imported), notes=imported.notes, quiet=quiet)
     if drawing is not None:
         from dh2sim.draw.frame_figure.figure import draw_assignment
@@ -224,9 +224,9 @@ def convert(
     from dh2sim.importing.convert import convert_robot
     from dh2sim.robot.spec import Convention
 
-    wanted = choice(to, Convention, "--to", without=(Convention.HAYATI,))
+    target = choice(to, Convention, "--to", without=(Convention.HAYATI,))
     require_free(out, force=force)
     [spec] = load_all([robot])
     folder = Path.cwd() if out is None else out.resolve().parent
-    converted = convert_robot(spec, wanted or Convention.STANDARD, folder=folder)
+    converted = convert_robot(spec, target or Convention.STANDARD, folder=folder)
     hand_over(converted.text, out, summary=converted.summary, notes=converted.notes, quiet=quiet)

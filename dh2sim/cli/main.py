@@ -1,4 +1,4 @@
-"""The ``dh2sim`` program, from its start to its end; what it can do is imported when it runs."""
+"""The ``dh2sim`` program, from its start to its end; its commands are imported when it runs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def main() -> None:
 
         app(prog_name="dh2sim")
     except BaseException:
-        # modules that are interrupted while they are imported make all sorts of errors of it
+        # a module that is interrupted while it is imported may raise any error
         if not interruptions:
             raise
         sys.stderr.write("dh2sim: interrupted\n")
@@ -45,19 +45,19 @@ def main() -> None:
 
 
 def _handle(kind: signal.Signals, handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
-    """Handle a signal, unless whoever started the program has it ignored, as 'nohup' does."""
+    """Handle a signal, unless the program was started with it ignored, as by 'nohup'."""
     if signal.getsignal(kind) is not signal.SIG_IGN:
         signal.signal(kind, handler)
 
 
 def _terminate(number: int, _frame: FrameType | None) -> None:
-    """End in good order: temporary folders are removed. The status is the one that a shell gives to such an end."""
+    """End in good order: temporary folders are removed. The status is what a shell reports for this signal."""
     _cut_off()
     raise SystemExit(128 + number)
 
 
 def _cut_off() -> None:
-    """Be quiet about what an end at any moment cuts off: libraries' coroutines that nobody waits for any more."""
+    """Suppress the warnings of libraries whose coroutines are cut off by an end at any moment."""
     warnings.filterwarnings("ignore", message="coroutine .* was never awaited", category=RuntimeWarning)
 
 

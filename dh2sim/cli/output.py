@@ -16,20 +16,20 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 WIDEST = 1000
-"""Columns; more than any table has."""
+"""Columns; wider than any table."""
 
 
 def make_console(width: int | None = None) -> Console:
     """Return a console on standard output, by default as wide as the terminal."""
     from rich.console import Console
 
-    class PlainSpoken(Console):
-        """Leaves it to the command what comes of a reader that has had enough; rich would end the program."""
+    class RaisingConsole(Console):
+        """Raises an error when its reader has closed the output; rich would end the program."""
 
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError
 
-    return PlainSpoken(highlight=False, width=width)
+    return RaisingConsole(highlight=False, width=width)
 
 
 def print_whole(table: Table) -> None:
@@ -95,7 +95,7 @@ def size_text(count: int) -> str:
 
 
 def require_free(out: Path | None, *, force: bool) -> None:
-    """Refuse to write over a file, unless asked to.
+    """Refuse to overwrite a file, unless asked to.
 
     Raises:
         OutputError: There is a file, or no folder to put one in.
@@ -111,10 +111,10 @@ def require_free(out: Path | None, *, force: bool) -> None:
 
 
 def hand_over(text: str, out: Path | None, *, summary: str, notes: Iterable[str] = (), quiet: bool = False) -> None:
-    """Print a robot file, or write it whole; what there is to say of it goes where it does not mix with the file.
+    """Print a robot file, or write it whole; summary and notes go where they do not mix with the file.
 
     Raises:
-        OutputError: It cannot be written; what stood there before stands untouched.
+        OutputError: It cannot be written; an existing file is unchanged.
     """
     if out is None:
         sys.stdout.write(text)

@@ -15,7 +15,7 @@ def list_robots(
 ) -> None:
     """List the robots that come with dh2sim: name, moving joints, and what they are.
 
-    R stands for a revolute joint, P for a prismatic one.
+    R is a revolute joint, P a prismatic one.
 
     \b
     Examples:

@@ -126,7 +126,7 @@ def rollout(
         progress = fill(writer, job, threads=threads, advance=advance, stopping=lambda: patience.arrived is not None)
     summary = describe(out)
     if not quiet:
-        _tell(job, summary, progress, out)
+        _print_summary(job, summary, progress, out)
     if progress.finished:
         return 0
     print(
@@ -186,7 +186,7 @@ def _patient(quiet: bool) -> Iterator[_Patience]:
             signal.signal(kind, signal.SIG_DFL if handler is None else handler)
 
 
-def _tell(job: Job, summary: RunDescription, progress: Progress, out: Path) -> None:
+def _print_summary(job: Job, summary: RunDescription, progress: Progress, out: Path) -> None:
     options = job.options
     print(
         f"{summary.robot}: {summary.rollouts:,} rollouts of {summary.steps:,} steps ({summary.duration:g} s), "

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 FORMATS = {"parquet": ".parquet", "hdf5": ".h5"}
 SHOWN = 5
-"""Rollouts that stopped early are named, so many of them."""
+"""Number of rollouts that stopped early to list."""
 
 
 def runs(
@@ -59,7 +59,7 @@ def runs(
         if out is not None or overwrite:
             option = "--overwrite" if out is None else "--out"
             raise typer.BadParameter("only with --to: without it nothing is written", param_hint=option)
-        _tell(paths, as_json=as_json)
+        _describe(paths, as_json=as_json)
         return
     if to not in FORMATS:
         guess = did_you_mean(to, FORMATS)
@@ -71,22 +71,22 @@ def runs(
     _convert(paths, to, out, overwrite=overwrite, quiet=quiet)
 
 
-def _tell(paths: list[Path], *, as_json: bool) -> None:
+def _describe(paths: list[Path], *, as_json: bool) -> None:
     from dh2sim.simulate.description import describe
 
-    told: list[RunDescription] = []
+    descriptions: list[RunDescription] = []
     errors: list[Dh2simError] = []
     for path in paths:
         try:
-            told.append(describe(path))
+            descriptions.append(describe(path))
         except Dh2simError as error:
             errors.append(error)
     if as_json:
         if not errors:
-            values = [description.to_json() for description in told]
+            values = [description.to_json() for description in descriptions]
             print(json.dumps(values[0] if len(values) == 1 else values, indent=2))
     else:
-        for number, description in enumerate(told):
+        for number, description in enumerate(descriptions):
             if number:
                 print()
             _print(description)

@@ -1,9 +1,4 @@
-"""Forward kinematics of a chain, for any number of configurations at once.
-
-Frames by the names that every export uses.
-
-The geometric Jacobian of a chain, for any number of configurations at once.
-"""
+"""Poses and Jacobians of a chain's frames, for any number of configurations at once."""
 
 from __future__ import annotations
 

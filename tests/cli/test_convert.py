@@ -30,7 +30,7 @@ def test_the_other_table_is_written_and_converts_back(tmp_path: Path) -> None:
     ]
 
 
-def test_a_wrong_convention_is_told() -> None:
+def test_a_wrong_convention_is_reported() -> None:
     run = dh2sim("convert", "scara", "--to", "hayati")
     assert (run.status, run.out) == (2, "")
     assert "'hayati' is not one of standard, modified" in run.err

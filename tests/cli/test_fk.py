@@ -127,7 +127,7 @@ def test_every_frame_can_be_asked_for(frame: str) -> None:
     np.testing.assert_array_equal(_pose("stanford", *IN_RADIANS, "--to", frame), expected)
 
 
-def test_a_configuration_stands_for_its_numbers_and_home_is_where_the_robot_is(tmp_path: Path) -> None:
+def test_a_configuration_may_be_named_and_home_is_the_default(tmp_path: Path) -> None:
     printed = forward_kinematics(CHAIN, STANFORD.configurations["printed"])
     home = forward_kinematics(CHAIN, STANFORD.configurations["home"])
     np.testing.assert_array_equal(_pose("stanford", "printed"), printed)
@@ -236,7 +236,7 @@ OPTIONS = "Options: --frame, --from, --to, --all, --degrees, --radians, --json, 
         ("1 2 3 4 5 6 --deg=1", f"fk has no option '--deg=1'. {OPTIONS}"),
     ],
 )
-def test_what_is_wrong_is_told_in_words(arguments: str, message: str) -> None:
+def test_what_is_wrong_is_reported_in_words(arguments: str, message: str) -> None:
     assert dh2sim("fk", "stanford", *arguments.split()) == Outcome(status=2, out="", err=f"dh2sim: {message}\n")
 
 

@@ -34,7 +34,7 @@ def test_the_robot_file_is_printed(axes: Path) -> None:
 
 
 @pytest.mark.slow
-def test_with_explain_every_step_is_told_and_drawn(axes: Path, tmp_path: Path) -> None:
+def test_with_explain_every_step_is_reported_and_drawn(axes: Path, tmp_path: Path) -> None:
     out = tmp_path / "two.yaml"
     run = dh2sim("frames", axes, "--explain", "-o", out)
     assert (run.status, run.err) == (0, "")
@@ -53,7 +53,7 @@ def test_the_picture_goes_where_asked_for(axes: Path, tmp_path: Path) -> None:
     assert not run.out.startswith("#")
 
 
-def test_a_picture_that_exists_is_not_written_over_and_nothing_else_is_written(axes: Path, tmp_path: Path) -> None:
+def test_a_picture_that_exists_is_not_overwritten_and_nothing_else_is_written(axes: Path, tmp_path: Path) -> None:
     drawing, out = tmp_path / "frames.svg", tmp_path / "two.yaml"
     drawing.write_text("mine")
     before = contents(tmp_path)
@@ -69,7 +69,7 @@ def test_a_picture_of_an_unknown_kind_is_refused_before_anything_is_done(axes: P
     assert "allowed endings: " in run.err
 
 
-def test_mistakes_in_the_axes_are_told_all_at_once_with_their_places(tmp_path: Path) -> None:
+def test_mistakes_in_the_axes_are_reported_all_at_once_with_their_places(tmp_path: Path) -> None:
     path = tmp_path / "axes.yaml"
     path.write_text(AXES.replace("[0, -1, 0]", "[0, 0, 0]").replace("tool:", "tol:"))
     run = dh2sim("frames", path)

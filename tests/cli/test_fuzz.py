@@ -93,7 +93,7 @@ def _run(*command: str) -> None:
     assert run.status in (0, 1, 2)
     assert "Traceback" not in run.out + run.err
     if run.status == 2:
-        assert run.err or not command, "bad input is told"
+        assert run.err or not command, "bad input is printed"
 
 
 lenient = settings(max_examples=120, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))

@@ -41,7 +41,7 @@ def test_the_robot_file_is_written_where_asked_for_and_exports(urdf: Path, tmp_p
     assert dh2sim("export", out, "--out", tmp_path / "generated").status == 0
 
 
-def test_a_file_that_exists_is_not_written_over_unless_forced(urdf: Path, tmp_path: Path) -> None:
+def test_a_file_that_exists_is_not_overwritten_unless_forced(urdf: Path, tmp_path: Path) -> None:
     out = tmp_path / "arm.yaml"
     out.write_text("mine\n")
     run = dh2sim("import", urdf, "-o", out)
@@ -86,13 +86,13 @@ def test_a_table_without_a_convention_is_an_error_that_says_what_to_add(tmp_path
         (["--tolerance", "nan"], "must be above 0 and below 1, got nan"),
     ],
 )
-def test_a_wrong_option_is_told_with_what_is_allowed(urdf: Path, options: list[str], expected: str) -> None:
+def test_a_wrong_option_is_reported_with_what_is_allowed(urdf: Path, options: list[str], expected: str) -> None:
     run = dh2sim("import", urdf, *options)
     assert (run.status, run.out) == (2, "")
     assert expected in run.err
 
 
-def test_an_unknown_tip_is_told_with_its_neighbours(urdf: Path) -> None:
+def test_an_unknown_tip_is_reported_with_its_neighbours(urdf: Path) -> None:
     run = dh2sim("import", urdf, "--tip", "tol0")
     assert (run.status, run.out) == (2, "")
     assert "Did you mean 'tool0'?" in run.err
@@ -121,7 +121,7 @@ def test_nothing_is_left_behind_where_the_folder_is_missing(urdf: Path, tmp_path
     assert run.status == 2
 
 
-def test_a_broken_file_is_told_with_its_place_and_without_a_traceback(tmp_path: Path) -> None:
+def test_a_broken_file_is_reported_with_its_place_and_without_a_traceback(tmp_path: Path) -> None:
     path = tmp_path / "broken.urdf"
     path.write_text('<robot name="r">\n  <link name="a">\n</robot>\n')
     run = dh2sim_process("import", path)

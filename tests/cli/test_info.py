@@ -38,13 +38,13 @@ def test_json_holds_everything_in_si_units(tmp_path: Path) -> None:
     robot = write(tmp_path, RICH)
     run = dh2sim("info", robot, "--json")
     assert (run.status, run.err) == (0, "")
-    told = json.loads(run.out)
+    printed = json.loads(run.out)
     chain, home = build_chain(load_robot(robot)), [0.3, -0.4]
     frames = {f"dh_{i}": T.tolist() for i, T in enumerate(frame_poses(chain, home))}
-    assert told["frames_at_home"] == {**frames, "tool0": forward_kinematics(chain, home).tolist()}
-    assert told["configurations"] == {"home": home, "up": [1.0, 1.0]}
-    assert [told[key] for key in ("name", "home", "reach")] == ["rich", home, 0.7]
-    assert told["rows"][0] == {
+    assert printed["frames_at_home"] == {**frames, "tool0": forward_kinematics(chain, home).tolist()}
+    assert printed["configurations"] == {"home": home, "up": [1.0, 1.0]}
+    assert [printed[key] for key in ("name", "home", "reach")] == ["rich", home, 0.7]
+    assert printed["rows"][0] == {
         "joint": "joint_1",
         "type": "revolute",
         "convention": "standard",
@@ -56,10 +56,10 @@ def test_json_holds_everything_in_si_units(tmp_path: Path) -> None:
         "flip": False,
         "limits": {"position": [-2.0, 2.0], "velocity": 3.0, "effort": 80.0, "assumed": []},
     }
-    assert [link["estimated"] for link in told["links"]] == [["inertia"], ["mass", "com", "inertia"]]
-    assert told["links"][0]["mass"] == 4.0
-    assert told["mass"] == sum(link["mass"] for link in told["links"])
-    assert told["disabled_collisions"] == [
+    assert [link["estimated"] for link in printed["links"]] == [["inertia"], ["mass", "com", "inertia"]]
+    assert printed["links"][0]["mass"] == 4.0
+    assert printed["mass"] == sum(link["mass"] for link in printed["links"])
+    assert printed["disabled_collisions"] == [
         {"link1": "base_link", "link2": "link_1", "reason": "Adjacent"},
         {"link1": "link_1", "link2": "link_2", "reason": "Adjacent"},
     ]
@@ -112,9 +112,9 @@ def test_a_hayati_table_has_a_second_twist_and_no_offset_but_of_slides(tmp_path:
         "2 slide prismatic 0.1 0 0 d2* + 0.2 0 -1 … 1 m",
         "3 plate fixed 0 0 0.25 15",
     ]
-    told = json.loads(dh2sim("info", robot, "--json").out)
-    assert [row["convention"] for row in told["rows"]] == ["hayati"] * 3
-    assert [row["beta"] for row in told["rows"]] == [math.radians(-0.05), 0.0, math.radians(0.25)]
+    printed = json.loads(dh2sim("info", robot, "--json").out)
+    assert [row["convention"] for row in printed["rows"]] == ["hayati"] * 3
+    assert [row["beta"] for row in printed["rows"]] == [math.radians(-0.05), 0.0, math.radians(0.25)]
 
 
 def test_rows_of_other_conventions_have_no_second_twist(tmp_path: Path) -> None:

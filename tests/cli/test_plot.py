@@ -23,7 +23,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_plot_stands_beside_its_run(run: Path) -> None:
+def test_a_plot_is_written_beside_its_run(run: Path) -> None:
     out = run.with_name("run-1-joints.png")
     done = dh2sim("plot", run, "--rollout", "1", "--size", "700x500", "--dpi", "60")
     assert done == Outcome(status=0, out=f"{out}: joints of run.zarr, rollout 1\n", err="")
@@ -40,7 +40,7 @@ def test_a_plot_is_a_drawing_where_its_ending_says_so(run: Path, tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "printed"),
     [
         (["--what", "tol"], f"unknown plot 'tol'. Did you mean 'tool'? Allowed: {WHAT}"),
         (["--rollout", "2"], "run.zarr has no rollout 2; it contains rollouts 0 to 1"),
@@ -54,28 +54,28 @@ def test_a_plot_is_a_drawing_where_its_ending_says_so(run: Path, tmp_path: Path)
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_what_cannot_be_plotted_is_told(
-    run: Path, arguments: list[str], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_what_cannot_be_plotted_is_reported(
+    run: Path, arguments: list[str], printed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert dh2sim("plot", run, *arguments) == Outcome(status=2, out="", err=f"dh2sim: {told}\n")
+    assert dh2sim("plot", run, *arguments) == Outcome(status=2, out="", err=f"dh2sim: {printed}\n")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_no_run_is_told(tmp_path: Path) -> None:
-    told = f"dh2sim: '{tmp_path}' is not a run of dh2sim\n"
-    assert dh2sim("plot", tmp_path) == Outcome(status=2, out="", err=told)
+def test_what_is_not_a_run_is_reported(tmp_path: Path) -> None:
+    printed = f"dh2sim: '{tmp_path}' is not a run of dh2sim\n"
+    assert dh2sim("plot", tmp_path) == Outcome(status=2, out="", err=printed)
     assert dh2sim("plot", "no.zarr") == Outcome(status=2, out="", err="dh2sim: there is no 'no.zarr'\n")
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "printed"),
     [
         (["--size", "100x100"], "Invalid value for --size: must be from 200 to 20000 pixels each way, got 100x100"),
         (["--size", "100"], "Invalid value for --size: '100' must have the form WIDTHxHEIGHT, such as 1280x720"),
     ],
 )
-def test_sizes_that_cannot_be_are_told(run: Path, arguments: list[str], told: str) -> None:
+def test_sizes_that_cannot_be_are_reported(run: Path, arguments: list[str], printed: str) -> None:
     done = dh2sim("plot", run, *arguments)
     assert (done.status, done.out) == (2, "")
-    assert told in " ".join(done.err.split())
+    assert printed in " ".join(done.err.split())

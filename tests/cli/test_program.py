@@ -127,7 +127,7 @@ def test_the_package_runs_as_a_module() -> None:
     ],
     ids=" ".join,
 )
-def test_wrong_usage_is_told_on_standard_error_and_exits_with_2(arguments: list[str]) -> None:
+def test_wrong_usage_is_reported_on_standard_error_and_exits_with_2(arguments: list[str]) -> None:
     run = dh2sim(*arguments)
     assert (run.status, run.out) == (2, "")
     assert "rror: " in run.err
@@ -239,7 +239,7 @@ def _shell(script: str, **variables: str) -> Outcome:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["schema", "info stanford", "fk stanford --json"])
-def test_a_reader_that_has_had_enough_is_no_error(command: str) -> None:
+def test_a_reader_that_closes_the_output_is_not_an_error(command: str) -> None:
     run = _shell(f"{{ $DH2SIM {command}; echo $? >&2; }} | head -c 1")
     assert (run.status, len(run.out)) == (0, 1)
     assert run.err == "0\n"
@@ -273,7 +273,7 @@ def test_a_terminal_that_knows_few_characters_is_written_to_all_the_same(tmp_pat
 
 
 @pytest.mark.parametrize("command", [("export", "rpr"), ("validate", "rpr"), ("rollout", "rpr", "--out", "run.zarr")])
-def test_a_library_to_draw_with_that_there_is_not_is_named(command: tuple[str, ...], tmp_path: Path) -> None:
+def test_a_missing_drawing_library_is_named(command: tuple[str, ...], tmp_path: Path) -> None:
     run = dh2sim_process(*command, cwd=tmp_path, variables={"MUJOCO_GL": "nonsense"})
     assert (run.status, run.out) == (2, "")
     assert run.err == (
@@ -302,9 +302,9 @@ main()
 
 
 @pytest.mark.parametrize(
-    ("kill", "status", "told"), [(signal.SIGINT, 130, "dh2sim: interrupted\n"), (signal.SIGTERM, 143, "")]
+    ("kill", "status", "printed"), [(signal.SIGINT, 130, "dh2sim: interrupted\n"), (signal.SIGTERM, 143, "")]
 )
-def test_what_an_end_cuts_off_is_not_told_of(kill: signal.Signals, status: int, told: str) -> None:
+def test_what_an_end_cuts_off_is_not_reported(kill: signal.Signals, status: int, printed: str) -> None:
     command = [sys.executable, "-c", CUT_OFF, str(int(kill))]
     done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=60, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (status, "", told)
+    assert (done.returncode, done.stdout, done.stderr) == (status, "", printed)

@@ -44,13 +44,13 @@ def test_a_rollout_becomes_a_film_beside_its_run(run: Path) -> None:
 def test_a_gif_and_a_still_are_chosen_by_their_ending(run: Path, tmp_path: Path) -> None:
     require_gl()
     done = dh2sim("render", run, "--out", tmp_path / "a.gif", "--size", "96x64", "--speed", "2", "--frames")
-    told = f"{tmp_path / 'a.gif'}: run.zarr, rollout 0, 0.2 s in 3 pictures, 96x64\n"
-    assert done == Outcome(status=0, out=told, err="")
+    expected = f"{tmp_path / 'a.gif'}: run.zarr, rollout 0, 0.2 s in 3 pictures, 96x64\n"
+    assert done == Outcome(status=0, out=expected, err="")
     with Image.open(tmp_path / "a.gif") as film:
         assert (film.format, film.size) == ("GIF", (96, 64))
     done = dh2sim("render", run, "--out", tmp_path / "a.png", "--size", "96x64", "--time", "0.1", "--no-trace")
-    told = f"{tmp_path / 'a.png'}: run.zarr, rollout 0 at 0.1 s, 96x64\n"
-    assert done == Outcome(status=0, out=told, err="")
+    expected = f"{tmp_path / 'a.png'}: run.zarr, rollout 0 at 0.1 s, 96x64\n"
+    assert done == Outcome(status=0, out=expected, err="")
     assert dh2sim("render", run, "--out", tmp_path / "b.png", "--size", "96x64", "--quiet").out == ""
     with Image.open(tmp_path / "a.png") as a, Image.open(tmp_path / "b.png") as b:
         assert not np.array_equal(np.asarray(a), np.asarray(b))
@@ -82,7 +82,7 @@ def test_a_rollout_that_stopped_early_says_where_its_film_ends(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "expected"),
     [
         (["--rollout", "3"], "run.zarr has no rollout 3; it contains rollouts 0 to 2"),
         (["--out", "a.avi"], "cannot write 'a.avi' as a picture; allowed endings: .mp4, .gif, .png"),
@@ -99,26 +99,26 @@ def test_a_rollout_that_stopped_early_says_where_its_film_ends(tmp_path: Path) -
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_what_cannot_be_rendered_is_told(
-    run: Path, arguments: list[str], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_what_cannot_be_rendered_is_reported(
+    run: Path, arguments: list[str], expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     require_gl()
     monkeypatch.chdir(tmp_path)
     output = [] if "--out" in arguments else ["--out", "a.mp4"]
-    assert dh2sim("render", run, *output, *arguments) == Outcome(status=2, out="", err=f"dh2sim: {told}\n")
+    assert dh2sim("render", run, *output, *arguments) == Outcome(status=2, out="", err=f"dh2sim: {expected}\n")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_no_run_or_robot_is_told(tmp_path: Path) -> None:
+def test_what_is_neither_run_nor_robot_is_reported(tmp_path: Path) -> None:
     missing = tmp_path / "no.zarr"
     assert dh2sim("render", missing) == Outcome(status=2, out="", err=f"dh2sim: there is no '{missing}'\n")
-    told = f"dh2sim: '{tmp_path}' is not a run of dh2sim\n"
-    assert dh2sim("render", tmp_path) == Outcome(status=2, out="", err=told)
+    expected = f"dh2sim: '{tmp_path}' is not a run of dh2sim\n"
+    assert dh2sim("render", tmp_path) == Outcome(status=2, out="", err=expected)
     assert dh2sim("render", "stanfrd").err == dh2sim("info", "stanfrd").err
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "expected"),
     [
         (["stanford", "--out", "a.mp4"], "dh2sim: a robot does not move: write 'a.png', or render a run\n"),
         (["stanford", "--time", "1"], "Invalid value for --time: does not apply to a robot"),
@@ -129,10 +129,10 @@ def test_what_is_no_run_or_robot_is_told(tmp_path: Path) -> None:
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_options_that_do_not_fit_are_told(arguments: list[str], told: str) -> None:
+def test_options_that_do_not_fit_are_reported(arguments: list[str], expected: str) -> None:
     done = dh2sim("render", *arguments)
     assert (done.status, done.out) == (2, "")
-    assert told in done.err
+    assert expected in done.err
 
 
 @pytest.mark.slow

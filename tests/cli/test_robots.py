@@ -21,7 +21,7 @@ KNOWN = f"Robots that come with dh2sim: {', '.join(builtin_robots())}"
     ("name", "hint"),
     [("stanfrd", " Did you mean 'stanford'?"), ("stanfrd.yaml", " Did you mean 'stanford'?"), ("xyzzy", "")],
 )
-def test_a_robot_that_is_unknown_is_told_with_those_that_are(command: str, name: str, hint: str) -> None:
+def test_a_robot_that_is_unknown_is_reported_with_those_that_are(command: str, name: str, hint: str) -> None:
     message = f"dh2sim: there is no file and no robot named '{name}'.{hint} {KNOWN}\n"
     assert dh2sim(command, name) == Outcome(status=2, out="", err=message)
 
@@ -69,7 +69,7 @@ def _places(text: str) -> list[str]:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_error_of_a_file_is_told_with_its_place(tmp_path: Path, command: str) -> None:
+def test_every_error_of_a_file_is_reported_with_its_place(tmp_path: Path, command: str) -> None:
     file = write(tmp_path, WRONG)
     run = dh2sim(command, file)
     assert (run.status, run.out) == (2, "")
@@ -78,7 +78,7 @@ def test_every_error_of_a_file_is_told_with_its_place(tmp_path: Path, command: s
 
 
 @pytest.mark.parametrize("command", ["export", "validate"])
-def test_all_wrong_files_are_told_at_once(tmp_path: Path, command: str) -> None:
+def test_all_wrong_files_are_reported_at_once(tmp_path: Path, command: str) -> None:
     files = [write(tmp_path, WRONG, name) for name in ("first", "second")]
     run = dh2sim(command, files[0], "xyzzy", files[1], "stanford")
     assert (run.status, run.out) == (2, "")
@@ -86,7 +86,7 @@ def test_all_wrong_files_are_told_at_once(tmp_path: Path, command: str) -> None:
     assert [line.split(":")[0] for line in lines] == [str(files[0])] * 3 + ["dh2sim"] + [str(files[1])] * 3
 
 
-def test_meshes_of_all_robots_that_cannot_be_used_are_told_at_once(tmp_path: Path) -> None:
+def test_meshes_of_all_robots_that_cannot_be_used_are_reported_at_once(tmp_path: Path) -> None:
     (tmp_path / "broken.stl").write_bytes(b"no mesh")
     files = [
         write(tmp_path, small(name).replace("alpha: 0.651,", "alpha: 0.651, link: {mesh: {file: broken.stl}},"))
@@ -104,7 +104,7 @@ def test_meshes_of_all_robots_that_cannot_be_used_are_told_at_once(tmp_path: Pat
     ("data", "what"),
     [(b"", "1:1"), (b"\xff\xfe\xfa", "1:1"), (b"[1, 2]", "1:1"), (b"a: [", ""), (b"\x00\x01", "")],
 )
-def test_a_file_that_is_no_robot_file_is_no_traceback(tmp_path: Path, data: bytes, what: str) -> None:
+def test_a_file_that_is_no_robot_file_makes_no_traceback(tmp_path: Path, data: bytes, what: str) -> None:
     file = tmp_path / "file.yaml"
     file.write_bytes(data)
     run = dh2sim("info", file)
@@ -141,7 +141,7 @@ def test_a_file_of_another_format_is_to_be_imported_first(tmp_path: Path, name: 
     assert dh2sim("rollout", file, "--out", tmp_path / "run.zarr").err == f"dh2sim: {message}\n"
 
 
-def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_is_reported(tmp_path: Path) -> None:
     link = tmp_path / "loop.yaml"
     link.symlink_to(link)
     run = dh2sim("info", link)

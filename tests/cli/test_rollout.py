@@ -33,7 +33,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def told(run: Outcome) -> list[str]:
+def printed(run: Outcome) -> list[str]:
     """The lines of an error of bad input."""
     assert (run.status, run.out) == (2, "")
     assert all(line.startswith("dh2sim: ") for line in run.err.splitlines())
@@ -97,7 +97,7 @@ def test_the_command_is_kept_as_a_shell_would_take_it(tmp_path: Path) -> None:
 def test_quiet_prints_nothing(folder: Path) -> None:
     assert dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *QUICK, "--quiet") == Outcome(status=0, out="", err="")
     assert dh2sim("rollout", "rich.yaml", "--out", "other.zarr", *QUICK, "-q") == Outcome(status=0, out="", err="")
-    assert told(dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *QUICK, "-q")) == [
+    assert printed(dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *QUICK, "-q")) == [
         "'run.zarr' already exists; resume it, overwrite it, or choose another folder"
     ]
 
@@ -118,10 +118,10 @@ def test_a_finished_run_has_nothing_to_resume(folder: Path) -> None:
     assert run.out.splitlines()[1] == "  all of them were simulated before"
 
 
-def test_every_mistake_is_told_at_once(folder: Path) -> None:
+def test_every_mistake_is_reported_at_once(folder: Path) -> None:
     mistakes = ["--steps", "10", "--every", "3", "--rollouts", "0", "--record", "qpos,qve", "--integrator", "rk5"]
     more = ["--randomize", "mas=0.1,gain=2", "--seed", "-1"]
-    assert told(dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *mistakes, *more)) == [
+    assert printed(dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *mistakes, *more)) == [
         "--rollouts must be at least 1, got 0",
         "--integrator must be one of Euler, RK4, implicit, implicitfast, got 'rk5'. Did you mean 'RK4'?",
         "--seed must be at least 0, got -1",
@@ -131,7 +131,7 @@ def test_every_mistake_is_told_at_once(folder: Path) -> None:
         "--every must divide the 10 steps of a rollout, got 3",
     ]
     unknown = ["--controller", "sine:amplitud=1", "--start", "hme"]
-    assert told(dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *unknown)) == [
+    assert printed(dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *unknown)) == [
         "controller 'sine': unknown option 'amplitud'. Did you mean 'amplitude'? "
         "Options: harmonics=5, frequency=0.1, amplitude=0.3, fade=1",
         "--start must be one of home, zero, random, up, or a .csv or .npy file of joint positions, got 'hme'. "
@@ -169,8 +169,8 @@ def test_every_mistake_is_told_at_once(folder: Path) -> None:
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_one_mistake_is_told_and_nothing_is_made(options: list[str], problem: str, folder: Path) -> None:
-    assert told(dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *options)) == [problem]
+def test_one_mistake_is_reported_and_nothing_is_made(options: list[str], problem: str, folder: Path) -> None:
+    assert printed(dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *options)) == [problem]
     assert not (folder / "run.zarr").exists()
 
 
@@ -199,8 +199,8 @@ def test_a_share_that_cannot_be_read_is_wrong_usage(share: str, problem: str, fo
     ],
     ids=["a file", "in a file", "this folder", "nothing", "too long"],
 )
-def test_a_place_where_no_run_can_be_is_told(out: str, words: str, folder: Path) -> None:
-    assert told(dh2sim("rollout", "rich.yaml", "--out", out, *QUICK)) == [words]
+def test_a_place_where_no_run_can_be_is_reported(out: str, words: str, folder: Path) -> None:
+    assert printed(dh2sim("rollout", "rich.yaml", "--out", out, *QUICK)) == [words]
     assert sorted(path.name for path in folder.iterdir()) == ["rich.yaml"]
 
 
@@ -209,7 +209,7 @@ def test_folders_on_the_way_are_made(folder: Path) -> None:
     assert open_dataset(folder / "a/b/run.zarr").sizes["rollout"] == 3
 
 
-def test_a_robot_that_is_wrong_is_told_as_by_every_command(folder: Path) -> None:
+def test_a_robot_that_is_wrong_is_reported_as_by_every_command(folder: Path) -> None:
     (folder / "bad.yaml").write_text(
         "name: bad\nconvention: standard\njoints: [{tpye: revolute}]\n", encoding="utf-8"
     )
@@ -222,7 +222,7 @@ def test_a_robot_that_does_not_move_has_nothing_to_simulate(folder: Path) -> Non
     (folder / "still.yaml").write_text(
         "name: still\nconvention: standard\njoints: [{type: fixed, a: 0.3}]\n", encoding="utf-8"
     )
-    assert told(dh2sim("rollout", "still.yaml", "--out", "run.zarr")) == [
+    assert printed(dh2sim("rollout", "still.yaml", "--out", "run.zarr")) == [
         "still has no joint that moves: there is nothing to simulate"
     ]
 

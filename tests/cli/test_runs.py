@@ -73,7 +73,7 @@ def _bytes_on_disk(run: Path) -> int:
     return sum(len(data) for data in contents(run).values())
 
 
-def test_a_run_is_told_in_eighty_columns(run: Path, arrays: Arrays) -> None:
+def test_a_run_is_reported_in_eighty_columns(run: Path, arrays: Arrays) -> None:
     numbers = sum(array.nbytes for array in arrays.values())
     disk = _bytes_on_disk(run)
     size = f"{disk / 1000:.1f} kB on disk for {numbers / 1000:.1f} kB of numbers ({100 * disk / numbers:.0f} %)"
@@ -83,9 +83,9 @@ def test_a_run_is_told_in_eighty_columns(run: Path, arrays: Arrays) -> None:
 
 
 def test_json_tells_the_same_alone(run: Path, arrays: Arrays) -> None:
-    told = dh2sim("runs", run, "--json")
-    assert (told.status, told.err) == (0, "")
-    values = json.loads(told.out)
+    printed = dh2sim("runs", run, "--json")
+    assert (printed.status, printed.err) == (0, "")
+    values = json.loads(printed.out)
     recorded = values.pop("recorded")
     assert recorded["qpos"] == {
         "units": "rad or m",
@@ -132,10 +132,10 @@ def test_an_unfinished_run_tells_how_to_carry_on(folder: Path, arrays: Arrays) -
     assert lines[0] == "run.zarr  not complete"
     assert "  rollouts    7: 3 finished, 4 not yet run" in lines
     assert lines[-1] == "  carry on    dh2sim rollout sample.yaml --out run.zarr --resume"
-    told = json.loads(dh2sim("runs", run, "--json").out)
-    assert (told["complete"], told["not_run"], told["stopped"]) == (False, 4, [])
-    assert told["resume_command"] == "dh2sim rollout sample.yaml --out run.zarr --resume"
-    assert told["bytes_in_memory"] == sum(array[:3].nbytes for array in arrays.values())
+    printed = json.loads(dh2sim("runs", run, "--json").out)
+    assert (printed["complete"], printed["not_run"], printed["stopped"]) == (False, 4, [])
+    assert printed["resume_command"] == "dh2sim rollout sample.yaml --out run.zarr --resume"
+    assert printed["bytes_in_memory"] == sum(array[:3].nbytes for array in arrays.values())
 
 
 def test_a_run_that_has_nothing_yet_has_neither_speed_nor_size_of_numbers(folder: Path, arrays: Arrays) -> None:
@@ -184,19 +184,19 @@ def test_of_many_early_stops_the_first_few_are_named(folder: Path) -> None:
     ]
 
 
-def test_several_runs_are_told_one_after_the_other_and_as_a_list(run: Path, arrays: Arrays) -> None:
+def test_several_runs_are_reported_one_after_the_other_and_as_a_list(run: Path, arrays: Arrays) -> None:
     other = write_run(Path("other.zarr"), make_layout(), arrays, blocks=2)
-    told = dh2sim("runs", run, other)
-    assert told.out == f"{dh2sim('runs', run).out}\n{dh2sim('runs', other).out}"
+    printed = dh2sim("runs", run, other)
+    assert printed.out == f"{dh2sim('runs', run).out}\n{dh2sim('runs', other).out}"
     values = json.loads(dh2sim("runs", run, other, "--json").out)
     assert values == [json.loads(dh2sim("runs", path, "--json").out) for path in (run, other)]
 
 
-def test_what_is_no_run_is_told_and_the_others_all_the_same(run: Path) -> None:
+def test_what_is_not_a_run_is_reported_and_the_others_all_the_same(run: Path) -> None:
     Path("folder").mkdir()
     Path("file").write_text("text")
-    told = dh2sim("runs", "none.zarr", "folder", run, "file")
-    assert told == Outcome(
+    printed = dh2sim("runs", "none.zarr", "folder", run, "file")
+    assert printed == Outcome(
         status=2,
         out=dh2sim("runs", run).out,
         err=(
@@ -222,10 +222,10 @@ def test_what_is_no_run_is_told_and_the_others_all_the_same(run: Path) -> None:
     ],
     ids=["format", "out", "overwrite", "json", "several"],
 )
-def test_options_that_make_no_sense_are_told(run: Path, options: list[str], message: str) -> None:
-    told = dh2sim("runs", run, *options)
-    assert (told.status, told.out) == (2, "")
-    assert told.err.splitlines()[-1] == f"Error: {message}"
+def test_options_that_make_no_sense_are_reported(run: Path, options: list[str], message: str) -> None:
+    printed = dh2sim("runs", run, *options)
+    assert (printed.status, printed.out) == (2, "")
+    assert printed.err.splitlines()[-1] == f"Error: {message}"
 
 
 @pytest.mark.parametrize(
@@ -239,5 +239,5 @@ def test_options_that_make_no_sense_are_told(run: Path, options: list[str], mess
         (5 * 10**15, "5000.0 TB"),
     ],
 )
-def test_sizes_are_told_with_a_digit_and_a_unit(count: int, text: str) -> None:
+def test_sizes_are_reported_with_a_digit_and_a_unit(count: int, text: str) -> None:
     assert size_text(count) == text

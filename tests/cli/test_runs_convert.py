@@ -37,14 +37,16 @@ def run(folder: Path, arrays: Arrays) -> Path:
     return write_run(Path("run.zarr"), make_layout(), arrays)
 
 
-def test_files_of_a_conversion_stand_beside_the_run_and_are_told(run: Path) -> None:
-    told = dh2sim("runs", run, "--to", "parquet")
+def test_files_of_a_conversion_stand_beside_the_run_and_are_reported(run: Path) -> None:
+    printed = dh2sim("runs", run, "--to", "parquet")
     names = ["run.parquet", "run.steps.parquet", "run.rollouts.parquet"]
-    assert (told.status, told.err) == (0, "")
-    assert told.out.splitlines() == [f"{name}  {size_text(Path(name).stat().st_size)}" for name in names]
+    assert (printed.status, printed.err) == (0, "")
+    assert printed.out.splitlines() == [f"{name}  {size_text(Path(name).stat().st_size)}" for name in names]
     assert len(pd.read_parquet("run.parquet")) == 7 * 5 * 3
-    told = dh2sim("runs", run, "--to", "hdf5", "--out", "new/there.h5")
-    assert told == Outcome(status=0, out=f"new/there.h5  {size_text(Path('new/there.h5').stat().st_size)}\n", err="")
+    printed = dh2sim("runs", run, "--to", "hdf5", "--out", "new/there.h5")
+    assert printed == Outcome(
+        status=0, out=f"new/there.h5  {size_text(Path('new/there.h5').stat().st_size)}\n", err=""
+    )
     with xr.open_dataset("new/there.h5", engine="h5netcdf") as dataset:
         assert dataset.sizes["rollout"] == 7
     assert dh2sim("runs", run, "--to", "hdf5", "--quiet") == Outcome(status=0, out="", err="")
@@ -61,8 +63,8 @@ def test_several_runs_are_converted_each_to_its_own_file(run: Path, arrays: Arra
 
 def test_a_conversion_of_an_unfinished_run_says_what_is_missing(folder: Path, arrays: Arrays) -> None:
     run = write_run(Path("run.zarr"), make_layout(), arrays, blocks=1)
-    told = dh2sim("runs", run, "--to", "hdf5", "--quiet")
-    assert told == Outcome(
+    printed = dh2sim("runs", run, "--to", "hdf5", "--quiet")
+    assert printed == Outcome(
         status=0,
         out="",
         err="dh2sim: 4 of 7 rollouts of 'run.zarr' are not run yet; their numbers are missing in what was written\n",
@@ -71,8 +73,8 @@ def test_a_conversion_of_an_unfinished_run_says_what_is_missing(folder: Path, ar
 
 def test_an_existing_file_is_replaced_only_if_that_is_wanted(run: Path) -> None:
     Path("run.h5").write_text("mine")
-    told = dh2sim("runs", run, "--to", "hdf5")
-    assert told == Outcome(
+    printed = dh2sim("runs", run, "--to", "hdf5")
+    assert printed == Outcome(
         status=2,
         out="",
         err="dh2sim: 'run.h5' already exists; overwrite it, or name another file\n",
@@ -91,8 +93,8 @@ def test_the_run_of_the_current_folder_is_converted_beside_it(run: Path, monkeyp
 @pytest.mark.parametrize("kind", ["parquet", "hdf5"])
 @pytest.mark.parametrize("out", ["", ".", ".."])
 def test_a_folder_is_no_file_to_write_to(run: Path, kind: str, out: str) -> None:
-    told = dh2sim("runs", run, "--to", kind, "--out", out)
-    assert told == Outcome(status=2, out="", err=f"dh2sim: '{out or '.'}' is a folder; name a file\n")
+    printed = dh2sim("runs", run, "--to", kind, "--out", out)
+    assert printed == Outcome(status=2, out="", err=f"dh2sim: '{out or '.'}' is a folder; name a file\n")
 
 
 @pytest.mark.slow

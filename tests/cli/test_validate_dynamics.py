@@ -15,7 +15,7 @@ from tests.validate.motion.robots import FOLDED, WEAK
 QUANTITIES = ["energy order", "momentum", "rest", "tracking", "inverse dynamics", "self-contact"]
 
 
-def told(run: Outcome) -> str:
+def expected(run: Outcome) -> str:
     """What was printed, with its lines joined."""
     return " ".join(run.out.split())
 
@@ -58,22 +58,22 @@ def test_a_robot_that_falls_short_makes_the_exit_status_1(tmp_path: Path) -> Non
     assert run.out.startswith("folded DOES NOT match its table\n")
     [line] = [line for line in run.out.splitlines() if " self-contact " in line and line.endswith("FAILED")]
     assert line.startswith("mujoco-rollout")
-    assert "mujoco-rollout, self-contact: link_1 and link_3 overlap by " in told(run)
-    assert " in configuration 'folded'" in told(run)
+    assert "mujoco-rollout, self-contact: link_1 and link_3 overlap by " in expected(run)
+    assert " in configuration 'folded'" in expected(run)
     [failure] = ET.parse(junit).iter("failure")
     assert "in configuration 'folded'" in failure.get("message", "")
     assert dh2sim("validate", tmp_path / "folded.yaml", "--samples", "3").status == 0
 
 
 @pytest.mark.slow
-def test_what_cannot_be_checked_is_told_and_is_no_failure(tmp_path: Path) -> None:
+def test_what_cannot_be_checked_is_reported_and_is_no_failure(tmp_path: Path) -> None:
     run = dh2sim("validate", write(tmp_path, WEAK), "--samples", "3", "--dynamics")
     assert run.status == 0
     for text in (
         "rest: the motors are too weak to carry the arm in any of its random poses",
         "tracking: the motors are too weak for any motion that was tried",
     ):
-        assert f"mujoco-rollout: {text}" in told(run)
+        assert f"mujoco-rollout: {text}" in expected(run)
 
 
 @pytest.mark.slow

@@ -153,7 +153,7 @@ def test_it_stops_at_once_with_a_page_open() -> None:
 
 
 @pytest.mark.slow
-def test_an_interruption_while_it_starts_is_no_traceback() -> None:
+def test_an_interruption_while_it_starts_makes_no_traceback() -> None:
     rng = random.Random(0)
     for _ in range(6):
         with serving("stanford", "--port", str(unused_port()), program=["-c", STARTED]) as process:
