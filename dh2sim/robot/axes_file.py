@@ -47,7 +47,6 @@ from dh2sim.robot.yaml_tree import Report, compose, decode
 from dh2sim.typing import Array, read_only
 
 
-@dataclass(frozen=True, slots=True)
 class Direction(Numbers):
     """A vector of any length but 0, which becomes a unit vector."""
 
@@ -82,7 +81,6 @@ class AxisJoint:
     actuator: Annotated[ActuatorSpec, Part("", ActuatorSpec)] = field(default_factory=ActuatorSpec)
 
 
-@dataclass(frozen=True, slots=True)
 class Axis(Part):
     """An entry of the axes."""
 

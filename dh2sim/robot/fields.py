@@ -35,7 +35,7 @@ WRONG: Final = object()
 """Stands for a value that a problem was reported of."""
 NAME_PATTERN: Final = "^[A-Za-z][A-Za-z0-9_-]*$"
 LONGEST_NAME: Final = 100
-_RESERVED: Final = re.compile(r"base_link-base|flange-tool0|base_link-dh_0|link_[0-9]+-(flange|dh_[0-9]+)")
+_RESERVED: Final = r"base_link-base|flange-tool0|base_link-dh_0|link_[0-9]+-(flange|dh_[0-9]+)"
 MESH_SUFFIXES: Final = (".stl", ".obj", ".ply", ".glb")
 _TRIANGLE_TOLERANCE: Final = 1e-9
 """By which two principal moments may fall short of the third, relative to it."""
@@ -106,10 +106,10 @@ def name_problem(value: object, what: str = "a name") -> str | None:
 
 def is_reserved(name: str) -> bool:
     """Whether a joint cannot have this name, which a fixed joint of the exports has."""
-    return _RESERVED.fullmatch(name) is not None
+    return re.fullmatch(_RESERVED, name) is not None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False, repr=False)  # quick to import: every command reads a robot file
 class Kind:
     """A kind of field."""
 
@@ -129,7 +129,6 @@ class Kind:
         return value
 
 
-@dataclass(frozen=True, slots=True)
 class Name(Kind):
     """A name that every format can hold."""
 
@@ -139,7 +138,6 @@ class Name(Kind):
         return value if problem is None else scope.wrong(loc, problem)
 
 
-@dataclass(frozen=True, slots=True)
 class Text(Kind):
     """Any text."""
 
@@ -151,7 +149,6 @@ class Text(Kind):
         return scope.wrong(loc, f"expected text, found {shown(value)}{hint}")
 
 
-@dataclass(frozen=True, slots=True)
 class Flag(Kind):
     """True or false."""
 
@@ -160,18 +157,18 @@ class Flag(Kind):
         return value if isinstance(value, bool) else scope.wrong(loc, f"expected true or false, found {shown(value)}")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False, repr=False)
 class Choice(Kind):
     """A member of an enumeration."""
 
     of: type[StrEnum] = StrEnum
     without: tuple[str, ...] = ()
     """Members that are not allowed here."""
-    short: Mapping[str, str] = field(default_factory=dict, hash=False)
+    short: Mapping[str, str] = field(default_factory=dict)
     """Other spellings that are taken; lower case."""
     inherited: bool = False
     """Whether a file that leaves it out has not the field's default but that of the whole."""
-    other_names: Mapping[str, str] = field(default_factory=dict, hash=False)
+    other_names: Mapping[str, str] = field(default_factory=dict)
     """Other names of members, lower case, that messages explain but that are not taken."""
 
     @property
@@ -190,7 +187,7 @@ class Choice(Kind):
         return scope.wrong(loc, f"found {shown(value)}{called}.{guess} Allowed: {listed(self.allowed)}")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False, repr=False)
 class Number(Kind):
     """A finite number; in files also an expression."""
 
@@ -227,7 +224,7 @@ class Number(Kind):
         return units.to_si(value, self.dimension, turns=turns)
 
 
-_WITH_UNIT: Final = re.compile(
+_WITH_UNIT: Final = (
     r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*"
     r"(deg|degrees?|°|rad|radians?|mm|cm|m|in|inch|inches|kg|g|Nm|N·m|N)"
 )
@@ -241,7 +238,7 @@ _SPELLINGS: Final = {
     "inches": "in",
 }
 _METRES: Final = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}
-_VARIABLE: Final = re.compile(r"(?:q|theta|th|t|θ|ϑ|d)_?(?:[0-9]+|i)?\*?")
+_VARIABLE: Final = r"(?:q|theta|th|t|θ|ϑ|d)_?(?:[0-9]+|i)?\*?"
 """Names of joint variables in textbooks."""
 
 
@@ -250,14 +247,14 @@ def number_hint(text: str, dimension: Dimension | None, loc: Loc, scope: Scope) 
     turns = scope.joint_type in ("revolute", "continuous")
     moving = "theta" if turns else "d" if scope.joint_type == "prismatic" else None
     if moving is not None and loc[-1] == moving:
-        whole = _VARIABLE.fullmatch(text.strip())
-        names = [text] if whole else [name for name in names_in(text) if _VARIABLE.fullmatch(name)]
+        whole = re.fullmatch(_VARIABLE, text.strip())
+        names = [text] if whole else [name for name in names_in(text) if re.fullmatch(_VARIABLE, name)]
         unknown = [name for name in names if name not in (scope.parameters or {})]
         if unknown:
             what = shown(text) if whole else f"in {shown(text)}: {shown(unknown[0])}"
             zero = ", or write 0" if whole else ""
             return f"{what} looks like the joint variable; leave it out{zero}: the joint coordinate adds to {moving}"
-    found = _WITH_UNIT.fullmatch(text.strip())
+    found = re.fullmatch(_WITH_UNIT, text.strip())
     if found is None:
         return None
     number, unit = found[1], _SPELLINGS.get(found[2], found[2])
@@ -280,11 +277,15 @@ def number_hint(text: str, dimension: Dimension | None, loc: Loc, scope: Scope) 
     return f"{here}: write {converted}, or set 'units: {{{what.removesuffix('s')}: {unit}}}' for all"
 
 
-@dataclass(frozen=True, slots=True)
+_ANY: Final = Number()
+_FRACTION: Final = Number(least=0, most=1)
+
+
+@dataclass(eq=False, repr=False)
 class Numbers(Kind):
     """A list of numbers."""
 
-    item: Number = Number()
+    item: Number = _ANY
     of: str = field(default="x, y, z", kw_only=True)
     """What the numbers are, as messages name them."""
     counts: tuple[int, ...] = field(default=(3,), kw_only=True)
@@ -305,7 +306,7 @@ class Numbers(Kind):
         return read_only([self.item.to_si(number, units, turns=turns) for number in value])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False, repr=False)
 class Range(Numbers):
     """A lower and an upper number."""
 
@@ -325,11 +326,11 @@ class Range(Numbers):
         return tuple(self.item.to_si(number, units, turns=turns) for number in value)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False, repr=False)
 class Color(Numbers):
     """Red, green, blue and optionally alpha."""
 
-    item: Number = Number(least=0, most=1)
+    item: Number = _FRACTION
     of: str = field(default="red, green, blue, alpha", kw_only=True)
     counts: tuple[int, ...] = field(default=(3, 4), kw_only=True)
 
@@ -350,7 +351,6 @@ class InertiaNumbers:
     iyz: Annotated[float, Number("kg·m²; the matrix entry, as in URDF.")] = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Inertia(Kind):
     """An inertia that a body can have: in files six numbers by name, in specs a matrix of shape (3, 3)."""
 
@@ -406,7 +406,6 @@ def inertia_problem(matrix: Array) -> str | None:
     return None
 
 
-@dataclass(frozen=True, slots=True)
 class MeshFile(Kind):
     """A mesh file; one that a robot file names exists."""
 
@@ -433,7 +432,6 @@ class MeshFile(Kind):
         return path.absolute()
 
 
-@dataclass(frozen=True, slots=True)
 class Parameters(Kind):
     """Named constants; those of a file have been evaluated before."""
 
@@ -453,7 +451,6 @@ class Parameters(Kind):
         return MappingProxyType(dict(value))
 
 
-@dataclass(frozen=True, slots=True)
 class Configurations(Kind):
     """Named joint vectors; names and lengths are checked with the table."""
 
@@ -469,7 +466,7 @@ class Configurations(Kind):
         return [Number().check(number, (*loc, index), scope) for index, number in enumerate(value)]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False, repr=False)
 class Internal(Kind):
     """What a spec knows and no file says."""
 
@@ -482,14 +479,14 @@ class Internal(Kind):
         return scope.wrong(loc, f"expected {_article(self.of)}, found {shown(value)}")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False, repr=False)
 class Part(Kind):
     """A part of a robot that has fields of its own: a mapping in files."""
 
     of: type = object
     inline: bool = field(default=False, kw_only=True)
     """Whether its keys are among those of the whole."""
-    more: Mapping[str, Kind] = field(default_factory=dict, kw_only=True, hash=False)
+    more: Mapping[str, Kind] = field(default_factory=dict, kw_only=True)
     """Keys of files that are no fields."""
     list_is: str | None = field(default=None, kw_only=True)
     """The key that a list in place of the mapping is the value of."""
@@ -541,11 +538,14 @@ class Part(Kind):
         return fields
 
 
-@dataclass(frozen=True, slots=True)
+_NO_PART: Final = Part()
+
+
+@dataclass(eq=False, repr=False)
 class Parts(Kind):
     """A list of parts, at least one."""
 
-    item: Part = Part()
+    item: Part = _NO_PART
 
     def check(self, value: object, loc: Loc, scope: Scope) -> Any:
         """Return a list of trees, some of which may be WRONG."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 import time
 
 import pytest
 
+from dh2sim.robot import yaml_tree
+from dh2sim.robot.read import builtin_path, builtin_robots
 from dh2sim.robot.yaml_tree import MAX_BYTES, MAX_DEPTH, MAX_LINE, MAX_NODES, Node, Report, compose, decode
 from tests.robot.files import MINIMAL, complaints, robot
 
@@ -188,3 +191,64 @@ def test_a_billion_laughs_end_at_once() -> None:
 def test_too_many_values_are_refused() -> None:
     (message,) = complaints("a:\n" + "- []\n" * (MAX_NODES + 1))
     assert message.endswith(f"more than {MAX_NODES} values (aliases counted each time)")
+
+
+def _flat(node: Node) -> object:
+    """Return all that a tree holds."""
+    match node.value:
+        case dict() as entries:
+            value: object = [(key, *entry[:3], _flat(entry.value)) for key, entry in entries.items()]
+        case list() as items:
+            value = [_flat(item) for item in items]
+        case scalar:
+            value = repr(scalar)
+    return (node.line, node.column, node.start, node.end, node.text, node.flow, node.anchor, node.wrong, value)
+
+
+ODD = """\
+name: "\u00e9 \U0001f916"
+\u00fcm: 'it''s'
+plain: on
+number: 1e-3
+octal: 0o17
+list: [1,
+  2, {a: , b: ~}]
+block: |
+  a
+
+  b
+folded: >-
+ c
+ d
+nothing:
+&a anchored: &b {x: 1}
+again: *b
+"""
+
+
+@pytest.mark.parametrize("name", [*builtin_robots(), "odd"])
+def test_both_parsers_find_the_same_tree(name: str) -> None:
+    path = builtin_path(name)
+    text = ODD if path is None else path.read_text(encoding="utf-8")
+    fast = yaml_tree._fast(text)
+    assert fast is not None
+    composer = yaml_tree._Composer(Report("r.yaml"))
+    for event in yaml_tree._events(text, Report("r.yaml")):
+        composer.take(event)
+    assert composer.root is not None
+    assert _flat(fast) == _flat(composer.root)
+
+
+@pytest.mark.parametrize(
+    "text", ["a: [1", "a: 1\na: 2", "%YAML 1.2\n---\na: 1", "a: \u2028b", "- \n- 1", "a: !!int 1", "a:\tb", ""]
+)
+def test_problems_and_what_yaml_1_1_takes_differently_are_left_to_the_pure_parser(text: str) -> None:
+    assert yaml_tree._fast(text) is None
+
+
+def test_the_pure_parser_is_used_where_libyaml_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "yaml.cyaml", None)
+    yaml_tree._fast.cache_clear()
+    assert yaml_tree._fast("a: 2") is None
+    assert compose("a: 2", Report("r.yaml")).at("a") is not None
+    yaml_tree._fast.cache_clear()
