@@ -61,7 +61,7 @@ class UnknownFrameError(Dh2simError):
 
 
 class ConfigurationError(Dh2simError, ValueError):
-    """A joint vector has the wrong shape or holds something that is no finite number."""
+    """A joint vector has the wrong shape or holds something that is not a finite number."""
 
 
 class MeshError(Dh2simError):

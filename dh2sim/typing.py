@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
-"""An array of doubles; its shape stands in the docstring of whatever carries it."""
+"""An array of doubles; the docstring of whatever carries it gives its shape."""
 
 
 def read_only(values: object) -> Array:

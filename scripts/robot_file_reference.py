@@ -37,7 +37,8 @@ line, editors complete and check it while you type.
 
 A number may be an arithmetic expression in a string over `parameters` and `pi`: `+ - * / **`, parentheses, and
 `sqrt sin cos tan asin acos atan atan2`. The functions take and return radians, whatever the file's angle unit is: in
-a file in degrees write `atan2(3, 4) * 180 / pi`. NaN and infinity are errors.
+a file in degrees write `atan2(3, 4) * 180 / pi`. NaN and infinity are errors. The joint variable is not written: the
+joint coordinate adds to `theta` or `d`, whose value is the offset (default 0).
 
 ## Units
 
@@ -51,7 +52,7 @@ parallel axes, has a second twist `beta`, and a `d` only if it slides; `beta` in
 
 ## Meshes
 
-A mesh shows a link instead of the shapes made from the table, and has no mass. It stands in the link's DH frame, or
+A mesh shows a link instead of the shapes made from the table, and has no mass. It is in the link's DH frame, or
 where its `xyz` and `rpy` put it from there.
 
 ## What is filled in
@@ -69,8 +70,8 @@ Assumed velocity and effort limits are written to the URDF, which must have some
 
 ## Errors
 
-Whatever is wrong in a file is told at once, a line each: `file:line:column: path: what was found and what is
-allowed`. Unknown keys, duplicate names, limits the wrong way round, inertias that no body can have, vectors of the
+Everything that is wrong in a file is reported at once, a line each: `file:line:column: path: what was found and
+what is allowed`. Unknown keys, duplicate names, limits the wrong way round, inertias that no body can have, vectors of the
 wrong length, cycles in `parameters` and the like are errors, never warnings. A file may have at most 1 MB.
 """
 

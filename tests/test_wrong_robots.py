@@ -161,7 +161,7 @@ WRONG: list[tuple[Callable[[], object], str]] = [
     (lambda: link(mesh="a.stl"), "joints[0].link.mesh: expected a MeshSpec, found 'a.stl'"),
     (
         lambda: link(mesh=MeshSpec(file=Path("a.step"))),
-        "joints[0].link.mesh.file: 'a.step' is no mesh file that can be read; allowed: .stl, .obj, .ply, .glb",
+        "joints[0].link.mesh.file: 'a.step' is not a mesh file that can be read; allowed: .stl, .obj, .ply, .glb",
     ),
     (lambda: row(link="steel"), "joints[0].link: expected a LinkSpec, found 'steel'"),
     # actuators

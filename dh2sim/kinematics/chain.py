@@ -108,7 +108,7 @@ def build_chain(spec: SpecLike) -> KinematicChain:
     """Turn a Denavit-Hartenberg table into a chain of joint-placed bodies.
 
     With X = Tx(a) Rx(alpha) and Z = Rz(theta) Tz(d), a row's transform is Z X (standard), X Z (modified) or
-    Z X Ry(beta) (Hayati). The joint moves in Z, so what follows Z in a row stands behind its joint and goes in
+    Z X Ry(beta) (Hayati). The joint moves in Z, so what follows Z in a row is behind its joint and goes in
     front of the next. A fixed row becomes a joint that does not move.
 
     Args:
@@ -158,7 +158,7 @@ def joint_vectors(chain: KinematicChain, q: ArrayLike) -> tuple[Array, tuple[int
         The joint vectors, shape (count, n), and the batch shape ``...``, whose product is count.
 
     Raises:
-        ConfigurationError: ``q`` is no array of real numbers, its last axis does not have length n, or a
+        ConfigurationError: ``q`` is not an array of real numbers, its last axis does not have length n, or a
             coordinate is not finite.
     """
     array = _numbers(q)

@@ -2,9 +2,7 @@
 
 Every table is one product base · … X Z X Z … · tool of link parts X = Tx(a) Rx(alpha) and joint parts
 Z = Rz(theta) Tz(d); a Hayati row has Ry(beta) behind its X. The conventions cut it into rows at other places, so a
-conversion hands link parts from row to row and computes next to nothing.
-
-Link parts X = Tx(a) Rx(alpha) as numbers: two that meet add up, and nothing is rounded that need not be.
+conversion hands link parts from row to row and computes next to nothing: two that meet add up, as numbers.
 """
 
 from __future__ import annotations

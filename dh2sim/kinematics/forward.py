@@ -193,7 +193,7 @@ def frame_pose(chain: ChainLike, frame: str, q: ArrayLike) -> Array:
 
     Args:
         chain: The robot, in any form.
-        frame: One of ``frame_names``; link_i stands at joint i, dh_i is the table's frame i.
+        frame: One of ``frame_names``; link_i is at joint i, dh_i is the table's frame i.
         q: Joint vectors, rad and m, shape (..., n).
 
     Returns:

@@ -1,11 +1,7 @@
-"""Rigid transforms as read-only 4x4 arrays, the same bits on every machine.
+"""Rigid transforms as read-only 4x4 arrays, points and tensors in other frames, and distances between poses.
 
-Written out in Python's own floating-point arithmetic: a matrix product by BLAS may fuse multiplications and
-additions, and then the last bit depends on the processor.
-
-Points and tensors seen from another frame, the same bits on every machine.
-
-How far poses are from the poses that they should be.
+Written out in Python's own floating-point arithmetic, for the same bits on every machine: a matrix product by BLAS
+may fuse multiplications and additions, and then the last bit depends on the processor.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ _ALLOWED: Final = f"Allowed: numbers, + - * / **, parentheses, parameters, pi, {
 
 
 class ExpressionError(ValueError):
-    """A text is no arithmetic expression, or has no finite real value."""
+    """A text that is not an arithmetic expression, or has no finite real value."""
 
 
 class _Token(NamedTuple):
@@ -104,7 +104,7 @@ def evaluate(text: str, names: Mapping[str, float]) -> float:
 
 
 def names_in(text: str) -> tuple[str, ...]:
-    """Return the names an expression uses, functions left out; none where it is no expression."""
+    """Return the names an expression uses, functions left out; none where it is not an expression."""
     try:
         tokens = _tokens(text)
     except ExpressionError:
@@ -138,7 +138,7 @@ def _tokens(text: str) -> _Tokens:
         kind = found.lastgroup or ""
         position = found.end()
         if kind == "number" and (rest := _NOT_A_NUMBER.match(text, position)):
-            raise ExpressionError(f"{shown(found.group() + rest.group())} is no number; a product needs *")
+            raise ExpressionError(f"{shown(found.group() + rest.group())} is not a number; a product needs *")
         tokens.append(_Token(kind, found.group()))
     return tokens
 
@@ -255,7 +255,7 @@ class _Parser:
 
 
 class NumberError(ValueError):
-    """A value is no finite number; the text is fit for a user."""
+    """A value that is not a finite number; the text is fit for a user."""
 
 
 def to_number(value: object, names: Mapping[str, float] | None) -> float:
@@ -295,4 +295,4 @@ def parameter_name_problem(name: object) -> str:
     taken = [*CONSTANTS, *FUNCTIONS]
     if name in taken:
         return f"a parameter cannot be named {shown(name)}; expressions know the name already"
-    return f"{shown(name)} is no name for a parameter; letters, digits and '_', not starting with a digit"
+    return f"{shown(name)} is not a name for a parameter: letters, digits and '_', not starting with a digit"

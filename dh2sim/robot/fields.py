@@ -414,12 +414,12 @@ class MeshFile(Kind):
         text = Text().check(value, loc, scope)
         if text is WRONG:
             return WRONG
-        if scope.directory is None:  # nothing is looked for: an answer would tell what there is on this machine
+        if scope.directory is None:  # nothing is looked for: an answer would disclose what is on this machine
             return scope.wrong(loc, f"found {shown(text)}; a robot file that was uploaded cannot name mesh files")
         path = scope.directory / text
         if path.suffix.lower() not in MESH_SUFFIXES:
             return scope.wrong(
-                loc, f"{shown(text)} is no mesh file that can be read; allowed: {listed(MESH_SUFFIXES)}"
+                loc, f"{shown(text)} is not a mesh file that can be read; allowed: {listed(MESH_SUFFIXES)}"
             )
         if not scope.in_file:  # a robot stays one when its meshes are moved; the model complains of missing ones
             return Path(text)
@@ -510,7 +510,7 @@ class Part(Kind):
             scope = dataclasses.replace(scope, joint_type=kind.short.get(given.casefold(), given))
         unknown = [key for key in value if key not in keys]
         for key in unknown:
-            if not scope.in_file and key in fields_of(self.of):  # an inline part that is none
+            if not scope.in_file and key in fields_of(self.of):  # an inline part of the wrong type
                 fields_of(self.of)[key].check(value[key], (*loc, key), scope)
                 continue
             message = f"unknown key {shown(key)}.{did_you_mean(str(key), keys)} Allowed keys: {listed(keys)}"

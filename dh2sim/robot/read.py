@@ -251,7 +251,7 @@ def _order(needs: Mapping[str, Sequence[str]]) -> tuple[list[str], list[tuple[st
 
 
 def _find(given: str) -> tuple[Path, str]:
-    """Return the file that a path or a name stands for, and what messages call it."""
+    """Return the file of a path or a name, and what messages call it."""
     path = Path(given)
     if given and os.path.lexists(given):
         if path.is_dir():

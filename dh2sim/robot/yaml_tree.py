@@ -31,7 +31,7 @@ class Report:
         self.problems.append(Problem(file=self.file, line=line, column=column, path=path_of(loc), message=message))
 
     def error(self) -> RobotFileError:
-        """Return all of them as one error, each told once."""
+        """Return all of them as one error, each once."""
         return RobotFileError(dict.fromkeys(self.problems))
 
 
@@ -239,7 +239,7 @@ def _events(text: str, report: Report) -> Iterator[Any]:
         mark = error.problem_mark or error.context_mark or mark
         message = ", ".join(" ".join(str(part).split()) for part in (error.problem, error.context) if part)
     except Exception:  # ruamel lets some of Python's own through, such as chr()'s for "\Uffffffff"
-        message = "an escape or a character that stands for nothing"
+        message = "an invalid escape or character"
     else:
         return
     line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
@@ -352,7 +352,7 @@ class _Composer:
             self._fail(event, f"alias {shown(event.anchor)} has no anchor before it")
         anchored = self._anchors[event.anchor]
         if anchored is None:
-            self._fail(event, f"alias {shown(event.anchor)} stands inside its own anchor")
+            self._fail(event, f"alias {shown(event.anchor)} is inside its own anchor")
         node, size, height = anchored
         self._count(event, size, height)
         self._attach(node, None, size, height, event)
@@ -387,7 +387,7 @@ class _Composer:
             message = "merge keys ('<<') are not supported; write the keys out"
         elif key.value in entries:
             first = entries[key.value].line
-            message = f"duplicate key {shown(key.value)}; it stands on line {first} already"
+            message = f"duplicate key {shown(key.value)}; it is on line {first} already"
             self._report.add(key.line, key.column, self._loc(), message)
             return None
         else:

@@ -86,7 +86,7 @@ def test_any_line_end_ends_a_line(end: str) -> None:
         ("a: [1, !foo 2]\n", "1:8: a[1]: tag '!foo' is not allowed; write the value alone"),
         ("a: ! x\n", "1:4: a: tag '!' is not allowed; write the value alone"),
         ("!!map {a: 1}\n", "1:1: tag '!!map' is not allowed; write the value alone"),
-        ("a: &x [1, *x]\n", "1:11: a[1]: alias 'x' stands inside its own anchor"),
+        ("a: &x [1, *x]\n", "1:11: a[1]: alias 'x' is inside its own anchor"),
         ("a: *x\n", "1:4: a: alias 'x' has no anchor before it"),
         (
             "a: [1, 2\n",
@@ -94,7 +94,7 @@ def test_any_line_end_ends_a_line(end: str) -> None:
         ),
         ("a: b: c\n", "1:5: not valid YAML: mapping values are not allowed here"),
         ("a:\n\t- 1\n", "2:1: not valid YAML: a tab in the indentation; YAML is indented with spaces"),
-        ('a: "\\Uffffffff"\n', "1:1: not valid YAML: an escape or a character that stands for nothing"),
+        ('a: "\\Uffffffff"\n', "1:1: not valid YAML: an invalid escape or character"),
         ("a: x\x1b[31m\n", "1:5: control character U+001B is not allowed"),
         ("a: b\nc: \x00\n", "2:4: control character U+0000 is not allowed"),
         ('a: ["\\e[31m"]\n', "1:5: a[0]: control character U+001B is not allowed"),
@@ -124,8 +124,8 @@ def test_text_with_a_lone_surrogate_is_refused() -> None:
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ("name: x\n", "5:1: duplicate key 'name'; it stands on line 1 already"),
-        ("tool: {xyz: [0, 0, 0], xyz: [0, 0, 0]}\n", "5:24: tool: duplicate key 'xyz'; it stands on line 5 already"),
+        ("name: x\n", "5:1: duplicate key 'name'; it is on line 1 already"),
+        ("tool: {xyz: [0, 0, 0], xyz: [0, 0, 0]}\n", "5:24: tool: duplicate key 'xyz'; it is on line 5 already"),
         ("<<: {a: 1}\n", "5:1: merge keys ('<<') are not supported; write the keys out"),
         ("1: x\n", "5:1: a key must be text, found 1; put it in quotes"),
         ("true: x\n", "5:1: a key must be text, found true; put it in quotes"),
@@ -145,7 +145,7 @@ def test_keys_that_a_merge_would_have_brought_are_not_missed() -> None:
 
 def test_bad_keys_do_not_hide_other_mistakes() -> None:
     assert complaints("name: r\nname: s\nconvention: x\njoints:\n- {type: revolute, 1: 2}\n") == [
-        "r.yaml:2:1: duplicate key 'name'; it stands on line 1 already",
+        "r.yaml:2:1: duplicate key 'name'; it is on line 1 already",
         "r.yaml:3:13: convention: found 'x'. Allowed: standard, modified, hayati",
         "r.yaml:5:20: joints[0]: a key must be text, found 1; put it in quotes",
     ]

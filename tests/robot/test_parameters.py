@@ -61,7 +61,7 @@ def test_a_long_chain_of_parameters_is_no_trouble() -> None:
         (
             "{d-1: 3}",
             [
-                "5:14: parameters: 'd-1' is no name for a parameter; "
+                "5:14: parameters: 'd-1' is not a name for a parameter: "
                 "letters, digits and '_', not starting with a digit"
             ],
         ),

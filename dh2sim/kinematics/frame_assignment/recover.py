@@ -1,9 +1,4 @@
-"""The simplest table that is a chain's within a tolerance.
-
-An assignment's product of parts, cut into the rows of a table.
-
-How far a table is from the chain that it was made from.
-"""
+"""The simplest table of a chain within a tolerance, and how far it is from the chain."""
 
 from __future__ import annotations
 
@@ -26,7 +21,7 @@ from dh2sim.typing import Array
 def proximal_from(assignment: Assignment, convention: Convention) -> int:
     """Return from which row on, counted from 0, rows are modified ones.
 
-    A Hayati row is distal: its link part stands behind its joint. So do those of all rows before it; only rows behind
+    A Hayati row is distal: its link part is behind its joint. So do those of all rows before it; only rows behind
     the last Hayati row can be modified.
     """
     if convention is not Convention.MODIFIED:
@@ -219,7 +214,7 @@ def recover_table(
         The table with its residual, which can be above the tolerance: compare them.
 
     Raises:
-        ValueError: ``convention`` is Hayati's, which is no convention for a whole table.
+        ValueError: ``convention`` is Hayati's, which is not a convention for a whole table.
     """
     if convention is Convention.HAYATI:
         raise ValueError("a table is made in the standard or the modified convention")

@@ -1,7 +1,4 @@
-"""What frame assignment decided, link by link: the table's numbers, and the reasons to tell.
-
-Below what a difference counts as none.
-"""
+"""What frame assignment decided, link by link: the table's numbers, their tolerances, and the reasons."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ _ROUNDING = 8 * 2.0**-52
 _FEW_DECIMALS = range(3, 10)
 _MOST_DECIMALS = 12
 _LUCK = 1e-6
-"""How likely a number that is not meant to be simple may be taken for one of so many decimals."""
+"""How likely a number that is not meant to be simple may be taken for one of few decimals."""
 _FINE = 3e-10
 """Tolerances above this are asked for: then more luck is allowed, in proportion, up to"""
 _MOST_LUCK = 0.05

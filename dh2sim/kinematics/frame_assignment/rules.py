@@ -1,8 +1,6 @@
-"""The first and the last frame, of which the axes leave much open.
+"""Rules of frame assignment: from one axis to the next, the first and the last frame, and axes of sliding joints.
 
-The link part: from one axis to the next, in all cases.
-
-Where the axis of a sliding joint is put: only its direction matters to the motion.
+The axes leave much of the first and the last frame open, and only the direction of a sliding joint's axis matters.
 """
 
 from __future__ import annotations
