@@ -518,7 +518,7 @@ class Robot:
         Args:
             host: Address to listen at; by default only this machine can reach it.
             port: Port to listen at, or the next that is free.
-            browser: Whether to open the page in a browser.
+            browser: Whether to open the page in a browser, if there is a screen.
 
         Returns:
             The server: its ``url`` is where the page is, ``wait()`` keeps a script alive, ``stop()`` ends it.
@@ -526,8 +526,6 @@ class Robot:
         Raises:
             Dh2simError: Nobody can listen at this address.
         """
-        import webbrowser
-
         from dh2sim.view.initial_state import folder_of, open_state
         from dh2sim.view.server import Viewer, free_port
 
@@ -535,7 +533,7 @@ class Robot:
         state = open_state(self.spec, None if file is None else folder_of(file.path))
         viewer = Viewer(state, host=host, port=free_port(host, port))
         if browser:
-            webbrowser.open(viewer.url)
+            viewer.open_browser()
         return viewer
 
     def __reduce__(self) -> tuple[Any, ...]:

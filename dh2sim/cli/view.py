@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,7 +12,6 @@ from dh2sim.cli.common import RobotArgument, load_all
 from dh2sim.cli.output import require_free
 
 if TYPE_CHECKING:
-    from dh2sim.view.server import Viewer
     from dh2sim.view.state import ViewState
 
 DEFAULT_PORT = 8080
@@ -87,7 +85,7 @@ def _serve(state: ViewState, run: Path | None, *, host: str, port: int, browser:
     try:
         print(f"{state.spec.name}: {viewer.url}  (stop with Ctrl-C)", flush=True)
         if browser:
-            _open_browser(viewer)
+            viewer.open_browser()
         viewer.wait()
     finally:
         viewer.stop()
@@ -104,12 +102,3 @@ def _export(state: ViewState, run: Path | None, rollout: int, page: Path) -> Non
         data = open_rollout(run, rollout)
     export_page(state.model, state.q, page, rollout=data)
     print(f"{page}: {state.spec.name}{'' if run is None else f', rollout {rollout} of {run}'}")
-
-
-def _open_browser(viewer: Viewer) -> None:
-    """Open the page if there is a screen; without one, Python would start a browser in the terminal."""
-    import webbrowser
-
-    screen = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    if screen:
-        webbrowser.open(viewer.url)

@@ -11,10 +11,13 @@ import importlib
 import io
 import ipaddress
 import logging
+import os
 import socket
+import sys
 import threading
 import time
 import warnings
+import webbrowser
 from collections.abc import Iterator, Mapping
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Final, cast
@@ -124,6 +127,12 @@ class Viewer:
         """The open pages."""
         with self._lock:
             return tuple(self._pages.values())
+
+    def open_browser(self) -> None:
+        """Open the page if there is a screen; without one, Python would start a browser in the terminal."""
+        screen = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+        if screen:
+            webbrowser.open(self.url)
 
     def wait(self) -> None:
         """Wait for a signal; does not return."""
