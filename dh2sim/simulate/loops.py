@@ -28,7 +28,7 @@ def checked(returned: object, shapes: Sequence[tuple[int, ...]], axes: str, *, c
         shapes: Allowed shapes.
         axes: What the axes count, for the message.
         controller: Name of the controller.
-        what: What was asked for, as in 'controls'.
+        what: What it should be, as in 'controls'.
 
     Raises:
         ControllerError: It is not an array of real numbers, or has another shape.

@@ -36,7 +36,7 @@ def generator(seed: int, rollout: int, purpose: Purpose) -> np.random.Generator:
 
 
 class Generators(Sequence[np.random.Generator]):
-    """The generators of some rollouts, each made when it is first asked for: that takes longer than a time step."""
+    """The generators of some rollouts, each made when it is first used, since that takes longer than a time step."""
 
     def __init__(self, seed: int, rollouts: range, purpose: Purpose) -> None:
         """Make none yet."""

@@ -142,7 +142,7 @@ def fill(
         job: The run.
         threads: Number of threads, 0 for one a processor.
         advance: Called with the number of rollouts that are done; those of an earlier run count at once.
-        stopping: Asked before every block whether to stop there; a block that has begun is finished.
+        stopping: Called before every block; the run stops there if it returns True.
 
     Raises:
         ControllerError: The controller fails.
@@ -152,7 +152,7 @@ def fill(
     pending = writer.pending()
     report(job.options.rollouts - sum(len(writer.layout.rollouts(block)) for block in pending))
     done = 0
-    begun = time.perf_counter()
+    start = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as pool:
         written: Future[None] | None = None
         for block in pending:
@@ -172,5 +172,5 @@ def fill(
     return Progress(
         finished=done == sum(len(writer.layout.rollouts(block)) for block in pending),
         rollouts=done,
-        seconds=time.perf_counter() - begun,
+        seconds=time.perf_counter() - start,
     )

@@ -1,6 +1,6 @@
 """Controllers as a user writes them, for the tests."""
 
-# ruff: noqa: ARG002 - they need not look at all that they are told
+# ruff: noqa: ARG002 - they need not look at all that they are reported
 
 from __future__ import annotations
 

@@ -70,9 +70,9 @@ def test_a_controller_that_fails_at_once_does_so_before_a_run_is_replaced(driver
 def test_rows_of_different_lengths_are_no_array() -> None:
     with pytest.raises(ControllerError) as caught:
         rollout(robots.arm(), rollouts=3, steps=7, controller=f"{DRIVERS}:Ragged")
-    told = str(caught.value)
-    assert told.startswith(f"controller '{DRIVERS}:Ragged' returned controls that are not an array of numbers: ")
-    assert "\n" not in told
+    reported = str(caught.value)
+    assert reported.startswith(f"controller '{DRIVERS}:Ragged' returned controls that are not an array of numbers: ")
+    assert "\n" not in reported
 
 
 def test_a_reference_without_velocities_is_an_error() -> None:

@@ -176,7 +176,7 @@ def test_the_same_options_make_the_same_run_but_for_its_date() -> None:
     assert {**one.layout.attributes, "created": ""} == {**other.layout.attributes, "created": ""}
 
 
-def test_a_start_of_a_file_is_told_apart_by_its_digest(tmp_path: Path) -> None:
+def test_initial_states_of_files_differ_by_their_digest(tmp_path: Path) -> None:
     path = tmp_path / "s.npy"
     digests = []
     for q in (0.1, 0.2):

@@ -59,7 +59,7 @@ def test_a_robot_may_be_a_name_a_file_or_a_model(robot: Any) -> None:
     assert run.qpos.shape == (2, 4, 2)
 
 
-def test_an_unknown_robot_is_told() -> None:
+def test_an_unknown_robot_is_reported() -> None:
     with pytest.raises(UnknownRobotError) as caught:
         rollout("planar_2q", rollouts=2, steps=3)
     assert "Did you mean 'planar_2r'?" in str(caught.value)
@@ -81,11 +81,11 @@ def test_numbers_may_be_numpys(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("out", [None, "run.zarr"])
-def test_progress_is_told_as_rollouts_are_done(out: str | None, tmp_path: Path) -> None:
-    told: list[int] = []
-    rollout("planar_2r", rollouts=600, steps=2, out=None if out is None else tmp_path / out, advance=told.append)
-    assert sum(told) == 600
-    assert len(told) >= 3
+def test_progress_is_reported_as_rollouts_are_done(out: str | None, tmp_path: Path) -> None:
+    reported: list[int] = []
+    rollout("planar_2r", rollouts=600, steps=2, out=None if out is None else tmp_path / out, advance=reported.append)
+    assert sum(reported) == 600
+    assert len(reported) >= 3
 
 
 @pytest.mark.parametrize("threads", [0, 1, 3])
@@ -123,7 +123,7 @@ def test_a_failing_controller_leaves_what_is_safe(tmp_path: Path) -> None:
     assert open_dataset(path).status.values.tolist() == [-1, -1, -1]
 
 
-def test_a_run_larger_than_memory_is_told_so() -> None:
+def test_a_run_larger_than_memory_is_refused() -> None:
     with pytest.raises(SettingsError) as caught:
         rollout("planar_2r", rollouts=10**7, steps=10**6)
     assert str(caught.value) == "the run does not fit into memory; give 'out' to write it block by block"
@@ -141,12 +141,12 @@ def test_blocks_are_filled_until_one_is_asked_to_stop(tmp_path: Path, monkeypatc
         assert progress.rollouts == 2 * writer.layout.block
         assert len(writer.pending()) == blocks - 2
     with open_run(job, tmp_path / "run.zarr", resume=True) as writer:
-        told: list[int] = []
-        again = fill(writer, job, advance=told.append)
+        reported: list[int] = []
+        again = fill(writer, job, advance=reported.append)
         assert again.finished
         assert again.rollouts == 100 - progress.rollouts
-        assert told[0] == progress.rollouts
-        assert sum(told) == 100
+        assert reported[0] == progress.rollouts
+        assert sum(reported) == 100
     assert (open_dataset(tmp_path / "run.zarr").status == 0).all()
 
 

@@ -1,4 +1,4 @@
-"""An engine that is not installed is told, and is no failure."""
+"""An engine that is not installed is reported, and is no failure."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_an_engine_that_is_not_installed_is_null_with_the_reason(tmp_path: Path,
 
 
 @pytest.mark.slow
-def test_a_person_is_told_that_an_engine_was_skipped(tmp_path: Path) -> None:
+def test_the_output_says_that_an_engine_was_skipped(tmp_path: Path) -> None:
     run = _without("pinocchio", "validate", write(tmp_path, small()), "--samples", "3")
     lines = run.out.splitlines()
     assert run.status == 0

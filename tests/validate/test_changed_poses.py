@@ -161,13 +161,13 @@ def test_a_changed_robot_file_is_found_against_old_exports(exported: Path) -> No
     assert not [engine for engine, _ in failed if engine == "dh2sim"], "the library has read the new file"
 
 
-def test_a_person_is_told_the_engine_the_frame_and_the_configuration(exported: Path) -> None:
+def test_the_output_names_the_engine_the_frame_and_the_configuration(exported: Path) -> None:
     change(exported / "made" / "odd" / "odd.xml", lambda root: named(root, "site", "dh_3").set("pos", "0 0 0.001"))
     run = dh2sim("validate", exported / "odd.yaml", "--dir", exported / "made", "--samples", "20")
     lines = run.out.splitlines()
     assert (run.status, run.err) == (1, "")
     assert lines[0] == "odd DOES NOT match its table"
     assert [line.split()[0] for line in lines if line.endswith("FAILED")] == ["mujoco-mjcf"]
-    told = " ".join(" ".join(lines).split("mujoco-mjcf, pose: ")[1].split())
-    assert told.startswith("0.001 m, ")
-    assert " rad (tolerance 1e-12); worst at dh_3, q = [" in told
+    reported = " ".join(" ".join(lines).split("mujoco-mjcf, pose: ")[1].split())
+    assert reported.startswith("0.001 m, ")
+    assert " rad (tolerance 1e-12); worst at dh_3, q = [" in reported

@@ -69,7 +69,7 @@ def test_the_report_is_written_to_a_file_beside_what_is_printed(tmp_path: Path) 
     assert file.read_text() == dh2sim("validate", robot, "--samples", "3", "--json", "-").out
 
 
-def test_a_report_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+def test_a_report_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     robot, file = write(tmp_path, small()), tmp_path / "missing" / "report"
     for option in ("--json", "--junit"):
         run = dh2sim("validate", robot, "--samples", "1", option, file)
@@ -84,8 +84,8 @@ def _strict(text: str) -> Any:
     return json.loads(text, parse_constant=refuse)
 
 
-@pytest.mark.parametrize(("value", "told"), [(math.nan, "nan"), (math.inf, "inf")])
-def test_what_is_not_finite_stands_in_the_json_as_text(value: float, told: str) -> None:
+@pytest.mark.parametrize(("value", "reported"), [(math.nan, "nan"), (math.inf, "inf")])
+def test_what_is_not_finite_is_text_in_the_json(value: float, reported: str) -> None:
     check = Check(
         engine="mujoco-mjcf",
         quantity=Quantity.POSE,
@@ -100,9 +100,9 @@ def test_what_is_not_finite_stands_in_the_json_as_text(value: float, told: str) 
     robot = RobotReport(name="arm", samples=1, reach=1.0, checks=(check,))
     report = ValidationReport(robots=(robot,))
     [entry] = _strict(json.dumps(report.to_json(), allow_nan=False))["robots"][0]["engines"]
-    assert entry["max_position_error"] == told
+    assert entry["max_position_error"] == reported
     assert entry["worst"] == {"where": "dh_1", "q": [0.5], "sample": 0}
-    assert failure_text(check) == f"{told} m, 0 rad (tolerance 1e-12); worst at dh_1, q = [0.5]"
+    assert failure_text(check) == f"{reported} m, 0 rad (tolerance 1e-12); worst at dh_1, q = [0.5]"
 
 
 def test_nothing_checked_has_not_failed_and_one_failure_fails_all() -> None:

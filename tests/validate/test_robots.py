@@ -85,9 +85,9 @@ def test_samples_keep_within_the_limits_and_follow_the_seed(tmp_path: Path) -> N
     worst: dict[int, list[list[float]]] = {}
     for seed in (0, 0, 1):
         report = validated(robot, None, "--seed", str(seed), "--tolerance", "1e-17")
-        told = [entry["worst"]["q"] for entry in failures(report).values()]
-        assert all(-2 <= value <= 2 for q in told for value in q)
-        assert worst.setdefault(seed, told) == told
+        reported = [entry["worst"]["q"] for entry in failures(report).values()]
+        assert all(-2 <= value <= 2 for q in reported for value in q)
+        assert worst.setdefault(seed, reported) == reported
     assert worst[0] != worst[1]
 
 

@@ -135,10 +135,10 @@ class Option:
         return f"{self.name}=…" if self.required else f"{self.name}={value_text(self.default)}"
 
     def read(self, text: str) -> Any:
-        """Return the value that a text stands for.
+        """Return the value of a text.
 
         Raises:
-            ValueError: It stands for none; the message says what is allowed.
+            ValueError: It is not a value of this option; the message says what is allowed.
         """
         if self.optional and text.casefold() == "none":
             return None

@@ -195,7 +195,7 @@ class Sine:
         away = np.abs(centers(batch.q0, reach, plant.lower, plant.upper) - batch.q0)
         fastest = MINIMUM_JERK_PEAK / fade * (away + reach) + reach * speed / total
         limit = INSIDE * plant.velocity
-        reach = reach * np.where(fastest > limit, limit / np.where(fastest > 0.0, fastest, 1.0), 1.0)
+        reach = reach * np.where(fastest > limit, limit / np.where(fastest > limit, fastest, 1.0), 1.0)
         self._center = centers(batch.q0, reach, plant.lower, plant.upper)
         self._terms = [*(drawn * (reach / total)), self._center]
         self._lower, self._upper = widened(batch)

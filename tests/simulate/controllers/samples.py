@@ -86,7 +86,9 @@ def started(
 
 def driven(spec: RobotSpec, kind: ActuatorType) -> RobotSpec:
     """The same robot with one kind of actuator at every joint."""
-    return replace(spec, rows=tuple(replace(row, actuator=ActuatorSpec(type=kind)) for row in spec.rows))
+    actuator = ActuatorSpec(type=kind)
+    rows = (replace(row, actuator=actuator) if row.type.moves else row for row in spec.rows)
+    return replace(spec, rows=tuple(rows))
 
 
 def make(text: str, spec: RobotSpec, rollouts: range = range(7), **options: Any) -> tuple[Controller, RolloutBatch]:

@@ -32,7 +32,7 @@ def test_a_weighted_sum_is_added_term_by_term(batch: int, count: int, m: int) ->
     assert np.array_equal(found, expected)
 
 
-def test_a_weighted_sum_goes_where_it_is_told() -> None:
+def test_a_weighted_sum_is_written_to_the_given_array() -> None:
     out = np.full((2, 9, 3), -1.0)
     weighted_sum(np.ones((1, 4)), [np.ones((2, 3))], out[:, 2:6])
     assert np.array_equal(out[0, :, 0], [-1, -1, 1, 1, 1, 1, -1, -1, -1])
@@ -94,7 +94,7 @@ def test_splines_are_twice_continuously_differentiable() -> None:
             assert abs(difference) < 100 * step
 
 
-def test_time_steps_are_told_in_which_piece_they_lie_and_where() -> None:
+def test_time_steps_are_placed_in_their_pieces() -> None:
     piece, s = pieces(4, 8, timestep=0.1, duration=0.5, number=2)
     assert piece.tolist() == [0, 1, 1, 1, 1, 1, 1, 1]
     np.testing.assert_allclose(s, [0.8, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.0], atol=1e-12)

@@ -47,7 +47,7 @@ def test_a_controller_looks_at_the_state_or_does_not(folder: Path, name: str) ->
     )
 
 
-def test_a_failing_constructor_is_told_by_its_text_and_line(folder: Path) -> None:
+def test_a_failing_constructor_is_reported_with_its_text_and_line(folder: Path) -> None:
     file = write(folder, "swinging.py", SWING)
     where = line(file, "raise ValueError")
     assert refused("swinging:Swing:gain=-1") == (
@@ -55,7 +55,7 @@ def test_a_failing_constructor_is_told_by_its_text_and_line(folder: Path) -> Non
     )
 
 
-def test_a_failing_method_is_told_by_its_text_and_line(folder: Path) -> None:
+def test_a_failing_method_is_reported_with_its_text_and_line(folder: Path) -> None:
     file = write(folder, "swinging.py", SWING)
     controller, _ = make("swinging:Still", arm())
     assert isinstance(controller, Follows)
@@ -67,7 +67,7 @@ def test_a_failing_method_is_told_by_its_text_and_line(folder: Path) -> None:
     )
 
 
-def test_a_failure_inside_a_library_is_told_by_the_users_line(folder: Path) -> None:
+def test_a_failure_inside_a_library_is_reported_with_the_users_line(folder: Path) -> None:
     text = (
         "import numpy as np\n\n\nclass A:\n    def __init__(self, batch):\n        np.linalg.inv(np.zeros((2, 2)))\n"
     )
@@ -84,7 +84,7 @@ def test_a_failure_inside_a_library_is_told_by_the_users_line(folder: Path) -> N
         ("assert False", "AssertionError"),
     ],
 )
-def test_a_module_that_cannot_be_imported_is_told_with_the_line(folder: Path, text: str, problem: str) -> None:
+def test_a_module_that_cannot_be_imported_is_reported_with_the_line(folder: Path, text: str, problem: str) -> None:
     write(folder, "unimportable.py", f"import sys\n{text}\n")
     assert refused("unimportable:A") == f"controller 'unimportable:A': {problem} (unimportable.py, line 2)"
 

@@ -79,7 +79,7 @@ def test_options_reach_the_controller() -> None:
 
 
 @pytest.mark.parametrize("text", ["sien", "sien:amplitude=3", "sien:amplitude"])
-def test_an_unknown_name_is_told_with_the_known_ones(text: str) -> None:
+def test_an_unknown_name_is_reported_with_the_known_ones(text: str) -> None:
     what = "controller and no module" if text == "sien:amplitude" else "controller"
     assert refused(text) == (
         f"unknown {what} 'sien'. Did you mean 'sine'? Known controllers: {KNOWN}; your own is named MODULE:CLASS"

@@ -76,7 +76,7 @@ def test_pd_follows_its_reference_without_trembling() -> None:
     assert np.mean(np.sign(np.diff(steps, axis=0))[1:] != np.sign(np.diff(steps, axis=0))[:-1]) < 0.1
 
 
-def test_pd_pulls_with_the_gains_that_it_is_told() -> None:
+def test_pd_uses_the_gains_of_its_options() -> None:
     group, (q, v) = started(MOTORS), state()
     controller, seen = PD(group, kp=9.0, kd=0.0, gravity=False), observe(group.plant, 120, q, v)
     q_ref = controller.reference(120, 1)[0][:, 0]

@@ -33,7 +33,7 @@ def test_recorded_accelerations_take_the_recorded_torques(robot: str) -> None:
 
 @pytest.mark.parametrize("controller", ["sine", "computed-torque", "passive", "hold", "random"])
 @pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast"])
-def test_so_they_do_with_any_controller_and_every_integrator_that_tells_them(
+def test_so_they_do_with_any_controller_and_every_integrator_that_keeps_accelerations(
     controller: str, integrator: str
 ) -> None:
     run = rollout(

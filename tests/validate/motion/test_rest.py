@@ -46,7 +46,7 @@ def test_what_is_not_finite_does_not_rest() -> None:
     assert (check.worst.where, check.worst.sample) == ("joint_2", 3)
 
 
-def test_motors_that_cannot_carry_the_arm_are_told() -> None:
+def test_motors_that_cannot_carry_the_arm_are_reported() -> None:
     check = check_rest(resting_rollouts(built(WEAK)))
     assert check.ok is None
     assert check.reason == "rest: the motors are too weak to carry the arm in any of its random poses"

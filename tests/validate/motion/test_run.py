@@ -60,7 +60,7 @@ def test_a_very_long_chain_is_not_simulated() -> None:
     assert check.reason == "energy order: the table has 61 rows; at most 60 are simulated"
 
 
-def test_a_model_that_mujoco_refuses_is_told() -> None:
+def test_a_model_that_mujoco_refuses_is_reported() -> None:
     model = heavier(built("planar_2r"), 0, 1e-30)
     with pytest.raises(EngineError, match=r"^MuJoCo refuses the model: .*mass and inertia") as raised:
         compile_model(model)

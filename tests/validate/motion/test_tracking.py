@@ -43,7 +43,7 @@ def test_arms_with_weak_motors_follow_slower_references() -> None:
     assert not run["saturation"].values.any()
 
 
-def test_motors_that_are_too_weak_for_any_motion_are_told() -> None:
+def test_motors_that_are_too_weak_for_any_motion_are_reported() -> None:
     check = check_tracking(tracking_rollouts(built(WEAK)))
     assert check.ok is None
     assert check.reason == "tracking: the motors are too weak for any motion that was tried"
@@ -75,7 +75,7 @@ def test_what_is_not_finite_is_off_its_reference() -> None:
     assert (check.ok, check.max_error) == (False, np.inf)
 
 
-def test_a_joint_that_stands_still_is_close_to_its_reference() -> None:
+def test_a_joint_at_rest_is_close_to_its_reference() -> None:
     still = """\
 name: still
 convention: standard

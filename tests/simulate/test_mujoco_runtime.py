@@ -73,7 +73,7 @@ def test_threads_share_it() -> None:
     assert timer() == before
 
 
-def test_the_time_of_mujocos_own_profile_stands_still_inside_only() -> None:
+def test_the_time_of_mujocos_own_profile_stops_inside_only() -> None:
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
     data = mujoco.MjData(model)
     with quiet_engine():
