@@ -85,21 +85,14 @@ def test_a_joint_without_limits_starts_anywhere_within_half_a_turn() -> None:
     assert q.min() < -0.95 * np.pi
 
 
-@pytest.mark.parametrize("name", ["zero", "tilted"])
-def test_a_start_outside_the_limits_is_refused(name: str) -> None:
+def test_a_start_outside_the_limits_is_refused() -> None:
     spec = robots.arm().spec
     rows = (replace(spec.rows[0], limits=Limits(position=(0.25, 1.5))), spec.rows[1])
-    configurations = {"home": read_only([1.0, 0.0]), "tilted": read_only([0.5, 0.9])}
+    configurations = {"home": read_only([1.0, 0.0])}
     robot = build_model(replace(spec, rows=rows, configurations=MappingProxyType(configurations)))
     with pytest.raises(SettingsError) as caught:
-        first(robot, name)
-    assert (
-        str(caught.value)
-        == {
-            "zero": "start zero: joint_1 would start at 0 rad, outside its limits 0.25 to 1.5 rad",
-            "tilted": "start tilted: joint_2 would start at 0.9 m, outside its limits -0.5 to 0.75 m",
-        }[name]
-    )
+        first(robot, "zero")
+    assert str(caught.value) == "start zero: joint_1 would start at 0 rad, outside its limits 0.25 to 1.5 rad"
 
 
 def test_a_floating_base_starts_at_the_origin_and_still() -> None:
