@@ -34,7 +34,7 @@ Word = TypeVar("Word", bound=StrEnum)
 
 def complete_robot(incomplete: str) -> list[str]:
     """Return what a shell offers for ROBOT: robots that come with dh2sim, robot files and folders."""
-    from dh2sim.robot.read import builtin_robots
+    from dh2sim.robot.catalog import builtin_robots
 
     names = [name for name in builtin_robots() if name.startswith(incomplete)]
     folder, start = os.path.split(incomplete)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from typing import Annotated
 
 import typer
@@ -23,26 +24,15 @@ def list_robots(
       dh2sim list --json
       dh2sim info scara
     """
-    from dh2sim.robot.read import builtin_robots, load_robot
+    from dh2sim.robot.catalog import summaries
 
-    robots = [load_robot(name) for name in builtin_robots()]
-    kinds = ["".join("R" if row.type.turns else "P" for row in spec.moving_rows) for spec in robots]
+    robots = list(summaries())
     if as_json:
-        entries = [
-            {
-                "name": spec.name,
-                "joints": joints,
-                "conventions": list(dict.fromkeys(row.convention.value for row in spec.rows)),
-                "description": " ".join(spec.description.split()),
-                "source": " ".join(spec.source.split()),
-            }
-            for spec, joints in zip(robots, kinds, strict=True)
-        ]
-        print(json.dumps(entries, indent=2))
+        print(json.dumps([asdict(robot) for robot in robots], indent=2))
         return
-    width = max((len(spec.name) for spec in robots), default=0)
-    for spec, joints in zip(robots, kinds, strict=True):
-        print(f"{spec.name:{width}}  {joints:8}  {' '.join(spec.description.split())}")
+    width = max((len(robot.name) for robot in robots), default=0)
+    for robot in robots:
+        print(f"{robot.name:{width}}  {robot.joints:8}  {robot.description}")
 
 
 def schema() -> None:

@@ -1,4 +1,4 @@
-"""Robot files to RobotSpecs, and the robots that come with dh2sim."""
+"""Robot files to RobotSpecs."""
 
 from __future__ import annotations
 
@@ -9,35 +9,16 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from dh2sim.errors import Dh2simError, RobotError, UnknownRobotError
 from dh2sim.messages import Loc, did_you_mean, listed, path_of, shown
+from dh2sim.robot.catalog import builtin_path, builtin_robots
 from dh2sim.robot.checks import check
 from dh2sim.robot.expressions import NumberError, is_name, names_in, parameter_name_problem, to_number
 from dh2sim.robot.fields import WRONG, Part, Scope, Tree
 from dh2sim.robot.spec import ROBOT, AngleUnit, LengthUnit, RobotSpec, SourceFile, Units, robot_fields
 from dh2sim.robot.yaml_tree import MAX_BYTES, Entry, Node, Report, check_size, compose, decode
-
-_PACKAGE: Final = Path(__file__).resolve().parent.parent
-_FOLDERS: Final = (_PACKAGE / "robots", _PACKAGE.parent / "robots")
-"""In an installed wheel; in a checkout."""
-
-
-def builtin_robots() -> tuple[str, ...]:
-    """Return the names of the robots that come with dh2sim, sorted."""
-    return tuple(sorted(path.stem for path in _folder().glob("*.yaml")))
-
-
-def builtin_path(name: str) -> Path | None:
-    """Return the file of a robot that comes with dh2sim, with or without ``.yaml``; None for others."""
-    stem = name.removesuffix(".yaml")
-    return _folder() / f"{stem}.yaml" if stem in builtin_robots() else None
-
-
-def _folder() -> Path:
-    """Return the folder of robot files; the package's own one where there is one."""
-    return next((folder for folder in _FOLDERS if folder.is_dir()), _FOLDERS[0])
 
 
 def load_robot(path_or_name: str | os.PathLike[str]) -> RobotSpec:

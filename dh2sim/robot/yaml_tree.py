@@ -206,8 +206,8 @@ def _fast(text: str) -> Node | None:
     if _OTHER_IN_YAML_1_1.search(text):
         return None
     try:
-        from yaml import YAMLError  # type: ignore[import-untyped]
-        from yaml.cyaml import CParser  # type: ignore[import-untyped]
+        from yaml import YAMLError
+        from yaml.cyaml import CParser  # type: ignore[attr-defined]
     except ImportError:
         return None
     report = Report("")

@@ -15,7 +15,8 @@ from dh2sim.errors import Dh2simError, UnknownRobotError
 from dh2sim.messages import did_you_mean, shown
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.read import builtin_path, builtin_robots, load_robot
+from dh2sim.robot.catalog import builtin_path, builtin_robots
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.view.events import OpenText
 from dh2sim.view.state import Ghost, ViewState, configurations

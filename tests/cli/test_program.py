@@ -13,7 +13,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from dh2sim.robot.read import builtin_robots
+from dh2sim.robot.catalog import builtin_robots
 from tests.export.robots import small, write
 from tests.program import Outcome, dh2sim, dh2sim_process, environment
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dh2sim.robot.read import builtin_robots
+from dh2sim.robot.catalog import builtin_robots
 from tests.export.robots import small, write
 from tests.program import Outcome, dh2sim
 

@@ -20,7 +20,8 @@ import numpy as np
 import pytest
 
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.read import builtin_robots, load_robot
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import load_robot
 from dh2sim.view.initial_state import folder_of, open_state
 from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.server import is_local_only

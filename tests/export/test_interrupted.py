@@ -11,7 +11,7 @@ import pytest
 
 from dh2sim import load_robot
 from dh2sim.cli.common import INTERRUPTED
-from dh2sim.robot.read import builtin_robots
+from dh2sim.robot.catalog import builtin_robots
 from tests.export.robots import small, write
 from tests.program import contents, dh2sim, environment
 

@@ -12,7 +12,8 @@ from dh2sim.errors import MismatchError
 from dh2sim.importing import convert as converted
 from dh2sim.importing.convert import convert_robot
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.read import builtin_robots, load_robot
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import Convention, RobotSpec
 from dh2sim.robot.write import robot_file_text
 from tests.strategies import robot_specs

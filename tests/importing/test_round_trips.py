@@ -17,7 +17,8 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.mass import MassProperties, in_frame
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.read import builtin_robots, load_robot, parse_robot
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import Convention, RobotSpec
 from dh2sim.typing import Array
 from tests.export.robots import ODD, RICH

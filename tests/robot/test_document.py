@@ -8,7 +8,7 @@ import time
 import pytest
 
 from dh2sim.robot import yaml_tree
-from dh2sim.robot.read import builtin_path, builtin_robots
+from dh2sim.robot.catalog import builtin_path, builtin_robots
 from dh2sim.robot.yaml_tree import MAX_BYTES, MAX_DEPTH, MAX_LINE, MAX_NODES, Node, Report, compose, decode
 from tests.robot.files import MINIMAL, complaints, robot
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from dh2sim.errors import Dh2simError, RobotFileError, UnknownRobotError
-from dh2sim.robot import read as catalog
-from dh2sim.robot.read import builtin_path, builtin_robots, load_robot, parse_robot
+from dh2sim.robot import catalog
+from dh2sim.robot.catalog import builtin_path, builtin_robots
+from dh2sim.robot.read import load_robot, parse_robot
 from tests.robot.files import MINIMAL
 
 

@@ -8,7 +8,8 @@ import jsonschema
 import pytest
 from ruamel.yaml import YAML
 
-from dh2sim.robot.read import builtin_path, builtin_robots, load_robot
+from dh2sim.robot.catalog import builtin_path, builtin_robots
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.schema import json_schema
 from tests.robot.files import FULL, MINIMAL, with_joint, with_keys
 

@@ -19,7 +19,7 @@ import dh2sim
 from dh2sim.errors import SettingsError
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.read import builtin_robots
+from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.block import Job
 from dh2sim.simulate.options import RolloutOptions

@@ -14,7 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
-from dh2sim.robot.read import builtin_robots, load_robot, parse_robot
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.typing import Array
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.scene.camera import FIELD_OF_VIEW, Viewpoint, viewpoint_of

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
-from dh2sim.robot.read import builtin_robots, load_robot
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from dh2sim.view.events import ChooseFrame, RandomConfiguration, SetJoints

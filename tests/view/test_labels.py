@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.draw.projection import Pinhole
-from dh2sim.robot.read import builtin_robots, load_robot
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import load_robot
 from dh2sim.view.events import SelectRow, SetCamera, Show
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.reduce import reduce

@@ -13,7 +13,8 @@ import pytest
 
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
-from dh2sim.robot.read import builtin_robots, load_robot, parse_robot
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import Convention
 from dh2sim.view.initial_state import folder_of, open_state
 from dh2sim.view.scene.ghost import misread_text

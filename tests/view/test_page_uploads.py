@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.read import builtin_path, load_robot, parse_robot
+from dh2sim.robot.catalog import builtin_path
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.yaml_tree import MAX_BYTES
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import Page as ServedPage

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.read import builtin_path, load_robot, parse_robot
+from dh2sim.robot.catalog import builtin_path
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.view import events
 from dh2sim.view.initial_state import MAX_PROBLEMS, builtin_ghost, file_name, open_state, uploaded_ghost
 from dh2sim.view.panel import markup

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from dh2sim.errors import Dh2simError
 from dh2sim.export import Format
-from dh2sim.robot.read import builtin_robots
+from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.yaml_tree import MAX_BYTES
 from dh2sim.view.events import Compare, CompareMisread, Event, Show
 from dh2sim.view.initial_state import file_name

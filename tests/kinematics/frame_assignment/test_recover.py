@@ -14,7 +14,8 @@ from dh2sim.kinematics.frame_assignment.recover import chain_reach, measure_resi
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import compose, invert
-from dh2sim.robot.read import builtin_robots, load_robot
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import Convention, JointType, RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.kinematics.frame_assignment.chains import Axis, chain_of, pose, random_axes, tip_by_exponentials, unit

@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
 
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
-from dh2sim.robot.read import builtin_robots, load_robot, parse_robot
+from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import (
     ActuatorSpec,
     ActuatorType,

@@ -1,0 +1,69 @@
+"""The robots that come with dh2sim: their files, and what a list says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from dh2sim.robot.yaml_tree import Node, Report, compose
+
+_PACKAGE: Final = Path(__file__).resolve().parent.parent
+_FOLDERS: Final = (_PACKAGE / "robots", _PACKAGE.parent / "robots")
+"""In an installed wheel; in a checkout."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Summary:
+    """What a list says of a robot."""
+
+    name: str
+    joints: str
+    """The moving rows, base first: R for a revolute joint, P for a prismatic one."""
+    conventions: tuple[str, ...]
+    """Of its rows, each once, in their order."""
+    description: str
+    source: str
+
+
+def builtin_robots() -> tuple[str, ...]:
+    """Return the names of the robots that come with dh2sim, sorted."""
+    return tuple(sorted(path.stem for path in _folder().glob("*.yaml")))
+
+
+def builtin_path(name: str) -> Path | None:
+    """Return the file of a robot that comes with dh2sim, with or without ``.yaml``; None for others."""
+    stem = name.removesuffix(".yaml")
+    return _folder() / f"{stem}.yaml" if stem in builtin_robots() else None
+
+
+def summaries() -> Iterator[Summary]:
+    """Yield the summary of every robot that comes with dh2sim, sorted by name.
+
+    Their files are known to be right, so they are not checked, and no number in them is evaluated.
+    """
+    for path in sorted(_folder().glob("*.yaml")):
+        root = compose(path.read_text(encoding="utf-8"), Report(path.name))
+        rows = root.at("joints")
+        assert rows is not None and isinstance(rows.value, list), path  # noqa: PT018
+        types = [_text(row, "type") for row in rows.value]
+        common = _text(root, "convention")
+        yield Summary(
+            name=_text(root, "name"),
+            joints="".join("P" if kind == "prismatic" else "R" for kind in types if kind != "fixed"),
+            conventions=tuple(dict.fromkeys(_text(row, "convention") or common for row in rows.value)),
+            description=" ".join(_text(root, "description").split()),
+            source=" ".join(_text(root, "source").split()),
+        )
+
+
+def _text(node: Node, key: str) -> str:
+    """Return the text of a key, empty where it is missing."""
+    found = node.at(key)
+    return str(found.value) if found else ""
+
+
+def _folder() -> Path:
+    """Return the folder of robot files; the package's own one where there is one."""
+    return next((folder for folder in _FOLDERS if folder.is_dir()), _FOLDERS[0])
