@@ -155,7 +155,7 @@ def _limits(joint: JointModel, units: Units) -> str:
     """Return the position limits, a length in the file's unit and in m; in parentheses where they are assumed."""
     from dh2sim.robot.textbook_table import short
 
-    kind = joint.joint.type
+    kind = joint.type
     if not kind.moves:
         return ""
     if joint.position_range is None:

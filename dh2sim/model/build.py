@@ -101,9 +101,8 @@ def build_model(spec: SpecLike) -> RobotModel:
         inertia = next(seen) if row.type.moves else 0.0
         limits, assumed = filled_limits(row, position, load_bound(i, chain, ranges, bodies, spec.gravity), inertia)
         actuator = actuator_model(row.actuator, inertia + row.dynamics.armature)
-        joints.append(
-            JointModel(joint=joint, limits=limits, assumed=assumed, dynamics=row.dynamics, actuator=actuator)
-        )
+        placed = {field.name: getattr(joint, field.name) for field in fields(Joint)}
+        joints.append(JointModel(**placed, limits=limits, assumed=assumed, dynamics=row.dynamics, actuator=actuator))
     return RobotModel(
         spec=spec,
         chain=chain,

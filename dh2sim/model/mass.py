@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from dh2sim.kinematics.chain import Joint
 from dh2sim.kinematics.transforms import move_point, rotate_tensor
 from dh2sim.model.shapes import Shape, ShapeKind
-from dh2sim.robot.fields import inertia_problem
+from dh2sim.robot.parts import inertia_problem
 from dh2sim.robot.spec import LinkSpec
 from dh2sim.typing import Array, read_only
 

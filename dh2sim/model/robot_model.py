@@ -72,21 +72,15 @@ class LinkModel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class JointModel:
-    """A joint with its limits, dynamics and actuator."""
+class JointModel(Joint):
+    """A joint of the chain with its limits, dynamics and actuator."""
 
-    joint: Joint
     limits: Limits
     """The robot file's, with what it leaves open filled in; continuous and fixed joints have no position limits."""
     assumed: tuple[str, ...]
     """Which of the limits 'position', 'velocity' and 'effort' were assumed."""
     dynamics: Dynamics
     actuator: ActuatorModel
-
-    @property
-    def name(self) -> str:
-        """The joint's name."""
-        return self.joint.name
 
     @property
     def position_range(self) -> Range | None:
@@ -158,7 +152,7 @@ class RobotModel:
     @property
     def moving_joints(self) -> tuple[JointModel, ...]:
         """The joints that have a coordinate, in the order of a joint vector."""
-        return tuple(joint for joint in self.joints if joint.joint.type.moves)
+        return tuple(joint for joint in self.joints if joint.type.moves)
 
     @property
     def bodies(self) -> tuple[MassProperties | None, ...]:

@@ -23,7 +23,7 @@ def with_actuators(model: RobotModel, kind: ActuatorType) -> RobotModel:
     seen = iter(seen_inertias(model.chain, model.bodies, model.home))
     joints = []
     for joint in model.joints:
-        inertia = next(seen) if joint.joint.type.moves else 0.0
+        inertia = next(seen) if joint.type.moves else 0.0
         if joint.actuator.type is kind:
             joints.append(joint)
         else:

@@ -12,21 +12,8 @@ import numpy as np
 from dh2sim.errors import ImportedFileError
 from dh2sim.messages import Loc, closest
 from dh2sim.robot.checks import check_actuators, check_configurations, check_names, check_type, trees
-from dh2sim.robot.fields import (
-    WRONG,
-    Choice,
-    Configurations,
-    Internal,
-    Name,
-    Numbers,
-    Parameters,
-    Part,
-    Parts,
-    Scope,
-    Text,
-    Tree,
-    UnitsLike,
-)
+from dh2sim.robot.fields import WRONG, Choice, Configurations, Name, Numbers, Parameters, Scope, Text, Tree, UnitsLike
+from dh2sim.robot.parts import Internal, Part, Parts
 from dh2sim.robot.read import check_file, file_scope, units_of
 from dh2sim.robot.spec import (
     CONVENTIONS,

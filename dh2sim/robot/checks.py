@@ -1,6 +1,6 @@
 """Checks between the values of a robot; each looks at what is right by itself and leaves the rest alone.
 
-They work on the trees that ``fields.Part.check`` returns, in whatever units, of robot files, axes files and robots
+They work on the trees that ``parts.Part.check`` returns, in whatever units, of robot files, axes files and robots
 made in code.
 """
 

@@ -16,7 +16,8 @@ from dh2sim.messages import Loc, did_you_mean, listed, path_of, shown
 from dh2sim.robot.catalog import builtin_path, builtin_robots
 from dh2sim.robot.checks import check
 from dh2sim.robot.expressions import NumberError, is_name, names_in, parameter_name_problem, to_number
-from dh2sim.robot.fields import WRONG, Part, Scope, Tree
+from dh2sim.robot.fields import WRONG, Scope, Tree
+from dh2sim.robot.parts import Part
 from dh2sim.robot.spec import ROBOT, AngleUnit, LengthUnit, RobotSpec, SourceFile, Units, robot_fields
 from dh2sim.robot.yaml_tree import MAX_BYTES, Entry, Node, Report, check_size, compose, decode
 

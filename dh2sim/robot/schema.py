@@ -14,17 +14,13 @@ from dh2sim.robot.fields import (
     Color,
     Configurations,
     Flag,
-    Inertia,
-    InertiaNumbers,
     Kind,
     Name,
     Number,
     Numbers,
     Parameters,
-    Part,
-    Parts,
-    fields_of,
 )
+from dh2sim.robot.parts import Inertia, InertiaNumbers, Part, Parts, fields_of
 from dh2sim.robot.spec import ROBOT
 
 _NAME = {"pattern": NAME_PATTERN, "maxLength": LONGEST_NAME}

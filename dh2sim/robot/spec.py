@@ -22,23 +22,18 @@ from dh2sim.robot.fields import (
     Configurations,
     Dimension,
     Flag,
-    Inertia,
-    Internal,
     MeshFile,
     Name,
     Number,
     Numbers,
     Parameters,
-    Part,
-    Parts,
     Range,
     Scope,
     Text,
     Tree,
     UnitsLike,
-    kept,
-    plain_part,
 )
+from dh2sim.robot.parts import Inertia, Internal, Part, Parts, kept, plain_part
 from dh2sim.typing import Array, read_only
 
 _FILLED_IN: Final[Any] = None

@@ -23,20 +23,8 @@ import numpy as np
 
 from dh2sim.errors import ModelError
 from dh2sim.robot.checks import default_name
-from dh2sim.robot.fields import (
-    Choice,
-    Color,
-    Dimension,
-    Flag,
-    Inertia,
-    Internal,
-    Kind,
-    MeshFile,
-    Number,
-    Numbers,
-    Part,
-    fields_of,
-)
+from dh2sim.robot.fields import Choice, Color, Dimension, Flag, Kind, MeshFile, Number, Numbers
+from dh2sim.robot.parts import Inertia, Internal, Part, fields_of
 from dh2sim.robot.spec import (
     ActuatorSpec,
     AngleUnit,

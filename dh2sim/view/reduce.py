@@ -226,5 +226,5 @@ def _nudged(state: ViewState, joint: int, direction: int) -> tuple[float, ...]:
         return state.commanded
     moving = state.model.moving_joints[joint]
     lower, upper = moving.travel
-    step = NUDGE_ANGLE if moving.joint.type.turns else NUDGE_SHARE * (upper - lower)
+    step = NUDGE_ANGLE if moving.type.turns else NUDGE_SHARE * (upper - lower)
     return _exchanged(state.commanded, joint, state.commanded[joint] + math.copysign(step, direction))

@@ -118,7 +118,7 @@ def _with_robot(
     state: ViewState, text: str, model: RobotModel, *, errors: tuple[CellError, ...] = (), notice: str = ""
 ) -> ViewState:
     """Return the state with another robot; the joints do not move unless new limits require it."""
-    same_joints = [joint.joint.type for joint in model.joints] == [joint.joint.type for joint in state.model.joints]
+    same_joints = [joint.type for joint in model.joints] == [joint.type for joint in state.model.joints]
     rows = len(model.joints)
     return replace(
         state,

@@ -53,7 +53,7 @@ def turns(built: RobotModel, count: int, seed: int) -> Array:
     """Joint vectors in the limits; continuous joints turn several times."""
     q = in_limits(built, count, seed)
     for i, joint in enumerate(built.moving_joints):
-        if joint.joint.type is JointType.CONTINUOUS:
+        if joint.type is JointType.CONTINUOUS:
             q[:, i] *= 4
     return q
 

@@ -34,7 +34,7 @@ def assert_holds_the_model(built: RobotModel, mj: mujoco.MjModel, *, own_bodies:
     np.testing.assert_array_equal(mj.opt.gravity, built.spec.gravity)
     for joint, link in zip(built.joints, built.links, strict=True):
         body = mj.body(link.name)
-        T = joint.joint.T_parent_joint
+        T = joint.T_parent_joint
         np.testing.assert_array_equal(body.pos, normal(T[:3, 3]))
         np.testing.assert_allclose(body.quat, quaternion_from_rotation(T), rtol=0, atol=3e-16)
         assert body.mass[0] == (0.0 if link.inertial is None else link.inertial.mass)
@@ -42,10 +42,10 @@ def assert_holds_the_model(built: RobotModel, mj: mujoco.MjModel, *, own_bodies:
             np.testing.assert_array_equal(body.ipos, normal(link.inertial.com))
     for joint in built.moving_joints:
         own = mj.joint(joint.name)
-        kind = mujoco.mjtJoint.mjJNT_HINGE if joint.joint.type.turns else mujoco.mjtJoint.mjJNT_SLIDE
+        kind = mujoco.mjtJoint.mjJNT_HINGE if joint.type.turns else mujoco.mjtJoint.mjJNT_SLIDE
         assert own.type[0] == kind
         np.testing.assert_array_equal(own.pos, [0, 0, 0])
-        np.testing.assert_array_equal(own.axis, [0, 0, joint.joint.sign])
+        np.testing.assert_array_equal(own.axis, [0, 0, joint.sign])
         assert own.qpos0[0] == 0.0
         assert bool(mj.jnt_limited[own.id]) == (joint.position_range is not None)
         if joint.position_range is not None:

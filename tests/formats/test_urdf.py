@@ -44,18 +44,18 @@ def assert_numbers_read_back(built: RobotModel) -> None:
     joints, links = joints_of(root), links_of(root)
     for joint, link in zip(built.joints, built.links, strict=True):
         element = joints[joint.name]
-        assert element.attrib["type"] == joint.joint.type.value
-        assert_stands_at(element, joint.joint.T_parent_joint)
+        assert element.attrib["type"] == joint.type.value
+        assert_stands_at(element, joint.T_parent_joint)
         limit = element.find("limit")
-        if not joint.joint.type.moves:
+        if not joint.type.moves:
             assert limit is None
             assert element.find("axis") is None
         else:
             assert limit is not None
-            assert floats(element.find("axis"), "xyz") == [0.0, 0.0, joint.joint.sign]
+            assert floats(element.find("axis"), "xyz") == [0.0, 0.0, joint.sign]
             assert floats(limit, "effort") + floats(limit, "velocity") == [joint.effort, joint.velocity]
             if joint.position_range is None:
-                assert joint.joint.type.value == "continuous"
+                assert joint.type.value == "continuous"
                 assert not {"lower", "upper"} & set(limit.attrib)
             else:
                 assert floats(limit, "lower") + floats(limit, "upper") == normal(np.array(joint.position_range))

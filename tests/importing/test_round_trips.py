@@ -45,7 +45,7 @@ def _masses_in_base(model: RobotModel, q: Array) -> list[MassProperties]:
     return [
         in_frame(T, link.inertial)
         for T, link, joint in zip(poses, model.links, model.joints, strict=True)
-        if joint.joint.type.moves and link.inertial is not None
+        if joint.type.moves and link.inertial is not None
     ]
 
 

@@ -25,7 +25,7 @@ def assert_every_moving_link_is_a_body(built: RobotModel) -> None:
             np.testing.assert_allclose(R.T @ R, np.eye(3), rtol=0, atol=1e-15)
             assert np.linalg.det(R) == pytest.approx(1.0, abs=1e-14)
     for link, joint in zip(built.links, built.joints, strict=True):
-        if joint.joint.type.moves:
+        if joint.type.moves:
             assert link.shapes
             assert link.inertial is not None
         if link.inertial is not None:
@@ -78,7 +78,7 @@ def assert_slides_stay_together(built: RobotModel, q: Array) -> int:
     for poses in joint_poses(built.chain, q):
         T_base = [np.eye(4), *poses]
         for i, joint in enumerate(built.joints):
-            if joint.joint.type is not PRISMATIC:
+            if joint.type is not PRISMATIC:
                 continue
             seen += 1
             parent, child = built.all_links[i], built.all_links[i + 1]
@@ -122,7 +122,7 @@ def test_a_slide_stays_guided_over_its_whole_travel(
     flip: bool, position: tuple[float, float] | None, first: bool
 ) -> None:
     built = build_model(slide(flip, position, first))
-    joint = next(joint for joint in built.joints if joint.joint.type is PRISMATIC)
+    joint = next(joint for joint in built.joints if joint.type is PRISMATIC)
     travel = np.linspace(*joint.travel, 41)
     q = np.stack([travel, np.full(41, 0.7)] if first else [np.full(41, 0.7), travel], axis=1)
     assert assert_slides_stay_together(built, q) == 41
@@ -133,7 +133,7 @@ def test_a_slide_stays_guided_over_its_whole_travel(
 @pytest.mark.parametrize("name", [*NAMES, "odd"])
 def test_every_slide_of_the_robots_stays_guided(name: str) -> None:
     built = model(name)
-    slides = sum(joint.joint.type is PRISMATIC for joint in built.joints)
+    slides = sum(joint.type is PRISMATIC for joint in built.joints)
     assert assert_slides_stay_together(built, in_limits(built, 50, seed=1)) == 50 * slides
 
 

@@ -183,19 +183,19 @@ def _bodies(mujoco: ET.Element, model: RobotModel, materials: dict[Color, str], 
     _geoms(body, model, model.base, model.chain.T_base_link_dh0, materials)
     add_site(body, "dh_0", model.chain.T_base_link_dh0, model.base.inertial if options.floating_base else None)
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
-        body = child(body, "body", name=link.name, **placed(joint.joint.T_parent_joint))
+        body = child(body, "body", name=link.name, **placed(joint.T_parent_joint))
         _inertial(body, link.inertial)
-        if joint.joint.type is not JointType.FIXED:
+        if joint.type is not JointType.FIXED:
             _joint(body, joint)
-        _geoms(body, model, link, joint.joint.T_joint_dh, materials)
-        frames = [(f"dh_{i}", joint.joint.T_joint_dh)] if i < len(model.links) else _last_frames(model)
+        _geoms(body, model, link, joint.T_joint_dh, materials)
+        frames = [(f"dh_{i}", joint.T_joint_dh)] if i < len(model.links) else _last_frames(model)
         for name, T in frames:
             add_site(body, name, T, link.inertial)
 
 
 def _last_frames(model: RobotModel) -> list[tuple[str, Array]]:
     """Return the names of the last DH frame and of tool0, and their poses in the last link."""
-    T = model.joints[-1].joint.T_joint_dh
+    T = model.joints[-1].T_joint_dh
     return [(f"dh_{len(model.links)}", T), ("tool0", compose(T, model.chain.T_dhn_tool0))]
 
 
@@ -217,8 +217,8 @@ def _inertial(body: ET.Element, properties: MassProperties | None) -> None:
 
 
 def _joint(body: ET.Element, joint: JointModel) -> None:
-    element = child(body, "joint", name=joint.name, type="hinge" if joint.joint.type.turns else "slide")
-    if joint.joint.sign < 0:
+    element = child(body, "joint", name=joint.name, type="hinge" if joint.type.turns else "slide")
+    if joint.sign < 0:
         element.set("axis", numbers([0, 0, -1]))
     if joint.position_range is not None:
         element.set("range", numbers(joint.position_range))

@@ -44,11 +44,11 @@ def to_urdf(model: ModelLike, *, dh_frames: bool = True) -> str:
     parent = model.base.name
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
         _joint(robot, joint, parent, link.name)
-        _link(robot, link, joint.joint.T_joint_dh, materials)
+        _link(robot, link, joint.T_joint_dh, materials)
         if dh_frames:
-            _frame(robot, f"dh_{i}", link.name, joint.joint.T_joint_dh)
+            _frame(robot, f"dh_{i}", link.name, joint.T_joint_dh)
         parent = link.name
-    _frame(robot, "flange", parent, compose(model.joints[-1].joint.T_joint_dh, T_DHN_FLANGE))
+    _frame(robot, "flange", parent, compose(model.joints[-1].T_joint_dh, T_DHN_FLANGE))
     _frame(robot, "tool0", "flange", compose(T_FLANGE_DHN, model.chain.T_dhn_tool0))
     header = [*provenance(model), *(entry.sentence for entry in model.assumptions)]
     return '<?xml version="1.0" encoding="utf-8"?>\n' + document(robot, header)
@@ -139,12 +139,12 @@ def _inertial(element: ET.Element, body: MassProperties) -> None:
 
 
 def _joint(robot: ET.Element, joint: JointModel, parent: str, name: str) -> None:
-    kind = joint.joint.type
+    kind = joint.type
     element = child(robot, "joint", name=joint.name, type=kind.value)
-    _ends(element, parent, name, joint.joint.T_parent_joint)
+    _ends(element, parent, name, joint.T_parent_joint)
     if kind is JointType.FIXED:
         return
-    child(element, "axis", xyz=numbers([0, 0, joint.joint.sign]))
+    child(element, "axis", xyz=numbers([0, 0, joint.sign]))
     limit = child(element, "limit")
     if joint.position_range is not None:
         lower, upper = joint.position_range

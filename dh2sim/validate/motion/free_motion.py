@@ -124,7 +124,7 @@ def random_states(
     n = len(lower)
     floating = compiled.nv > n
     length = max(model.reach, LEAST_SIZE)
-    sizes = np.array([1.0 if joint.joint.type.turns else length for joint in model.moving_joints])
+    sizes = np.array([1.0 if joint.type.turns else length for joint in model.moving_joints])
     base = np.array([length, length, length, 1.0, 1.0, 1.0] if floating else [])
     data = mujoco.MjData(compiled)
     states = []

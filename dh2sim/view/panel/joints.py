@@ -140,12 +140,12 @@ def _configuration(name: str) -> Event:
 
 def _layout(state: ViewState) -> object:
     """Return everything that the sliders depend on besides joint coordinates."""
-    joints = [(joint.name, joint.joint.type, joint.travel) for joint in state.model.moving_joints]
+    joints = [(joint.name, joint.type, joint.travel) for joint in state.model.moving_joints]
     return joints, state.angle, tuple(configurations(state.model))
 
 
 def _unit(joint: JointModel, angle: AngleUnit) -> str:
-    return angle.value if joint.joint.type.turns else "m"
+    return angle.value if joint.type.turns else "m"
 
 
 def _symbol(unit: str) -> str:
@@ -163,4 +163,4 @@ def _hint(index: int, joint: JointModel) -> str:
     limits = "no limits" if joint.position_range is None else "limits from the robot file"
     if "position" in joint.assumed:
         limits = "assumed limits: the robot file has none"
-    return f"{joint.joint.type.value}, {limits}{keys}"
+    return f"{joint.type.value}, {limits}{keys}"

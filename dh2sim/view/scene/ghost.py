@@ -153,11 +153,7 @@ def _pairs(ghost: RobotModel, robot: RobotModel) -> dict[int, int]:
     names = [joint.name for joint in ghost.moving_joints]
     by_name = {i: places[name] for i, name in enumerate(names) if name in places}
     pairs = by_name or {i: i for i in range(min(ghost.chain.n, robot.chain.n))}
-    return {
-        i: j
-        for i, j in pairs.items()
-        if ghost.moving_joints[i].joint.type.turns == robot.moving_joints[j].joint.type.turns
-    }
+    return {i: j for i, j in pairs.items() if ghost.moving_joints[i].type.turns == robot.moving_joints[j].type.turns}
 
 
 def _digits(value: float) -> str:

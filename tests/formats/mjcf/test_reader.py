@@ -23,7 +23,7 @@ def test_an_exported_robot_is_read_back(name: str, tmp_path: Path) -> None:
     path.write_text(to_mjcf(built), encoding="utf-8")
     robot = read_mjcf(path, file=path.name)
     mj = mujoco.MjModel.from_xml_path(str(path))
-    links = [link.name for joint, link in zip(built.joints, built.links, strict=True) if joint.joint.type.moves]
+    links = [link.name for joint, link in zip(built.joints, built.links, strict=True) if joint.type.moves]
     scale = 1.0 + float(np.abs(mj.body_pos).sum())
     assert residual(robot, mj, "base_link", [*links, "tool0"]) < 1e-14 * robot.chain.n * scale
     assert robot.name == built.name
@@ -31,7 +31,7 @@ def test_an_exported_robot_is_read_back(name: str, tmp_path: Path) -> None:
     assert [link.name for link in robot.links] == links
     moving = built.moving_joints
     assert [joint.name for joint in robot.chain.joints] == [joint.name for joint in moving]
-    assert [joint.type for joint in robot.chain.joints] == [joint.joint.type for joint in moving]
+    assert [joint.type for joint in robot.chain.joints] == [joint.type for joint in moving]
     for limits, joint in zip(robot.limits, moving, strict=True):
         expected = joint.position_range
         assert limits.position == expected
