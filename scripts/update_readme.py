@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Update the README, where it shows what commands print, and the accuracy table of docs/validation.md.
+"""Update the pages that show what commands print, and the accuracy table of docs/validation.md.
 
-Every block that begins with ``$ dh2sim …`` is run, all in one folder and 80 columns wide. The accuracy table is the
-worst pose error of every engine on every robot, over 1000 configurations; its last digits depend on the machine.
+Every block of README.md and docs/importing.md that begins with ``$ dh2sim …`` is run, all of a page in one folder and
+80 columns wide, without the optional engine pinocchio, which README's first line does not install. The accuracy table is
+the worst pose error of every engine on every robot, over 1000 configurations; its last digits depend on the machine.
 """
 
 from __future__ import annotations
@@ -22,18 +23,19 @@ from dh2sim.validate.report import Quantity, RobotReport
 from dh2sim.validate.run import validate_robot
 
 ROOT = Path(__file__).resolve().parent.parent
-README, VALIDATION = ROOT / "README.md", ROOT / "docs" / "validation.md"
+README, IMPORTING, VALIDATION = ROOT / "README.md", ROOT / "docs" / "importing.md", ROOT / "docs" / "validation.md"
 CONSOLE = re.compile(r"^```console\n\$ (.*?)\n.*?```$", flags=re.MULTILINE | re.DOTALL)
 TABLE = re.compile(r"(<!-- accuracy: begin -->\n).*(<!-- accuracy: end -->)", flags=re.DOTALL)
 MARKDOWN = re.compile(r"^```markdown\n(.*?)^```", flags=re.MULTILINE | re.DOTALL)
 ROBOT_FILE = re.compile(r"^```yaml\n(name: my_arm\n.*?)^```", flags=re.MULTILINE | re.DOTALL)
 MISTAKES = (("alpha: 90,", "alfa: 90,"), ("[0.1, 1.2]", "[1.2, 0.1]"))
-"""What is wrong in the robot file whose errors the page shows."""
+"""What is wrong in the robot file whose errors README.md shows."""
+NO_PINOCCHIO = """raise ModuleNotFoundError("No module named 'pinocchio'", name="pinocchio")\n"""
 
 
-def wrong_robot(text: str) -> str:
-    """The page's robot file, with the mistakes in it."""
-    found = ROBOT_FILE.search(text)
+def wrong_robot() -> str:
+    """Return README's robot file, with the mistakes in it."""
+    found = ROBOT_FILE.search(README.read_text(encoding="utf-8"))
     assert found is not None
     robot = found.group(1)
     for right, wrong in MISTAKES:
@@ -42,35 +44,39 @@ def wrong_robot(text: str) -> str:
     return robot
 
 
-def files(text: str) -> dict[str, str]:
-    """The files that the page's commands read, by name."""
-    table = MARKDOWN.search(text)
+def files() -> dict[str, str]:
+    """Return the files that the commands of the pages read, by name."""
+    table = MARKDOWN.search(IMPORTING.read_text(encoding="utf-8"))
     assert table is not None
     types = [TYPES[letter] for letter in DEFAULT_JOINTS]
     return {
         "my_arm.yaml": template("my_arm", types, Convention.STANDARD),
-        "wrong.yaml": wrong_robot(text),
+        "wrong.yaml": wrong_robot(),
         "ur5.md": table.group(1),
     }
 
 
 def run(command: str, folder: Path) -> str:
-    """What a command prints, its errors behind its results."""
+    """Run a command as if pinocchio were not installed, and return what it prints, its errors behind its results."""
     program, *arguments = command.split()
     assert program == "dh2sim"
-    done = subprocess.run(
-        [sys.executable, "-m", "dh2sim", *arguments],
-        cwd=folder,
-        env={**os.environ, "COLUMNS": "80"},
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-    )
+    with TemporaryDirectory() as hiding:
+        Path(hiding, "pinocchio.py").write_text(NO_PINOCCHIO, encoding="utf-8")
+        path = os.pathsep.join(filter(None, [hiding, str(ROOT), os.environ.get("PYTHONPATH")]))
+        done = subprocess.run(
+            [sys.executable, "-m", "dh2sim", *arguments],
+            cwd=folder,
+            env={**os.environ, "COLUMNS": "80", "PYTHONPATH": path},
+            capture_output=True,
+            encoding="utf-8",
+            timeout=120,
+            check=False,
+        )
     return done.stdout + done.stderr
 
 
 def accuracy() -> str:
-    """The accuracy table, as Markdown."""
+    """Return the accuracy table, as Markdown."""
     reports = [validate_robot(build_model(load_robot(name)), samples=1000) for name in builtin_robots()]
     engines = [check.engine for check in reports[0].checks if check.quantity is Quantity.POSE]
     lines = [f"| robot | reach | {' | '.join(engines)} |", f"|---|---:|{'---:|' * len(engines)}"]
@@ -83,18 +89,23 @@ def _line(report: RobotReport, engines: list[str]) -> str:
     return f"| {report.name} | {report.reach:.3g} m | {' | '.join(cells)} |"
 
 
-def main() -> None:
-    """Rewrite both pages."""
-    text = README.read_text(encoding="utf-8")
+def updated(page: Path) -> str:
+    """Return a page that shows what its commands print now."""
+    text = page.read_text(encoding="utf-8")
     with TemporaryDirectory() as name:
         folder = Path(name)
-        for file, content in files(text).items():
-            if file != "my_arm.yaml":  # which the page's first command writes
+        for file, content in files().items():
+            if "$ dh2sim new" not in text or file != "my_arm.yaml":  # which that command writes
                 (folder / file).write_text(content, encoding="utf-8")
-        text = CONSOLE.sub(lambda found: f"```console\n$ {found[1]}\n{run(found[1], folder)}```", text)
-    README.write_text(text, encoding="utf-8")
-    page = VALIDATION.read_text(encoding="utf-8")
-    VALIDATION.write_text(TABLE.sub(lambda found: found[1] + accuracy() + found[2], page), encoding="utf-8")
+        return CONSOLE.sub(lambda found: f"```console\n$ {found[1]}\n{run(found[1], folder)}```", text)
+
+
+def main() -> None:
+    """Rewrite the pages."""
+    for page in (README, IMPORTING):
+        page.write_text(updated(page), encoding="utf-8")
+    text = VALIDATION.read_text(encoding="utf-8")
+    VALIDATION.write_text(TABLE.sub(lambda found: found[1] + accuracy() + found[2], text), encoding="utf-8")
 
 
 if __name__ == "__main__":
