@@ -36,6 +36,12 @@ def path_of(loc: Loc) -> str:
     return path
 
 
+def loc_of(path: str) -> Loc:
+    """Return the place of a path that ``path_of`` made."""
+    parts = re.findall(r"\[([0-9]+)\]|\['(.+?)'\]|([^.\[]+)", path)
+    return tuple(int(index) if index else quoted or key for index, quoted, key in parts)
+
+
 def shown(value: object) -> str:
     """Return how a message names a value read from a robot file; long text is cut short."""
     match value:

@@ -112,9 +112,14 @@ def _section(title: str, entry: dict[str, Any], schema: dict[str, Any]) -> Itera
 
 
 def _kind(value: dict[str, Any], schema: dict[str, Any]) -> str:
+    if "anyOf" in value:
+        return ", or ".join(_kind(one, schema) for one in value["anyOf"])
     if "$ref" in value:
         target = schema["$defs"][value["$ref"].rsplit("/", 1)[1]]
-        return " \\| ".join(f"`{name}`" for name in target["enum"]) if "enum" in target else "mapping"
+        if "enum" not in target:
+            return "mapping"
+        spellings = {name.casefold(): name for name in reversed(target["enum"])}  # one of 'R' and 'r'
+        return " \\| ".join(f"`{name}`" for name in target["enum"] if spellings[name.casefold()] == name)
     kind = value.get("type")
     if kind == ["number", "string"]:
         text = "number"

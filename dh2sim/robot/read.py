@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from dh2sim.errors import Dh2simError, RobotError, UnknownRobotError
-from dh2sim.messages import Loc, did_you_mean, listed, path_of, shown
+from dh2sim.messages import Loc, did_you_mean, listed, loc_of, path_of, shown
 from dh2sim.robot.catalog import builtin_path, builtin_robots
 from dh2sim.robot.checks import check
 from dh2sim.robot.expressions import NumberError, is_name, names_in, parameter_name_problem, to_number
@@ -77,7 +77,7 @@ def parse_robot(
         return RobotSpec(**robot_fields({**tree, "source_file": source}, units_of(tree)))
     except RobotError as error:  # right in the file's units alone, such as a radius that is too small in m
         for problem in error.problems:
-            report.add(1, 1, (), f"{problem} once converted to SI units")
+            scope.report(loc_of(problem.path), f"{problem.message} once converted to SI units")
         raise report.error() from None
 
 

@@ -69,15 +69,19 @@ def _value(kind: Kind, definitions: dict[str, Any]) -> dict[str, Any]:
             name = _name(kind.of)
             if name not in definitions:
                 definitions[name] = _part(kind, definitions)
-            return {"$ref": f"#/$defs/{name}"}
+            mapping = {"$ref": f"#/$defs/{name}"}
+            if kind.list_is is None:
+                return mapping
+            return {"anyOf": [mapping, _value(kind.keys[kind.list_is], definitions)]}
         case Inertia():
             return _value(Part("", InertiaNumbers), definitions)
         case Parts():
             return {"type": "array", "items": _value(kind.item, definitions), "minItems": 1}
         case Choice():
+            letters = [spelling for short in kind.short for spelling in (short.upper(), short)]
             definitions[kind.of.__name__] = {
                 "description": _summary(kind.of),
-                "enum": [choice.value for choice in kind.of],
+                "enum": [*(choice.value for choice in kind.of), *letters],
                 "type": "string",
             }
             return {"$ref": f"#/$defs/{kind.of.__name__}"}

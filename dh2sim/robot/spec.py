@@ -97,7 +97,7 @@ class Units:
 
 
 class Convention(StrEnum):
-    """Where a row's link part stands beside its joint part."""
+    """Order of the factors of a row's transform."""
 
     STANDARD = "standard"
     """A_i = Rz(theta) Tz(d) Tx(a) Rx(alpha); distal (Paul, Spong)."""
@@ -267,7 +267,15 @@ class Row:
     """A row of the DH table: its transform at coordinate zero, how it moves and what it carries."""
 
     name: Annotated[str, Name("Default joint_<i>, counted from 1.")] = _FILLED_IN
-    type: Annotated[JointType, Choice("How the row moves.", JointType, short=JOINT_LETTERS, required=True)]
+    type: Annotated[
+        JointType,
+        Choice(
+            "How the row moves; R, P and F are short for revolute, prismatic and fixed.",
+            JointType,
+            short=JOINT_LETTERS,
+            required=True,
+        ),
+    ]
     convention: Annotated[
         Convention, Choice("Overrides the file's for this row.", Convention, other_names=CONVENTIONS)
     ] = _FILLED_IN
@@ -291,9 +299,9 @@ class Row:
         Number("beta_i, second twist, about y, in the file's angle unit; of a Hayati row alone.", Dimension.ANGLE),
     ] = 0.0
     flip: Annotated[bool, Flag("True: the joint coordinate subtracts instead.")] = False
-    limits: Annotated[Limits, Part("Limits, in the file's units.", Limits, list_is="position")] = field(
-        default_factory=Limits
-    )
+    limits: Annotated[
+        Limits, Part("Limits, in the file's units; [lower, upper] are those of position.", Limits, list_is="position")
+    ] = field(default_factory=Limits)
     dynamics: Annotated[Dynamics, Part("Joint dynamics, SI.", Dynamics)] = field(default_factory=Dynamics)
     link: Annotated[LinkSpec, Part("The link that this joint moves.", LinkSpec)] = field(default_factory=LinkSpec)
     actuator: Annotated[ActuatorSpec, Part("Overrides the file's actuators.", ActuatorSpec)] = field(

@@ -205,12 +205,12 @@ def test_the_error_is_one_of_dh2sim_and_of_values() -> None:
     assert isinstance(error.value, Dh2simError)
 
 
-def test_a_number_that_is_wrong_in_si_units_alone_is_reported_with_the_file() -> None:
+def test_a_number_that_is_wrong_in_si_units_alone_is_reported_at_its_place() -> None:
     text = "name: r\nconvention: standard\nunits: {length: mm}\njoints: [{type: fixed, link: {radius: 1e-323}}]\n"
     with pytest.raises(RobotError) as error:
         robot(text)
     assert str(error.value) == (
-        "r.yaml:1:1: joints[0].link.radius: must be greater than 0, found 0.0 once converted to SI units"
+        "r.yaml:4:39: joints[0].link.radius: must be greater than 0, found 0.0 once converted to SI units"
     )
 
 

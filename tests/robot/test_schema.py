@@ -8,8 +8,9 @@ import jsonschema
 import pytest
 from ruamel.yaml import YAML
 
+from dh2sim.errors import RobotFileError
 from dh2sim.robot.catalog import builtin_path, builtin_robots
-from dh2sim.robot.read import load_robot
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.schema import json_schema
 from tests.robot.files import FULL, MINIMAL, with_joint, with_keys
 
@@ -60,6 +61,31 @@ def test_no_key_may_be_null() -> None:
 )
 def test_right_files_are_valid(text: str) -> None:
     assert _valid(text)
+
+
+@pytest.mark.parametrize(
+    ("short", "entry"),
+    [
+        ("{type: R}", "{type: revolute}"),
+        ("{type: r}", "{type: revolute}"),
+        ("{type: P}", "{type: prismatic}"),
+        ("{type: p}", "{type: prismatic}"),
+        ("{type: F}", "{type: fixed}"),
+        ("{type: f}", "{type: fixed}"),
+        ("{type: revolute, limits: [-1, pi / 2]}", "{type: revolute, limits: {position: [-1, pi / 2]}}"),
+    ],
+)
+def test_short_spellings_are_valid_and_read_as_the_long_ones(short: str, entry: str) -> None:
+    assert _valid(with_joint(short))
+    (row,), (long,) = parse_robot(with_joint(short)).rows, parse_robot(with_joint(entry)).rows
+    assert (row.type, row.limits.position) == (long.type, long.limits.position)
+
+
+@pytest.mark.parametrize("entry", ["{type: C}", "{type: Revolute}", "{type: R, limits: [1]}", "{type: R, limits: 1}"])
+def test_spellings_that_the_reader_refuses_are_not_valid(entry: str) -> None:
+    assert not _valid(with_joint(entry))
+    with pytest.raises(RobotFileError):
+        parse_robot(with_joint(entry))
 
 
 @pytest.mark.parametrize(
