@@ -93,8 +93,8 @@ def build_model(spec: SpecLike) -> RobotModel:
         estimated=(),
     )
     bodies = [link.inertial for link in links]
-    named = named_configurations(spec)
-    home, zero = named["home"], named["zero"]
+    home = named_configurations(spec)["home"]
+    zero = np.zeros_like(home)
     seen = iter(seen_inertias(chain, bodies, home))
     joints = []
     for i, (row, joint, position) in enumerate(zip(spec.rows, chain.joints, ranges, strict=True)):

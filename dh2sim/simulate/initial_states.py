@@ -31,40 +31,33 @@ class InitialStates:
     """Where rollouts start."""
 
     name: str
-    """One of ``STARTS``, or the configuration or file that ``given`` comes from."""
+    """'random', or the configuration or file that ``given`` comes from."""
     given: Array | None = field(default=None, repr=False)
     """Joint positions and velocities, rad, m and their rates, shape (1 or rollouts, 2, n)."""
     digest: str = ""
-    """SHA-256 of ``given``."""
+    """SHA-256 of ``given``; empty for home and zero, which are the robot's."""
 
     def states(self, plant: Plant, options: RolloutOptions, rollouts: range) -> tuple[Array, Array]:
         """Return joint positions and velocities at the start of some rollouts, each of shape (batch, n).
 
         Random configurations lie inside the limits, uniformly, and no links touch in them if such are found.
         """
-        shape = (len(rollouts), plant.n)
         if self.given is not None:
             one = len(self.given) == 1
             chosen = self.given if one else self.given[rollouts.start : rollouts.stop]
             states = np.broadcast_to(chosen, (len(rollouts), 2, plant.n))
             return states[:, 0].copy(), states[:, 1].copy()
-        if self.name == "random":
-            return _random(plant, options.seed, rollouts), np.zeros(shape)
-        q = plant.home if self.name == "home" else np.zeros(plant.n)
-        return np.broadcast_to(q, shape).copy(), np.zeros(shape)
+        return _random(plant, options.seed, rollouts), np.zeros((len(rollouts), plant.n))
 
     def check(self, plant: Plant) -> None:
-        """Require positions that are given, or zero, to be inside the limits.
+        """Require positions that are given to be inside the limits.
 
         Raises:
             SettingsError: They are not; the error names the first that is not.
         """
-        if self.given is not None:
-            q = self.given[:, 0]
-        elif self.name == "zero":
-            q = np.zeros((1, plant.n))
-        else:
+        if self.given is None or self.name == "home":  # home is inside but for rounding
             return
+        q = self.given[:, 0]
         outside = (q < plant.lower) | (q > plant.upper)
         if outside.any():
             row, joint = (int(k) for k in np.argwhere(outside)[0])
@@ -88,14 +81,14 @@ def read_initial_states(
     Args:
         start: 'home', 'zero', 'random', a configuration of the robot file, or the path of a .csv or .npy file.
         joints: Names of the moving joints.
-        configurations: Those of the robot file, by name, each of shape (n,).
+        configurations: Those that have a name, each of shape (n,).
         rollouts: Number of rollouts of the run.
 
     Raises:
         SettingsError: It is none of these, or the file is wrong.
     """
     path = Path(start)
-    if start in STARTS:
+    if start == "random":
         return InitialStates(name=start)
     if start in configurations:
         states = np.zeros((1, 2, len(joints)))
@@ -103,13 +96,14 @@ def read_initial_states(
     elif path.suffix.lower() in (".csv", ".npy"):
         states = _read_file(path, joints, rollouts)
     else:
-        known = [*STARTS, *(name for name in configurations if name not in STARTS)]
+        known = list(dict.fromkeys([*STARTS, *configurations]))
         raise _refused(
             f"must be one of {listed(known)}, or a .csv or .npy file of joint positions, got {start!r}."
             f"{did_you_mean(start, known)}".rstrip(".")
         )
     frozen = read_only(states)
-    return InitialStates(name=start, given=frozen, digest=hashlib.sha256(frozen.tobytes()).hexdigest())
+    digest = "" if start in STARTS else hashlib.sha256(frozen.tobytes()).hexdigest()
+    return InitialStates(name=start, given=frozen, digest=digest)
 
 
 def _read_file(path: Path, joints: tuple[str, ...], rollouts: int) -> Array:

@@ -13,7 +13,7 @@ from dh2sim.simulate import rollout
 from dh2sim.simulate.initial_states import InitialStates, read_initial_states
 
 JOINTS = ("joint_1", "slide")
-CONFIGURATIONS = {"home": np.array([0.1, 0.2]), "folded": np.array([0.3, 0.4])}
+CONFIGURATIONS = {"home": np.array([0.1, 0.2]), "zero": np.zeros(2), "folded": np.array([0.3, 0.4])}
 COLUMNS = "Columns are joints, rad or m, and optionally slide_velocity and so on"
 
 
@@ -50,10 +50,17 @@ def npy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
     return write
 
 
-@pytest.mark.parametrize("name", ["home", "zero", "random"])
-def test_these_words_need_no_file(name: str) -> None:
+def test_random_states_are_not_given() -> None:
+    start = read("random")
+    assert (start.name, start.given, start.digest) == ("random", None, "")
+
+
+@pytest.mark.parametrize("name", ["home", "zero"])
+def test_home_and_zero_are_the_robots_and_need_no_digest(name: str) -> None:
     start = read(name)
-    assert (start.name, start.given, start.digest) == (name, None, "")
+    assert start.given is not None
+    assert start.given.tolist() == [[CONFIGURATIONS[name].tolist(), [0.0, 0.0]]]
+    assert (start.name, start.digest) == (name, "")
 
 
 def test_a_configuration_is_a_state_at_rest_for_all() -> None:

@@ -40,6 +40,11 @@ def test_zero_is_zero() -> None:
     assert not first(model("odd"), "zero").any()
 
 
+def test_zero_is_that_of_the_robot_file_if_it_has_one() -> None:
+    spec = replace(robots.arm().spec, configurations={"zero": read_only([0.25, -0.5])})
+    assert np.array_equal(first(build_model(spec), "zero"), np.tile([0.25, -0.5], (4, 1)))
+
+
 def test_a_configuration_of_the_robot_file_has_its_name() -> None:
     assert np.array_equal(first(robots.worm(), "curled"), np.tile([0.3, 1.2, 1.5, -1.7, 0.9], (4, 1)))
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian, joint_poses
@@ -17,10 +19,10 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import ActuatorType, Convention, Dynamics, JointType, LinkSpec, RobotSpec, Row
-from dh2sim.typing import read_only
+from dh2sim.typing import Array, read_only
 from dh2sim.validate.motion.free_motion import frictionless, without_contacts
 from dh2sim.validate.motion.mechanics import energy
-from dh2sim.view.motion.applied_force import drag_spring
+from dh2sim.view.motion.applied_force import LinkPoint, drag_spring, find_point
 from dh2sim.view.motion.physics import STEPS_PER_CLOCK_READING, Drive, Physics
 
 PATIENT = 600.0
@@ -46,6 +48,23 @@ def slider() -> RobotModel:
     block = LinkSpec(mass=3.0, com=read_only([0.0, 0.0, 0.0]), inertia=read_only(1e-2 * np.eye(3)))
     row = Row(name="lift", type=JointType.PRISMATIC, convention=Convention.STANDARD, link=block)
     return build_model(RobotSpec(name="slider", rows=(row,)))
+
+
+@dataclass(frozen=True)
+class ConstantForce:
+    """A force that does not depend on where its point is, unlike a spring's: what it does is known exactly."""
+
+    place: LinkPoint
+    force: Array
+
+    def force_at(self, point: Array, velocity: Array) -> Array:  # noqa: ARG002
+        return self.force
+
+
+def apply_force(physics: Physics, link: str, point: ArrayLike, force: ArrayLike) -> None:
+    """Apply a constant force, N, along base_link's axes to a point in a link's frame until ``release``."""
+    place = find_point(physics._bodies, link, point)
+    physics._force = ConstantForce(place, read_only(force))  # type: ignore[assignment]
 
 
 def simulated(physics: Physics, duration: float) -> None:
@@ -126,7 +145,7 @@ def test_the_energy_is_that_of_the_table_and_its_masses() -> None:
 def test_a_free_robot_without_friction_keeps_its_energy() -> None:
     model = without_contacts(frictionless(robot("planar_2r")))
     physics = Physics(model, model.home, drive="free")
-    physics.apply_force(model.links[-1].name, [0.0, 0.0, 0.0], [3.0, 20.0, 0.0])
+    apply_force(physics, model.links[-1].name, [0.0, 0.0, 0.0], [3.0, 20.0, 0.0])
     simulated(physics, 0.3)
     physics.release()
     before = sum(physics.energy)
@@ -164,7 +183,7 @@ def test_steps_are_the_same_one_by_one_and_together() -> None:
 def test_a_reset_puts_the_robot_at_rest_without_forces() -> None:
     model = robot("puma560")
     physics = Physics(model, model.home, drive="free")
-    physics.apply_force(model.links[-1].name, [0.0, 0.0, 0.0], [10.0, 0.0, 0.0])
+    apply_force(physics, model.links[-1].name, [0.0, 0.0, 0.0], [10.0, 0.0, 0.0])
     simulated(physics, 0.5)
     physics.set_drive("position")
     q = model.home + 0.1
@@ -182,7 +201,7 @@ def test_a_robot_yields_to_a_force_as_its_jacobian_and_stiffness_predict() -> No
     T = forward_kinematics(model.chain, model.home)
     point = np.linalg.inv(joint_poses(model.chain, model.home)[-1]) @ T[:, 3]
     force = np.array([3.0, -4.0, 5.0])
-    physics.apply_force(model.links[-1].name, point[:3], force)
+    apply_force(physics, model.links[-1].name, point[:3], force)
     simulated(physics, 5.0)
     torque = geometric_jacobian(model.chain, physics.q)[:3].T @ force
     stiffness = np.array([joint.actuator.kp for joint in with_actuators(model, ActuatorType.POSITION).moving_joints])
@@ -199,8 +218,8 @@ def test_a_robot_yields_to_a_force_as_its_jacobian_and_stiffness_predict() -> No
 
 def test_a_force_keeps_its_direction_while_the_link_turns() -> None:
     physics = Physics(pendulum(), [0.0], gravity=False, drive="free")
-    physics.apply_force("link_1", [0.5, 0.0, 0.0], [0.0, 4.0, 0.0])
-    # the apply_force is to this pendulum what its weight is to one that hangs: it swings about pi/2
+    apply_force(physics, "link_1", [0.5, 0.0, 0.0], [0.0, 4.0, 0.0])
+    # the force is to this pendulum what its weight is to one that hangs: it swings about pi/2
     work = []
     for _ in range(500):
         physics.step()
@@ -288,7 +307,7 @@ def test_an_unstable_simulation_stops_with_a_reason_and_a_reset_starts_it_again(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     physics = Physics(model, [0.1], drive="free", gravity=False)
-    physics.apply_force("link_1", [lever, 0.0, 0.0], force)
+    apply_force(physics, "link_1", [lever, 0.0, 0.0], force)
     assert physics.advance(1.0, time_budget_s=PATIENT) == 0.0
     assert re.fullmatch(message, physics.stopped), physics.stopped
     assert physics.q == pytest.approx([0.1]), "the last good state"
@@ -305,7 +324,7 @@ def test_an_unstable_simulation_stops_with_a_reason_and_a_reset_starts_it_again(
 
 def test_what_was_good_before_an_instability_counts_as_simulated() -> None:
     physics = Physics(pendulum(), [0.0], drive="free", gravity=False)
-    physics.apply_force("link_1", [0.5, 0.0, 0.0], [0.0, 2.4e5, 0.0])
+    apply_force(physics, "link_1", [0.5, 0.0, 0.0], [0.0, 2.4e5, 0.0])
     done = physics.advance(1.0, time_budget_s=PATIENT)
     assert 0.0 < done < 1.0
     assert physics.stopped.startswith(f"The simulation became unstable at {done + physics.timestep:.3f} s: swing")
@@ -339,7 +358,7 @@ def test_dry_friction_and_damping_of_the_file_act_on_free_joints() -> None:
 
 
 @pytest.mark.parametrize(
-    ("link", "point", "force", "message"),
+    ("link", "point", "target", "message"),
     [
         (
             "link_9",
@@ -348,25 +367,18 @@ def test_dry_friction_and_damping_of_the_file_act_on_free_joints() -> None:
             "unknown link 'link_9'. Did you mean 'link_1'? Links: base_link, link_1",
         ),
         ("link_1", [0.0, math.nan, 0.0], [0.0] * 3, "the point must be three finite numbers, got [0.0, nan, 0.0]"),
-        ("link_1", [0.0] * 3, [1.0, 2.0], "the force must be three finite numbers, got [1.0, 2.0]"),
+        ("link_1", [0.0] * 3, [1.0, 2.0], "the target must be three finite numbers, got [1.0, 2.0]"),
+        ("link_1", [0.0] * 3, [math.inf, 0.0, 0.0], "the target must be three finite numbers, got [inf, 0.0, 0.0]"),
     ],
-    ids=["link", "point", "force"],
+    ids=["link", "point", "target", "finite target"],
 )
-def test_a_force_on_an_unknown_link_or_point_is_refused(
-    link: str, point: list[float], force: list[float], message: str
+def test_dragging_an_unknown_link_or_point_or_to_no_point_is_refused(
+    link: str, point: list[float], target: list[float], message: str
 ) -> None:
     physics = Physics(pendulum(), [0.0])
     with pytest.raises(ConfigurationError, match=f"^{re.escape(message)}$"):
-        physics.apply_force(link, point, force)
+        physics.drag(link, point, target)
     assert physics.applied_force is None
-
-
-def test_an_invalid_target_is_refused() -> None:
-    physics = Physics(pendulum(), [0.0])
-    with pytest.raises(
-        ConfigurationError, match=r"^the target must be three finite numbers, got \[inf, 0\.0, 0\.0\]$"
-    ):
-        physics.drag("link_1", [0.0] * 3, [math.inf, 0.0, 0.0])
 
 
 def test_an_invalid_joint_vector_is_refused_and_changes_nothing() -> None:

@@ -223,11 +223,6 @@ def next_axis(chain: SerialChain, index: int, T: Array) -> Line | None:
     return None
 
 
-def same_line(first: Line, second: Line, tolerances: Tolerances) -> bool:
-    """Whether two parallel lines are one."""
-    return distance_of_parallels(first, second) <= tolerances.length
-
-
 def _through(point: Array, line: Line) -> Line:
     return Line(point=np.asarray(point), direction=line.direction)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import mujoco
 import numpy as np
@@ -107,19 +106,6 @@ class LinkPoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ConstantForce:
-    """A force with a constant direction and size."""
-
-    place: LinkPoint
-    force: Array
-    """N, shape (3,)."""
-
-    def force_at(self, point: Array, velocity: Array) -> Array:  # noqa: ARG002
-        """Return the force, N, shape (3,)."""
-        return self.force
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SpringForce:
     """The force of a spring."""
 
@@ -133,10 +119,7 @@ class SpringForce:
         return spring_force(self.spring, point, velocity, self.target)
 
 
-AppliedForce: TypeAlias = ConstantForce | SpringForce
-
-
-def joint_forces(applied: AppliedForce, model: mujoco.MjModel, data: mujoco.MjData) -> Array:
+def joint_forces(applied: SpringForce, model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """Return the joint forces of an applied force, N·m or N, shape (nv,), by the principle of virtual work."""
     jacobian = applied.place.jacobian(model, data)
     with np.errstate(over="ignore", invalid="ignore"):  # the result is checked after the time step

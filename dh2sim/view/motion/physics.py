@@ -18,8 +18,6 @@ from dh2sim.simulate.mujoco_runtime import quiet_engine
 from dh2sim.typing import Array, read_only
 from dh2sim.validate.motion.free_motion import compile_model
 from dh2sim.view.motion.applied_force import (
-    AppliedForce,
-    ConstantForce,
     SpringForce,
     drag_spring,
     find_point,
@@ -101,7 +99,7 @@ class Physics:
         self._bodies = {link.name: int(self._model.body(link.name).id) for link in model.all_links}
         self._driven = [int(self._model.jnt_qposadr[joint]) for joint in self._model.actuator_trnid[:, 0]]
         self._speed_limit = SpeedLimit(self._model, size=model.reach)
-        self._force: AppliedForce | None = None
+        self._force: SpringForce | None = None
         self._targets = self._vector(q)
         self._stopped = ""
         self.set_gravity(gravity)
@@ -185,20 +183,6 @@ class Physics:
         if drive not in ("position", "free"):
             raise ValueError(f"drive must be 'position' or 'free', got {drive!r}")
         self._switch(mujoco.mjtDisableBit.mjDSBL_ACTUATION, off=drive == "free")
-
-    def apply_force(self, link: str, point_in_link: ArrayLike, force: ArrayLike) -> None:
-        """Apply a constant force to a link until ``release``.
-
-        Args:
-            link: Name of the link.
-            point_in_link: Where, in the link's frame, m, shape (3,).
-            force: N, along base_link's axes however the link turns, shape (3,).
-
-        Raises:
-            ConfigurationError: The link is unknown, or numbers are not three finite ones.
-        """
-        place = find_point(self._bodies, link, point_in_link)
-        self._force = ConstantForce(place=place, force=finite_vector(force, "the force"))
 
     def drag(self, link: str, point_in_link: ArrayLike, target: ArrayLike) -> None:
         """Drag a link towards a point by a spring until ``release``; call it again when the point moves.
