@@ -363,6 +363,24 @@ class Robot:
 
         return geometric_jacobian(self.chain, self._vectors(q), frame=frame)
 
+    def singular_values(self, q: ArrayLike, frame: str = "tool0") -> Array:
+        """Return the singular values of the geometric Jacobian, largest first, shape (..., min(6, n)).
+
+        The arguments and errors are those of :meth:`jacobian`.
+        """
+        from dh2sim.kinematics.singularity import singular_values
+
+        return singular_values(self.jacobian(q, frame))
+
+    def manipulability(self, q: ArrayLike, frame: str = "tool0") -> Array:
+        """Return the product of the singular values, Yoshikawa's measure, shape (...); zero in a singularity.
+
+        The arguments and errors are those of :meth:`jacobian`.
+        """
+        from dh2sim.kinematics.singularity import manipulability
+
+        return manipulability(self.jacobian(q, frame))
+
     def _vectors(self, q: ArrayLike) -> ArrayLike:
         if not isinstance(q, str):
             return q
@@ -463,9 +481,9 @@ class Robot:
             threads: Number of threads, 0 for one a processor. The result does not depend on it.
             resume: Whether to continue the run at ``out``, if there is one.
             overwrite: Whether to replace the run at ``out``.
-            **options: What is simulated and recorded, as for :func:`dh2sim.simulate.rollout`: ``controller``,
-                ``seed``, ``duration`` or ``steps``, ``timestep``, ``integrator``, ``start``, ``record``, ``every``,
-                ``randomize``, ``floating_base``.
+            **options: What is simulated and recorded, as for :func:`dh2sim.simulate.rollout`: ``controller`` (its
+                name, or a class of your own), ``seed``, ``duration`` or ``steps``, ``timestep``, ``integrator``,
+                ``start``, ``record``, ``every``, ``randomize``, ``floating_base``.
 
         Returns:
             The dataset, as ``docs/dataset.md`` describes it; read lazily from ``out`` if that is given.

@@ -16,6 +16,7 @@ import pytest
 import dh2sim
 from dh2sim import Continuous, Fixed, Pose, Prismatic, Revolute, Robot
 from dh2sim.errors import ConfigurationError, Dh2simError, OutputError, UnknownFrameError
+from dh2sim.kinematics.singularity import manipulability, singular_values
 from dh2sim.robot.spec import Convention, JointType
 
 GENERATED = Path(__file__).parents[1] / "generated"
@@ -69,6 +70,8 @@ def test_kinematics_take_any_batch_and_agree_with_the_functions(name: str) -> No
     q = robot.random_configurations(6, seed=3).reshape(2, 3, robot.n)
     assert np.array_equal(robot.fk(q), dh2sim.forward_kinematics(robot.chain, q))
     assert np.array_equal(robot.jacobian(q), dh2sim.geometric_jacobian(robot.chain, q))
+    assert np.array_equal(robot.singular_values(q), singular_values(robot.jacobian(q)))
+    assert np.array_equal(robot.manipulability(q, "dh_2"), manipulability(robot.jacobian(q, "dh_2")))
     assert np.array_equal(robot.jacobian(q, "dh_2"), dh2sim.geometric_jacobian(robot.chain, q, frame="dh_2"))
     for i, frame in enumerate(["dh_0", "dh_1", "dh_2"]):
         assert np.array_equal(robot.fk(q, frame=frame), dh2sim.frame_poses(robot.chain, q)[..., i, :, :])

@@ -37,7 +37,7 @@ class RolloutKeywords(TypedDict, total=False):
     duration: float | None
     timestep: float
     integrator: str
-    controller: str
+    controller: str | type
     start: str
     seed: SupportsIndex
     record: str | Sequence[str]
@@ -96,6 +96,10 @@ def _text(value: object) -> str:
     if not isinstance(value, str):
         raise _OptionError(f"must be text, got {value!r}")
     return value
+
+
+def _controller(value: object) -> str | type:
+    return value if isinstance(value, type) else _text(value)
 
 
 def _integrator(value: object) -> str:
@@ -171,8 +175,8 @@ class RolloutOptions:
     """s."""
     integrator: str = _option("implicitfast", _integrator)
     """'Euler', 'RK4', 'implicit' or 'implicitfast'."""
-    controller: str = _option("sine", _text)
-    """``NAME`` or ``NAME:key=value,…``; ``MODULE:CLASS`` or ``MODULE:CLASS:key=value,…`` of your own."""
+    controller: str | type = field(default="sine", metadata={"read": _controller})
+    """``NAME`` or ``NAME:key=value,…``; of your own ``MODULE:CLASS``, ``MODULE:CLASS:key=value,…``, or the class."""
     start: str = _option("home", _text)
     """'home', 'zero', 'random', a configuration of the robot file, or a .csv or .npy file of states."""
     seed: int = _option(0, partial(_whole, least=0))

@@ -59,16 +59,19 @@ BUILT_IN: Final[Mapping[str, type]] = MappingProxyType(
 )
 
 
-def choose(text: str) -> ControllerChoice:
+def choose(text: str | type) -> ControllerChoice:
     """Return the controller that a text names.
 
     Args:
         text: ``NAME`` or ``NAME:key=value,…`` of a controller of dh2sim or of an installed package, or
-            ``MODULE:CLASS`` or ``MODULE:CLASS:key=value,…`` of a user's class.
+            ``MODULE:CLASS`` or ``MODULE:CLASS:key=value,…`` of a user's class; or the class, whose options have
+            their defaults.
 
     Raises:
         ControllerError: The controller is unknown, its options or files are wrong, or its code failed.
     """
+    if isinstance(text, type):
+        return _choice(f"{text.__module__}:{text.__qualname__}", text, "", own=False)
     head, _, rest = text.partition(":")
     name = head.strip()
     if name in BUILT_IN:

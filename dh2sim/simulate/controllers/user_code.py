@@ -169,7 +169,7 @@ def source_digest(found: type) -> str:
         if base.__module__.split(".")[0] not in ("dh2sim", "builtins", "typing", "abc"):
             try:
                 sources.add(inspect.getsourcefile(base))
-            except TypeError:  # defined in an interactive session
+            except (OSError, TypeError):  # defined in an interactive session
                 continue
     digests = [hashlib.sha256(Path(source).read_bytes()) for source in sorted(filter(None, sources))]
     if len(digests) < 2:

@@ -9,8 +9,10 @@ import pytest
 
 from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import ActuatorType
-from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, OpenLoop
+from dh2sim.simulate import rollout
+from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, Observation, OpenLoop, RolloutBatch
 from dh2sim.simulate.controllers.registry import choose
+from dh2sim.typing import Array
 from tests.simulate.controllers.own_code import SWING, line, write
 from tests.simulate.controllers.samples import arm, make, observe
 
@@ -33,6 +35,30 @@ def test_a_class_in_the_current_directory_is_a_controller(folder: Path) -> None:
     assert not isinstance(controller, OpenLoop | Follows)
     q, v = np.random.default_rng(2).normal(size=(2, 7, 3))
     assert np.array_equal(controller.control(observe(group.plant, 0, q, v)), -2.0 * v)
+
+
+def test_a_class_itself_is_the_controller_that_its_name_stands_for(folder: Path) -> None:
+    write(folder, "swinging.py", SWING)
+    named = choose("swinging:Swing")
+    given = choose(sys.modules["swinging"].Swing)
+    assert given == named
+    assert given.digest == named.digest
+
+
+def test_a_class_of_an_interactive_session_is_a_controller() -> None:
+    class Sink:
+        actuation = "motor"
+
+        def __init__(self, batch: RolloutBatch, *, damping: float = 4.0) -> None:  # noqa: ARG002
+            self.damping = damping
+
+        def control(self, observation: Observation) -> Array:
+            return -self.damping * observation.v
+
+    Sink.__module__, Sink.__qualname__ = "__main__", "Sink"
+    run = rollout(arm(), rollouts=2, steps=5, controller=Sink)
+    assert run.attrs["controller"] == "__main__:Sink"
+    assert np.isfinite(run.qpos.values).all()
 
 
 def test_a_class_in_a_package_is_a_controller(folder: Path) -> None:
