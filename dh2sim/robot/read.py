@@ -245,6 +245,11 @@ def _find(given: str) -> tuple[Path, str]:
     if builtin is not None:
         return builtin, builtin.name
     known = builtin_robots()
-    hint = did_you_mean(given.removesuffix(".yaml"), known)
+    here = f"{given}.yaml"
+    hint = (
+        f" Did you mean '{here}'?"
+        if given and Path(here).is_file()
+        else did_you_mean(given.removesuffix(".yaml"), known)
+    )
     list_of_them = f"Robots that come with dh2sim: {listed(known)}"
     raise UnknownRobotError(f"there is no file and no robot named {shown(given)}.{hint} {list_of_them}")

@@ -41,6 +41,14 @@ def test_a_path_that_exists_wins_over_a_built_in_name(
     assert run.out.startswith("mine: pose of tool0 in base_link\n")
 
 
+def test_a_robot_file_named_without_its_ending_is_offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, small("mine"), "mine")
+    run = dh2sim("fk", "mine", "home")
+    assert (run.status, run.out) == (2, "")
+    assert run.err.startswith("dh2sim: there is no file and no robot named 'mine'. Did you mean 'mine.yaml'? ")
+
+
 def test_two_robots_of_one_name_are_refused(tmp_path: Path) -> None:
     left, right = write(tmp_path, small("arm"), "left"), write(tmp_path, small("arm"), "right")
     message = f"{left} and {right}: both robots are named 'arm', but each needs a folder of its own name"
