@@ -248,7 +248,7 @@ def _find(given: str) -> tuple[Path, str]:
     here = f"{given}.yaml"
     hint = (
         f" Did you mean '{here}'?"
-        if given and Path(here).is_file()
+        if given and os.path.isfile(here)
         else did_you_mean(given.removesuffix(".yaml"), known)
     )
     list_of_them = f"Robots that come with dh2sim: {listed(known)}"
