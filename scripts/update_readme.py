@@ -2,8 +2,8 @@
 """Update the pages that show what commands print, and the accuracy table of docs/validation.md.
 
 Every block of README.md and docs/importing.md that begins with ``$ dh2sim …`` is run, all of a page in one folder and
-80 columns wide, without the optional engine pinocchio, which README's first line does not install. The accuracy table is
-the worst pose error of every engine on every robot, over 1000 configurations; its last digits depend on the machine.
+80 columns wide, without the optional engine pinocchio, which README's first line does not install. The accuracy table
+shows the worst pose error of every engine on every robot at 1000 configurations; its last digits vary by machine.
 """
 
 from __future__ import annotations

@@ -96,10 +96,41 @@ class LazyGroup(TyperGroup):
             ctx.fail(f"unknown command {shown(name)}.{did_you_mean(name, COMMANDS)}".rstrip("."))
         return super().resolve_command(ctx, args)
 
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; report a wrong value of an option in the words of this program."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            error.message = _plain(error)
+            raise
+
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002
         """List the commands without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, command.help) for name, command in COMMANDS.items()])
+
+
+_PLAIN: Final = {
+    "int_parsing": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "float_parsing": "must be a number",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than_equal": "must be at most {le:g}",
+}
+"""What is required of a value, by the kind of pydantic's error."""
+
+
+def _plain(error: typer.BadParameter) -> str:
+    """Return the message for a wrong value; typer passes on that of pydantic, which does not quote the value."""
+    details: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
+    required = _PLAIN.get(details[0]["type"]) if details else None
+    if required is None:
+        return error.message
+    from dh2sim.messages import shown
+
+    value = details[0]["input"]
+    limits = details[0].get("ctx", {})
+    return f"{required.format(**limits)}, got {value if 'ge' in limits or 'le' in limits else shown(value)}"
 
 
 _SETTINGS: Final = {"help_option_names": ["-h", "--help"], "max_content_width": 100}

@@ -8,7 +8,7 @@ import os
 import re
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ParamSpec, TypeVar
@@ -70,8 +70,17 @@ RobotsArgument = Annotated[
 ]
 
 
-def choice(text: str | None, words: type[Word], option: str, *, without: tuple[Word, ...] = ()) -> Word | None:
+def choice(
+    text: str | None,
+    words: type[Word],
+    option: str,
+    *,
+    without: tuple[Word, ...] = (),
+    other_names: Mapping[str, str] | None = None,
+) -> Word | None:
     """Return the member of an enumeration that the value of an option names; None if it was not given.
+
+    ``other_names`` are what people call its members elsewhere, for the message.
 
     Raises:
         BadParameter: The value names no member.
@@ -84,7 +93,8 @@ def choice(text: str | None, words: type[Word], option: str, *, without: tuple[W
         from dh2sim.messages import did_you_mean, shown
 
         names = [word.value for word in allowed]
-        hint = did_you_mean(text, names)
+        meant = (other_names or {}).get(text.lower())
+        hint = f" It is called '{meant}' here" if meant in names else did_you_mean(text, names)
         raise typer.BadParameter(
             f"{shown(text)} is not one of {', '.join(names)}.{hint}".rstrip("."), param_hint=option
         )
@@ -188,26 +198,31 @@ def refuse_other_formats(robot: str) -> None:
     Raises:
         Dh2simError: The file's ending or content is that of another format than a robot file's.
     """
-    path = Path(robot)
-    if not robot or not path.is_file():
-        return
+    kind = other_format(robot)
+    if kind is not None:
+        import shlex
+
+        path = Path(robot)
+        name = f"{path.stem}.yaml"
+        if name == path.name:
+            name = f"{path.stem}_imported.yaml"
+        raise Dh2simError(
+            f"{robot}: this is {kind}, not a robot file: run 'dh2sim import {shlex.quote(robot)} -o "
+            f"{shlex.quote(name)}' first"
+        )
+
+
+def other_format(file: str) -> str | None:
+    """Return what a file is, from how it begins and from its ending; None for what may be YAML, or cannot be read."""
+    path = Path(file)
+    if not file or not path.is_file():
+        return None
     try:
         with path.open("rb") as stream:
             head = stream.read(8192).removeprefix(b"\xef\xbb\xbf").lstrip()
     except OSError:
-        return  # whoever reads it reports that
-    kind = _other_format(head, path.suffix.lower())
-    if kind is not None:
-        import shlex
-
-        name = shlex.quote(f"{path.stem}.yaml")
-        raise Dh2simError(
-            f"{robot}: this is {kind}, not a robot file: run 'dh2sim import {shlex.quote(robot)} -o {name}' first"
-        )
-
-
-def _other_format(head: bytes, suffix: str) -> str | None:
-    """Return what a file is, from how it begins and from its ending; None for what may be a robot file."""
+        return None  # whoever reads it reports that
+    suffix = path.suffix.lower()
     if head.startswith(b"<"):
         found = _XML_ROOT.match(head)
         root = b"" if found is None else found[1]

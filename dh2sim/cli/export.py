@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 def export(
     robots: RobotsArgument,
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder to write to; each robot gets a folder of its own in it.")
+        Path,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Folder to write to; each robot gets a folder of its own in it."
+        ),
     ] = Path("generated"),
     formats: Annotated[
         list[str] | None,

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, choice, load_all, tolerance_of
+from dh2sim.cli.common import RobotArgument, choice, load_all, other_format, tolerance_of
 from dh2sim.cli.output import hand_over, require_free
-from dh2sim.errors import ImportedFileError, MissingExtraError
+from dh2sim.errors import Dh2simError, ImportedFileError, MissingExtraError
 
 if TYPE_CHECKING:
     from dh2sim.importing.result import Imported
@@ -74,13 +74,15 @@ def import_robot(
       dh2sim import - --convention standard < table.csv
     """
     from dh2sim.importing.sources import STDIN, ImportOptions, import_data, read_file
-    from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
+    from dh2sim.robot.spec import CONVENTIONS, AngleUnit, Convention, LengthUnit
 
     require_free(out, force=force)
     options = ImportOptions(
         base=base,
         tip=tip,
-        convention=choice(convention, Convention, "--convention", without=(Convention.HAYATI,)),
+        convention=choice(
+            convention, Convention, "--convention", without=(Convention.HAYATI,), other_names=CONVENTIONS
+        ),
         angle=choice(angle, AngleUnit, "--angle"),
         length=choice(length, LengthUnit, "--length"),
         tolerance=tolerance_of(tolerance),
@@ -89,6 +91,7 @@ def import_robot(
     )
     folder = Path.cwd() if out is None else out.resolve().parent
     data = sys.stdin.buffer.read() if file == STDIN else read_file(Path(file))
+    _refuse_yaml(data, file)
     try:
         imported = import_data(data, file, options, folder=folder)
     except ImportedFileError as error:
@@ -96,6 +99,39 @@ def import_robot(
             replace(problem, message=_with_options(problem.message)) for problem in error.problems
         ) from error
     hand_over(imported.text, out, summary=summary(imported), notes=imported.notes, quiet=quiet)
+
+
+def _refuse_yaml(data: bytes, file: str) -> None:
+    """Refuse robot files and axes files, which are not imported.
+
+    Raises:
+        Dh2simError: It is one.
+    """
+    if not file.lower().endswith((".yaml", ".yml")):
+        return
+    if re.search(rb"^joints\s*:", data, re.MULTILINE):
+        raise Dh2simError(f"{file}: this is a robot file already; 'dh2sim info {shlex.quote(file)}' shows its table")
+    if re.search(rb"^axes\s*:", data, re.MULTILINE):
+        raise Dh2simError(f"{file}: this lists joint axes: run 'dh2sim frames {shlex.quote(file)}'")
+
+
+def _read_axes_file(file: str) -> bytes:
+    """Return the content of an axes file.
+
+    Raises:
+        Dh2simError: It cannot be read, or is something else: a robot file, a URDF, an MJCF, a table.
+    """
+    from dh2sim.importing.sources import read_file
+
+    data = read_file(Path(file))
+    kind = other_format(file)
+    if kind is not None:
+        raise Dh2simError(f"{file}: this is {kind}, not a list of axes: run 'dh2sim import {shlex.quote(file)}'")
+    if re.search(rb"^joints\s*:", data, re.MULTILINE) and not re.search(rb"^axes\s*:", data, re.MULTILINE):
+        raise Dh2simError(
+            f"{file}: this is a robot file, not a list of axes; 'dh2sim info {shlex.quote(file)}' shows its table"
+        )
+    return data
 
 
 _ARGUMENT = re.compile(r"\b(tip|convention|angle|length)=('[^']*'|\"[^\"]*\")")
@@ -164,16 +200,16 @@ def frames(
       dh2sim frames axes.yaml
       dh2sim frames axes.yaml --explain -o arm.yaml
     """
-    from dh2sim.importing.sources import import_axes, read_file
+    from dh2sim.importing.sources import import_axes
     from dh2sim.robot.axes_file import read_axes
-    from dh2sim.robot.spec import Convention
+    from dh2sim.robot.spec import CONVENTIONS, Convention
 
-    chosen = choice(convention, Convention, "--convention", without=(Convention.HAYATI,))
+    chosen = choice(convention, Convention, "--convention", without=(Convention.HAYATI,), other_names=CONVENTIONS)
     allowed = tolerance_of(tolerance)
     if picture is not None:
         _require_frame_figure(picture)
     require_free(out, force=force)
-    spec = read_axes(read_file(Path(axes)), file=axes, directory=Path(axes).parent)
+    spec = read_axes(_read_axes_file(axes), file=axes, directory=Path(axes).parent)
     drawing = picture
     if drawing is None and explain:
         drawing = (out.parent if out is not None else Path()) / f"{spec.name}-frames.svg"
@@ -222,9 +258,9 @@ def convert(
       dh2sim convert my_arm.yaml --to standard -o my_arm_standard.yaml
     """
     from dh2sim.importing.convert import convert_robot
-    from dh2sim.robot.spec import Convention
+    from dh2sim.robot.spec import CONVENTIONS, Convention
 
-    target = choice(to, Convention, "--to", without=(Convention.HAYATI,))
+    target = choice(to, Convention, "--to", without=(Convention.HAYATI,), other_names=CONVENTIONS)
     require_free(out, force=force)
     [spec] = load_all([robot])
     folder = Path.cwd() if out is None else out.resolve().parent

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -96,8 +97,18 @@ def _coordinates(spec: RobotSpec, words: Sequence[str], units: Units) -> tuple[f
         try:
             values.append(units.coordinate(evaluate(part, {}), turns=row.type.turns))
         except ExpressionError as error:
-            raise ConfigurationError(f"{row.name}: {error}") from None
+            raise ConfigurationError(f"{row.name}: {_unit_hint(part, _unit(row, units)) or error}") from None
     return tuple(values)
+
+
+def _unit_hint(text: str, unit: str) -> str:
+    """Return what is wrong with a number that has a unit; empty for other mistakes."""
+    from dh2sim.messages import shown
+    from dh2sim.robot.fields import WITH_UNIT
+
+    if re.fullmatch(WITH_UNIT, text.strip()) is None:
+        return ""
+    return f"{shown(text)} has a unit; write the number alone, in {unit}"
 
 
 def split(words: Sequence[str], count: int) -> list[str]:

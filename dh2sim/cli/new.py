@@ -66,7 +66,7 @@ def new(
     """
     from dh2sim.robot.fields import name_problem
     from dh2sim.robot.read import parse_robot
-    from dh2sim.robot.spec import Convention
+    from dh2sim.robot.spec import CONVENTIONS, Convention
 
     name = name.removesuffix(".yaml")
     if (problem := name_problem(name)) is not None:
@@ -74,7 +74,7 @@ def new(
     path = Path(f"{name}.yaml") if out is None else out
     require_free(path, force=force)
     if source is None:
-        kind = choice(convention, Convention, "--convention") or Convention.STANDARD
+        kind = choice(convention, Convention, "--convention", other_names=CONVENTIONS) or Convention.STANDARD
         text = template(name, _types(DEFAULT_JOINTS if joints is None else joints), kind)
     elif joints is not None or convention is not None:
         option = "--convention" if joints is None else "--joints"

@@ -33,7 +33,10 @@ def render(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="File to write: .mp4, .gif or .png. [default: RUN-<rollout>.mp4 or ROBOT.png]"
+            "--out",
+            "-o",
+            metavar="FILE",
+            help="File to write: .mp4, .gif or .png. [default: RUN-<rollout>.mp4 or ROBOT.png]",
         ),
     ] = None,
     size: Annotated[
@@ -166,7 +169,12 @@ def plot(
     what: Annotated[str, typer.Option(metavar="joints|tool|energy|tracking", help="What to plot.")] = "joints",
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="File to write: .png, .svg or .pdf. [default: RUN-<rollout>-<what>.png]"),
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE",
+            help="File to write: .png, .svg or .pdf. [default: RUN-<rollout>-<what>.png]",
+        ),
     ] = None,
     size: Annotated[
         str | None, typer.Option(metavar="WIDTHxHEIGHT", help="Size in pixels. [default: depends on the plot]")

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 def rollout(
     robot: RobotArgument,
-    out: Annotated[Path, typer.Option(metavar="RUN.zarr", help="Folder to write the run to.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="RUN.zarr", help="Folder to write the run to.")],
     rollouts: Annotated[int, typer.Option(metavar="N", help="Number of rollouts.")] = 256,
     duration: Annotated[
         float | None,

@@ -35,7 +35,9 @@ def runs(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="File to write. [default: RUN.parquet or RUN.h5, beside the run]"),
+        typer.Option(
+            "--out", "-o", metavar="FILE", help="File to write. [default: RUN.parquet or RUN.h5, beside the run]"
+        ),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite existing files.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,

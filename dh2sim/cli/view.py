@@ -60,6 +60,8 @@ def view(
         raise typer.BadParameter(
             "needs a run and --export; a page lets you choose the rollout", param_hint="--rollout"
         )
+    if export is not None and export.suffix.lower() not in (".html", ".htm"):
+        raise typer.BadParameter(f"must be a file that ends in .html, got {str(export)!r}", param_hint="--export")
     require_free(export, force=force)
     from dh2sim.view.initial_state import folder_of, open_state
 

@@ -229,6 +229,8 @@ class _Parser:
     def _name(self, name: str) -> float:
         if name in FUNCTIONS:
             raise ExpressionError(f"'{name}' is a function; write {name}(...)")
+        if name.casefold() in ("nan", "inf", "infinity") and name not in self._names:
+            raise ExpressionError(f"{shown(name)} is not a finite number")
         try:
             value = CONSTANTS[name] if name in CONSTANTS else self._names[name]
         except KeyError:

@@ -214,10 +214,11 @@ class Number(Kind):
         return units.to_si(value, self.dimension, turns=turns)
 
 
-_WITH_UNIT: Final = (
+WITH_UNIT: Final = (
     r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*"
     r"(deg|degrees?|°|rad|radians?|mm|cm|m|in|inch|inches|kg|g|Nm|N·m|N)"
 )
+"""A number with a unit: two groups."""
 _SPELLINGS: Final = {
     "°": "deg",
     "degree": "deg",
@@ -244,7 +245,7 @@ def number_hint(text: str, dimension: Dimension | None, loc: Loc, scope: Scope) 
             what = shown(text) if whole else f"in {shown(text)}: {shown(unknown[0])}"
             zero = ", or write 0" if whole else ""
             return f"{what} looks like the joint variable; leave it out{zero}: the joint coordinate adds to {moving}"
-    found = re.fullmatch(_WITH_UNIT, text.strip())
+    found = re.fullmatch(WITH_UNIT, text.strip())
     if found is None:
         return None
     number, unit = found[1], _SPELLINGS.get(found[2], found[2])

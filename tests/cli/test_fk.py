@@ -215,6 +215,9 @@ OPTIONS = "Options: --frame, --from, --to, --all, --degrees, --radians, --json, 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        ("45deg 0 0 0 0 0", "joint_1: '45deg' has a unit; write the number alone, in deg"),
+        ("0 0 400mm 0 0 0", "joint_3: '400mm' has a unit; write the number alone, in m"),
+        ("0 0 0 nan 0 0", "joint_4: 'nan' is not a finite number"),
         ("1 2", f"stanford has 6 joint coordinates, got 2: {JOINTS}"),
         ("1", f"stanford has 6 joint coordinates, got 1: {JOINTS}"),
         ("--radians 1", f"stanford has 6 joint coordinates, got 1: {JOINTS.replace('deg', 'rad')}"),

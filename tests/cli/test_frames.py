@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dh2sim.robot.read import parse_robot
-from tests.program import contents, dh2sim
+from tests.program import Outcome, contents, dh2sim
 
 AXES = """\
 name: two
@@ -83,3 +83,21 @@ def test_mistakes_in_the_axes_are_reported_all_at_once_with_their_places(tmp_pat
 def test_the_convention_is_the_one_asked_for(axes: Path) -> None:
     run = dh2sim("frames", axes, "--convention", "modified")
     assert {row.convention.value for row in parse_robot(run.out).rows} == {"modified"}
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "reason"),
+    [
+        ("arm.urdf", "<robot name='arm'/>", "this is a URDF, not a list of axes: run 'dh2sim import {file}'"),
+        ("arm.md", "| a | d |\n", "this is a Markdown table, not a list of axes: run 'dh2sim import {file}'"),
+        (
+            "arm.yaml",
+            "joints: []\n",
+            "this is a robot file, not a list of axes; 'dh2sim info {file}' shows its table",
+        ),
+    ],
+)
+def test_other_files_than_axes_are_named(tmp_path: Path, name: str, text: str, reason: str) -> None:
+    file = tmp_path / name
+    file.write_text(text)
+    assert dh2sim("frames", file) == Outcome(status=2, out="", err=f"dh2sim: {file}: {reason.format(file=file)}\n")

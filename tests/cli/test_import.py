@@ -11,7 +11,7 @@ import pytest
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
 from dh2sim.robot.read import load_robot, parse_robot
-from tests.program import contents, dh2sim, dh2sim_process
+from tests.program import Outcome, contents, dh2sim, dh2sim_process
 
 CSV = "theta,d (m),a (m),alpha (deg)\nq1,0.4,0,-90\nq2,0.15,0,90\n"
 
@@ -128,3 +128,14 @@ def test_a_broken_file_is_reported_with_its_place_and_without_a_traceback(tmp_pa
     assert (run.status, run.out) == (2, "")
     assert run.err.startswith(f"{path}:3:")
     assert "Traceback" not in run.err
+
+
+def test_a_robot_file_and_axes_are_not_imported(tmp_path: Path) -> None:
+    robot, axes = tmp_path / "arm.yaml", tmp_path / "axes.yaml"
+    robot.write_text("name: arm\nconvention: standard\njoints: [{type: revolute}]\n")
+    axes.write_text("name: arm\naxes:\n  - {type: revolute, point: [0, 0, 0], direction: [0, 0, 1]}\n")
+    for file, reason in (
+        (robot, f"this is a robot file already; 'dh2sim info {robot}' shows its table"),
+        (axes, f"this lists joint axes: run 'dh2sim frames {axes}'"),
+    ):
+        assert dh2sim("import", file) == Outcome(status=2, out="", err=f"dh2sim: {file}: {reason}\n")

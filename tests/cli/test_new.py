@@ -100,7 +100,8 @@ def test_a_file_is_never_overwritten_without_force() -> None:
         (["arm", "--joints", "R" * 101], "Invalid value for --joints: needs 1 to 100 letters, got 101"),
         (
             ["arm", "--convention", "craig"],
-            "Invalid value for --convention: 'craig' is not one of standard, modified, hayati",
+            "Invalid value for --convention: 'craig' is not one of standard, modified, hayati. "
+            "It is called 'modified' here",
         ),
         (
             ["arm", "--from", "rpr", "--joints", "RRR"],

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 
 import jsonschema
@@ -132,6 +133,40 @@ def test_wrong_usage_is_reported_on_standard_error_and_exits_with_2(arguments: l
     assert (run.status, run.out) == (2, "")
     assert "rror: " in run.err
     assert "Traceback" not in run.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["validate", "stanford", "--samples", "0"], "'--samples': must be at least 1, got 0"),
+        (["validate", "stanford", "--samples", "many"], "'--samples': must be a whole number, got 'many'"),
+        (["rollout", "stanford", "--out", "r", "--duration", "long"], "'--duration': must be a number, got 'long'"),
+        (["view", "stanford", "--port", "99999"], "'--port': must be at most 65535, got 99999"),
+    ],
+    ids=lambda value: value[2] if isinstance(value, list) else "",
+)
+@pytest.mark.skipif(find_spec("typer._coercion") is None, reason="this version of typer words them itself")
+def test_wrong_numbers_are_reported_in_plain_words(arguments: list[str], message: str) -> None:
+    assert dh2sim(*arguments).err.splitlines()[-1] == f"Error: Invalid value for {message}"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option", "allowed", "meant"),
+    [
+        (["convert", "stanford", "--to", "craig"], "--to", "standard, modified", "modified"),
+        (["new", "arm", "--convention", "MDH"], "--convention", "standard, modified, hayati", "modified"),
+        (["import", "a.md", "--convention", "spong"], "--convention", "standard, modified", "standard"),
+        (["frames", "a.yaml", "--convention", "dh"], "--convention", "standard, modified", "standard"),
+    ],
+)
+def test_other_names_of_the_conventions_are_translated(
+    arguments: list[str], option: str, allowed: str, meant: str
+) -> None:
+    run = dh2sim(*arguments)
+    assert (run.status, run.out) == (2, "")
+    assert run.err.splitlines()[-1] == (
+        f"Error: Invalid value for {option}: '{arguments[-1]}' is not one of {allowed}. It is called '{meant}' here"
+    )
 
 
 def test_list_names_every_robot_with_its_joints() -> None:

@@ -139,7 +139,7 @@ def test_a_file_that_is_no_robot_file_makes_no_traceback(tmp_path: Path, data: b
 def test_a_file_of_another_format_is_to_be_imported_first(tmp_path: Path, name: str, text: str, kind: str) -> None:
     file = tmp_path / name
     file.write_text(text, encoding="utf-8")
-    made = shlex.quote(f"{file.stem}.yaml")
+    made = shlex.quote(f"{file.stem}_imported.yaml" if name == f"{file.stem}.yaml" else f"{file.stem}.yaml")
     message = (
         f"{file}: this is {kind}, not a robot file: run 'dh2sim import {shlex.quote(str(file))} -o {made}' first"
     )

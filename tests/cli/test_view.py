@@ -297,6 +297,12 @@ def test_a_page_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_a_page_is_written_only_to_html(tmp_path: Path) -> None:
+    done = dh2sim("view", "stanford", "--export", tmp_path / "page.pdf")
+    assert (done.status, done.out, list(tmp_path.iterdir())) == (2, "", [])
+    assert "Invalid value for --export: must be a file that ends in .html, got '" in done.err
+
+
 def test_force_needs_export() -> None:
     done = dh2sim("view", "stanford", "--no-browser", "--force")
     assert (done.status, done.out) == (2, "")
