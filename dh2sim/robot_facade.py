@@ -340,7 +340,7 @@ class Robot:
 
         Raises:
             ConfigurationError: ``q`` has the wrong shape, or something in it is not finite.
-            UnknownFrameError: There is no such frame.
+            UnknownFrameError: The frame is unknown.
         """
         from dh2sim.kinematics.forward import frame_pose
 

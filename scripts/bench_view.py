@@ -91,8 +91,8 @@ def _first_pictures(browser: Browser) -> Iterator[Row]:
             page.context.close()
     for what, times in (("first paint", paints), ("robot on the screen", robots)):
         middle = statistics.median(times)
-        told = f"{middle:.1f} s ({min(times):.1f} to {max(times):.1f})"
-        yield f"view: from the command to the {what}", told, "3 s", middle <= 3.0
+        figures = f"{middle:.1f} s ({min(times):.1f} to {max(times):.1f})"
+        yield f"view: from the command to the {what}", figures, "3 s", middle <= 3.0
 
 
 def _delays(browser: Browser) -> Iterator[Row]:
@@ -110,24 +110,24 @@ def _delays(browser: Browser) -> Iterator[Row]:
                 page = opened(browser, url, *scripts)
                 if not soft:
                     choose_plain_shading(page)
-                posed, painted, told = _slider_delays(page, pause)
+                posed, painted, figures = _slider_delays(page, pause)
                 page.context.close()
                 yield _row(f"view: slider to the robot's pose, {when}{words}", posed, 50.0)
                 yield _row(f"view: slider to the frame after it, {when}{words}", painted, None)
-                yield _row(f"view: slider to the pose in numbers, {when}{words}", told, None)
+                yield _row(f"view: slider to the pose in numbers, {when}{words}", figures, None)
 
 
 def _slider_delays(page: Page, pause: float) -> tuple[list[float], list[float], list[float]]:
     time.sleep(3.0)  # the fading in of the first picture
     page.get_by_role("slider").first.focus()
-    told = []
+    figures = []
     for _ in range(MOVES + 5):
         page.evaluate(NUMBERS)
         page.keyboard.press("ArrowRight")  # on and on: to poses where it was not before
-        told.append(page.evaluate("() => window.moved"))
+        figures.append(page.evaluate("() => window.moved"))
         time.sleep(pause)
     posed, painted = page.evaluate("() => [window.posed, window.painted]")
-    return posed[5:], painted[5:], told[5:]  # without the first, which are slower
+    return posed[5:], painted[5:], figures[5:]  # without the first, which are slower
 
 
 def _long_chain(browser: Browser) -> Iterator[Row]:
@@ -148,8 +148,8 @@ def _long_chain(browser: Browser) -> Iterator[Row]:
             still = shown.evaluate(FRAMES, SECONDS)
             with _moving(page):
                 moving = shown.evaluate(FRAMES, SECONDS)
-            told = f"{moving:.0f} ({still:.0f} while none moves)"
-            yield f"view: 60 joints, frames a second, {words}", told, "30", moving >= 30.0
+            figures = f"{moving:.0f} ({still:.0f} while none moves)"
+            yield f"view: 60 joints, frames a second, {words}", figures, "30", moving >= 30.0
             shown.context.close()
     finally:
         viewer.stop()
@@ -216,8 +216,8 @@ def _memory(browser: Browser, minutes: float) -> Iterator[Row]:
         time.sleep(1.0)
         after = _resident(process)
         page.context.close()
-    told = f"{after / before:.2f} ({before / 1e6:.0f} to {after / 1e6:.0f} MB, {count} clicks)"
-    yield what, told, "1.1", after <= 1.1 * before
+    figures = f"{after / before:.2f} ({before / 1e6:.0f} to {after / 1e6:.0f} MB, {count} clicks)"
+    yield what, figures, "1.1", after <= 1.1 * before
 
 
 def _resident(process: subprocess.Popen[str]) -> int:

@@ -70,8 +70,8 @@ def test_every_dimension_is_described_and_no_other(layouts: list[Layout]) -> Non
 def test_every_coordinate_is_described_and_no_other(layouts: list[Layout]) -> None:
     dimensions, coordinates = _tables("Dimensions and labels")
     without = {row[0].strip("`") for row in dimensions if row[2].startswith("none")}
-    told = _first_cells(coordinates) | (_first_cells(dimensions) - without)
-    assert told == {coordinate.name for layout in layouts for coordinate in layout.coordinates}
+    reported = _first_cells(coordinates) | (_first_cells(dimensions) - without)
+    assert reported == {coordinate.name for layout in layouts for coordinate in layout.coordinates}
     for row in coordinates:
         for name in _names(row[0]):
             [along] = {c.dimension for layout in layouts for c in layout.coordinates if c.name == name}
@@ -80,10 +80,10 @@ def test_every_coordinate_is_described_and_no_other(layouts: list[Layout]) -> No
 
 def test_every_variable_is_described_with_its_dimensions_and_type(layouts: list[Layout]) -> None:
     [variables] = _tables("Variables")
-    told = {name: row for row in variables for name in _names(row[0])}
+    reported = {name: row for row in variables for name in _names(row[0])}
     known = {variable.name: variable for layout in layouts for variable in layout.variables}
-    assert set(told) == set(known)
-    for name, row in told.items():
+    assert set(reported) == set(known)
+    for name, row in reported.items():
         assert row[1].split(", ") == list(known[name].dimensions)
         dtype = known[name].dtype
         assert dtype.name == (re.findall(r"int\d+", row[2]) or ["float64"])[0], name

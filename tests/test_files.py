@@ -88,13 +88,13 @@ def test_a_file_replaces_another_only_when_it_is_whole(tmp_path: Path) -> None:
 
 
 def test_paths_that_no_file_can_have_are_refused(tmp_path: Path) -> None:
-    for out, told in (
+    for out, reported in (
         (tmp_path / "no" / "a.png", f"there is no folder '{tmp_path / 'no'}'"),
         (tmp_path, "that is a folder"),
     ):
         with pytest.raises(OutputError) as caught, atomic_file(out):
             pass
-        assert str(caught.value) == f"cannot write '{out}': {told}"
+        assert str(caught.value) == f"cannot write '{out}': {reported}"
     assert list(tmp_path.iterdir()) == []
 
 

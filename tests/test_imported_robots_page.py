@@ -157,8 +157,8 @@ def test_a_wrong_number_in_a_table_would_be_noticed(comparison: Comparison) -> N
 
 @pytest.mark.parametrize("comparison", OTHER[:2], ids=lambda comparison: comparison.heading)
 def test_tables_that_are_called_other_arms_differ_by_about_what_is_said(comparison: Comparison) -> None:
-    told = float(comparison.relation["size"].split(" mm")[0])
-    assert 0.7 * told <= 1e3 * greatest_difference(comparison)[0] <= 1.1 * told
+    reported = float(comparison.relation["size"].split(" mm")[0])
+    assert 0.7 * reported <= 1e3 * greatest_difference(comparison)[0] <= 1.1 * reported
 
 
 def test_the_puma_of_the_file_has_other_distances_between_its_axes() -> None:
@@ -178,7 +178,7 @@ def test_the_printed_digits_of_ufactory_are_off_their_own_formula_by_what_is_sai
     assert "2 µm off" in PAGE
 
 
-def test_the_irb_140_of_the_file_has_the_lengths_that_are_told() -> None:
+def test_the_irb_140_of_the_file_has_the_lengths_on_the_page() -> None:
     root = installed(IRB140.package)
     if root is None:
         pytest.skip(f"{IRB140.package.name} {IRB140.package.version} is not installed")
@@ -222,5 +222,5 @@ def test_the_check_sees_a_changed_number_but_no_changed_rounding(capsys: pytest.
     assert check(re.sub(r"\b\de-16 m\b", "7.1e-16 m", PAGE)) == 0
     assert capsys.readouterr().out == "imported-robots.md: up to date\n"
     assert check(PAGE.replace("| 1 | 0 | 0 | 0.333 | 0 |", "| 1 | 0 | 0 | 0.334 | 0 |")) == 1
-    told = capsys.readouterr().err
-    assert "-| 1 | 0 | 0 | 0.333 | 0 | | 0 | 0 | 0.333 | 0 |\n+| 1 | 0 | 0 | 0.334 | 0 | |" in told
+    reported = capsys.readouterr().err
+    assert "-| 1 | 0 | 0 | 0.333 | 0 | | 0 | 0 | 0.333 | 0 |\n+| 1 | 0 | 0 | 0.334 | 0 | |" in reported

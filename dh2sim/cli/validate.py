@@ -83,7 +83,7 @@ def validate(
     from dh2sim.validate.run import engine_samples, validate_robot
 
     poses = sum(engine_samples(samples, len(model.joints)) for model in models)
-    with _warnings_told(), progress_bar("comparing", "poses", poses) as advance:
+    with _warnings_reported(), progress_bar("comparing", "poses", poses) as advance:
         reports = []
         for model in models:
             found = validate_robot(
@@ -135,7 +135,7 @@ def _write(path: Path, text: str) -> None:
 
 
 @contextmanager
-def _warnings_told() -> Iterator[None]:
+def _warnings_reported() -> Iterator[None]:
     """Print MuJoCo's warnings, which it would append to a file in the current folder."""
     import mujoco
 

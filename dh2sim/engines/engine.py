@@ -65,7 +65,7 @@ def present_frames(path: str, found: Sequence[str], rows: int, *, dh_frames_requ
     wanted = [*dh, "tool0"] if some else ["tool0"]
     missing = [name for name in wanted if name not in known]
     if missing:
-        raise EngineError(f"{path}: there is no frame {', '.join(missing)}")
+        raise EngineError(f"{path}: frame not found: {', '.join(missing)}")
     return tuple(wanted)
 
 
@@ -78,6 +78,6 @@ def require_joints(path: str, found: Sequence[str], wanted: Sequence[str]) -> No
     missing = [name for name in wanted if name not in set(found)]
     extra = [name for name in found if name not in set(wanted)]
     if missing:
-        raise EngineError(f"{path}: there is no moving joint {', '.join(missing)}")
+        raise EngineError(f"{path}: moving joint not found: {', '.join(missing)}")
     if extra:
         raise EngineError(f"{path}: the joint {', '.join(extra)} moves, but the robot file has no such moving row")

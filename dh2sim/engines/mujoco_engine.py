@@ -92,11 +92,11 @@ class MujocoEngine:
         """Return the mass properties of a body in its own frame.
 
         Raises:
-            EngineError: there is no such body.
+            EngineError: the body is unknown.
         """
         number = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, body)
         if number < 0:
-            raise EngineError(f"{self._path}: there is no body {body}")
+            raise EngineError(f"{self._path}: body not found: {body}")
         principal = np.zeros(9)
         mujoco.mju_quat2Mat(principal, self._model.body_iquat[number])
         R = principal.reshape(3, 3)

@@ -200,7 +200,7 @@ def frame_pose(chain: ChainLike, frame: str, q: ArrayLike) -> Array:
         Shape (..., 4, 4).
 
     Raises:
-        UnknownFrameError: There is no such frame.
+        UnknownFrameError: The frame is unknown.
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
     robot = chain_of(chain)
@@ -235,7 +235,7 @@ def geometric_jacobian(chain: ChainLike, q: ArrayLike, *, frame: str = "tool0") 
         along the axes of base_link, for each rad/s or m/s of a joint coordinate.
 
     Raises:
-        UnknownFrameError: There is no such frame.
+        UnknownFrameError: The frame is unknown.
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
     robot = chain_of(chain)

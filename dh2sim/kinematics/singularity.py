@@ -14,8 +14,7 @@ SINGULAR = 1e-9
 def singular_values(J: ArrayLike) -> Array:
     """Return the singular values of Jacobians, largest first.
 
-    Rows in m and in rad are not told apart, so the values depend on the unit of length; which of them are zero does
-    not.
+    Rows in m and rows in rad are not weighted, so the values depend on the unit of length, but not which are zero.
 
     Args:
         J: Jacobians, shape (..., 6, n).

@@ -352,7 +352,7 @@ class MeshFile(Kind):
         except (OSError, ValueError):
             exists = False
         if not exists:
-            return scope.wrong(loc, f"there is no file {shown(text)} in {scope.directory.absolute()}")
+            return scope.wrong(loc, f"file {shown(text)} not found in {scope.directory.absolute()}")
         return path.absolute()
 
 

@@ -30,7 +30,7 @@ def load_robot(path_or_name: str | os.PathLike[str]) -> RobotSpec:
             A path that exists wins.
 
     Raises:
-        UnknownRobotError: There is neither such a file nor such a robot.
+        UnknownRobotError: Neither such a file nor such a robot exists.
         RobotFileError: The file is wrong; the error holds everything that is.
         Dh2simError: The file cannot be read.
     """
@@ -252,4 +252,4 @@ def _find(given: str) -> tuple[Path, str]:
         else did_you_mean(given.removesuffix(".yaml"), known)
     )
     list_of_them = f"Robots that come with dh2sim: {listed(known)}"
-    raise UnknownRobotError(f"there is no file and no robot named {shown(given)}.{hint} {list_of_them}")
+    raise UnknownRobotError(f"no file or robot named {shown(given)}.{hint} {list_of_them}")

@@ -56,7 +56,7 @@ def _part(part: Part, definitions: dict[str, Any]) -> dict[str, Any]:
 
 
 def _property(kind: Kind, default: Any, definitions: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of a key; ``default`` is None where there is none."""
+    """Return the schema of a key; ``default`` is None for a key without a default."""
     schema = _value(kind, definitions)
     if default is not None and not kind.required:
         schema["default"] = default

@@ -182,7 +182,7 @@ def compose(text: str, report: Report, needs: str = "a robot needs at least name
         needs: What an empty file is reported to need.
 
     Raises:
-        RobotFileError: There is no tree, with everything noted so far.
+        RobotFileError: The text has no tree; the error holds all problems noted so far.
     """
     root = _fast(text)
     if root is not None:

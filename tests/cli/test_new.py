@@ -122,7 +122,7 @@ def test_wrong_usage_is_reported_and_nothing_is_written(arguments: list[str], me
 
 def test_a_source_that_is_missing_or_has_no_line_for_its_name_is_refused(folder: Path) -> None:
     assert dh2sim("new", "arm", "--from", "stanfrd").err.startswith(
-        "dh2sim: there is no file and no robot named 'stanfrd'. Did you mean 'stanford'?"
+        "dh2sim: no file or robot named 'stanfrd'. Did you mean 'stanford'?"
     )
     Path("flow.yaml").write_text("{name: flow, convention: standard, joints: [{type: revolute}]}", encoding="utf-8")
     assert dh2sim("new", "arm", "--from", "flow.yaml") == Outcome(

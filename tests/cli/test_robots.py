@@ -22,7 +22,7 @@ KNOWN = f"Robots that come with dh2sim: {', '.join(builtin_robots())}"
     [("stanfrd", " Did you mean 'stanford'?"), ("stanfrd.yaml", " Did you mean 'stanford'?"), ("xyzzy", "")],
 )
 def test_a_robot_that_is_unknown_is_reported_with_those_that_are(command: str, name: str, hint: str) -> None:
-    message = f"dh2sim: there is no file and no robot named '{name}'.{hint} {KNOWN}\n"
+    message = f"dh2sim: no file or robot named '{name}'.{hint} {KNOWN}\n"
     assert dh2sim(command, name) == Outcome(status=2, out="", err=message)
 
 

@@ -241,7 +241,7 @@ def test_two_viewers_run_side_by_side() -> None:
 def test_an_unknown_robot_is_refused() -> None:
     done = dh2sim("view", "stanfrod", "--no-browser")
     assert (done.status, done.out) == (2, "")
-    assert done.err.startswith("dh2sim: there is no file and no robot named 'stanfrod'. Did you mean 'stanford'?")
+    assert done.err.startswith("dh2sim: no file or robot named 'stanfrod'. Did you mean 'stanford'?")
 
 
 def test_an_address_of_another_machine_is_refused() -> None:

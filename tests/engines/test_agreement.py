@@ -196,11 +196,11 @@ def test_mujoco_reports_the_mass_properties_of_a_body(folder: Path) -> None:
             np.testing.assert_allclose(found.inertia, body.inertia, rtol=0, atol=1e-12)
         with pytest.raises(EngineError) as caught:
             engine.mass_properties("link_7")
-        assert str(caught.value) == f"{folder / file}: there is no body link_7"
+        assert str(caught.value) == f"{folder / file}: body not found: link_7"
 
 
 @pytest.mark.parametrize("name", ["tool0", "dh_1", "link_2", "universe", "world", "base"])
-def test_a_joint_may_bear_the_name_of_a_frame(name: str, tmp_path: Path) -> None:
+def test_engines_agree_if_a_joint_has_the_name_of_a_frame(name: str, tmp_path: Path) -> None:
     rows = tuple(
         Row(name=name if i == 1 else f"j{i}", type=JointType.REVOLUTE, convention=row.convention, a=0.3, d=0.1)
         for i, row in enumerate(ODD_ROBOT.rows[:3])

@@ -49,7 +49,7 @@ def spoiled(folder: Path, *changes: tuple[str, str]) -> None:
 
 @pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("content", ["this is no XML", "", "<robot", "<mujoco><nonsense/></mujoco>", None])
-def test_a_file_that_cannot_be_read_is_refused_in_the_readers_words(
+def test_a_file_that_an_engine_cannot_read_is_refused_in_its_words(
     name: str, content: str | None, tmp_path: Path
 ) -> None:
     path = path_of(name, tmp_path)
@@ -67,19 +67,19 @@ def test_a_file_that_cannot_be_read_is_refused_in_the_readers_words(
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_missing_dh_frame_is_named(name: str, tmp_path: Path) -> None:
     spoiled(tmp_path, ('name="dh_3"', 'name="other_3"'), ('link="dh_3"', 'link="other_3"'))
-    assert message(name, tmp_path) == "there is no frame dh_3"
+    assert message(name, tmp_path) == "frame not found: dh_3"
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_missing_frames_are_all_named(name: str, tmp_path: Path) -> None:
     spoiled(tmp_path, *((f'"{old}"', f'"not_{old}"') for old in ("dh_0", "dh_5", "tool0")))
-    assert message(name, tmp_path) == "there is no frame dh_0, dh_5, tool0"
+    assert message(name, tmp_path) == "frame not found: dh_0, dh_5, tool0"
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_fewer_frames_than_the_table_has_are_noticed(name: str, tmp_path: Path) -> None:
     write(model("odd"), tmp_path)
-    assert message(name, tmp_path, rows=8) == "there is no frame dh_7, dh_8"
+    assert message(name, tmp_path, rows=8) == "frame not found: dh_7, dh_8"
 
 
 @pytest.mark.parametrize("name", URDF)
@@ -91,13 +91,13 @@ def test_a_urdf_may_leave_out_all_dh_frames(name: str, tmp_path: Path) -> None:
 def test_an_mjcf_may_not(tmp_path: Path) -> None:
     spoiled(tmp_path, *((f'<site name="dh_{i}"', f'<site name="x_{i}"') for i in range(7)))
     frames = ", ".join(f"dh_{i}" for i in range(7))
-    assert message("mujoco-mjcf", tmp_path) == f"there is no frame {frames}"
+    assert message("mujoco-mjcf", tmp_path) == f"frame not found: {frames}"
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_missing_joint_is_named(name: str, tmp_path: Path) -> None:
     write(model("odd"), tmp_path)
-    assert message(name, tmp_path, [*JOINTS, "seven", "eight"]) == "there is no moving joint seven, eight"
+    assert message(name, tmp_path, [*JOINTS, "seven", "eight"]) == "moving joint not found: seven, eight"
 
 
 @pytest.mark.parametrize("name", ENGINES)
@@ -110,7 +110,7 @@ def test_a_joint_too_many_is_named(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", URDF)
 def test_a_joint_that_the_file_holds_fixed_is_missed(name: str, tmp_path: Path) -> None:
     spoiled(tmp_path, ('name="six" type="revolute"', 'name="six" type="fixed"'))
-    assert message(name, tmp_path) == "there is no moving joint six"
+    assert message(name, tmp_path) == "moving joint not found: six"
 
 
 def test_a_ball_joint_is_refused(tmp_path: Path) -> None:

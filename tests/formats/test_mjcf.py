@@ -130,7 +130,7 @@ def test_a_robot_may_bear_any_name(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["tool0", "dh_1", "link_1", "base_link", "world", "universe", "main"])
-def test_a_joint_may_bear_the_name_of_a_frame(name: str) -> None:
+def test_a_joint_may_have_the_name_of_a_frame(name: str) -> None:
     rows = tuple(dataclasses.replace(row, name=name) if i == 3 else row for i, row in enumerate(ODD_ROBOT.rows))
     built = build_model(dataclasses.replace(ODD_ROBOT, rows=rows))
     assert_holds_the_model(built, in_mujoco(to_mjcf(built)))

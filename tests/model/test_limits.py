@@ -46,7 +46,7 @@ def test_a_prismatic_joint_of_a_robot_without_lengths_is_assumed_to_slide_a_metr
     assert joint.position_range == (-1.0, 1.0)
 
 
-def test_a_continuous_joint_has_no_position_limits() -> None:
+def test_a_continuous_joint_is_given_no_position_limits() -> None:
     (joint,) = one(CONTINUOUS).joints
     assert (joint.position_range, joint.travel) == (None, (-math.pi, math.pi))
     assert joint.assumed == ("velocity", "effort")

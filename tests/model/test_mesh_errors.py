@@ -61,7 +61,7 @@ def test_a_file_without_faces_is_refused(tmp_path: Path, name: str, data: bytes)
         ("cut.glb", b"glTF1234"),
     ],
 )
-def test_a_file_that_cannot_be_read_is_refused_in_the_readers_words(tmp_path: Path, name: str, data: bytes) -> None:
+def test_a_mesh_file_that_cannot_be_read_is_refused(tmp_path: Path, name: str, data: bytes) -> None:
     file = tmp_path / name
     file.write_bytes(data)
     with pytest.raises(Exception) as caught:  # noqa: PT011
@@ -73,7 +73,7 @@ def test_a_file_that_cannot_be_read_is_refused_in_the_readers_words(tmp_path: Pa
 def test_a_file_that_is_gone_is_named_with_its_place(tmp_path: Path) -> None:
     with pytest.raises(RobotFileError) as caught:
         build(tmp_path, "gone.stl")
-    assert str(caught.value) == f"{WHERE}: there is no file 'gone.stl' in {tmp_path}"
+    assert str(caught.value) == f"{WHERE}: file 'gone.stl' not found in {tmp_path}"
 
 
 def test_a_file_that_disappears_after_the_robot_was_read_is_named_with_its_place(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Parts of a robot file that do not go together are told, also where other parts are wrong."""
+"""Parts of a robot file that do not go together are reported, also where other parts are wrong."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_other_names_are_free(name: str) -> None:
     assert _complaints(f"{{type: fixed, name: {name}}}") == []
 
 
-def test_a_continuous_joint_has_no_position_limits() -> None:
+def test_position_limits_of_a_continuous_joint_are_refused() -> None:
     assert _complaints("{type: continuous, limits: {velocity: 1, position: [0, 1]}}") == [
         "r.yaml:4:44: joints[0].limits.position: a continuous joint has no position limits; "
         "make it revolute or remove them"
@@ -102,7 +102,7 @@ def test_only_a_hayati_row_takes_a_second_twist(convention: str) -> None:
 @pytest.mark.parametrize(
     "wrong", ["{type: screw, convention: hayati, d: 1}", "{type: fixed, convention: craig, beta: 1}"]
 )
-def test_a_row_of_unknown_type_or_convention_is_told_that_alone(wrong: str) -> None:
+def test_only_the_unknown_type_or_convention_of_a_row_is_reported(wrong: str) -> None:
     (message,) = _complaints(wrong)
     assert ": found '" in message
 

@@ -38,7 +38,7 @@ def test_the_smallest_file_has_the_defaults_of_the_contract() -> None:
     assert (row.actuator.type, row.actuator.kp, row.actuator.kv) == (ActuatorType.POSITION, None, None)
 
 
-def test_every_key_arrives_in_si_units() -> None:
+def test_every_key_of_a_robot_file_is_converted_to_si_units() -> None:
     spec = robot(FULL)
     turn = spec.rows[0]
     assert (spec.name, spec.description, spec.source) == ("full", "Every key there is", "made up")

@@ -101,7 +101,7 @@ def test_any_line_end_ends_a_line(end: str) -> None:
         ('a: "\\ud800"\n', "1:4: a: control character U+D800 is not allowed"),
     ],
 )
-def test_what_is_no_robot_file_at_all_is_told_with_its_place(text: str, message: str) -> None:
+def test_text_that_is_not_a_robot_file_is_refused_with_its_place(text: str, message: str) -> None:
     assert complaints(text) == [f"r.yaml:{message}"]
 
 
@@ -113,7 +113,7 @@ def test_what_is_no_robot_file_at_all_is_told_with_its_place(text: str, message:
         ("name: r\n".encode("utf-16"), "1:1: not UTF-8: byte 0xff"),
     ],
 )
-def test_bytes_that_are_not_utf_8_are_told_with_their_place(data: bytes, message: str) -> None:
+def test_bytes_that_are_not_utf_8_are_reported_with_their_place(data: bytes, message: str) -> None:
     assert complaints(data) == [f"r.yaml:{message}"]
 
 
@@ -134,7 +134,7 @@ def test_text_with_a_lone_surrogate_is_refused() -> None:
         ("~: 1\n", "5:1: a key must be text, found nothing"),
     ],
 )
-def test_bad_keys_are_told_once_and_nothing_else_is(keys: str, message: str) -> None:
+def test_bad_keys_are_reported_once_and_nothing_else_is(keys: str, message: str) -> None:
     assert complaints(MINIMAL + keys) == [f"r.yaml:{message}"]
 
 

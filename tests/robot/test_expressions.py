@@ -107,7 +107,7 @@ def test_expression_has_the_value_that_python_gives(text: str, value: float) -> 
         ),
     ],
 )
-def test_wrong_expression_is_told_what_is_wrong(text: str, message: str) -> None:
+def test_the_error_of_an_expression_says_what_is_wrong(text: str, message: str) -> None:
     with pytest.raises(ExpressionError) as caught:
         evaluate(text, NAMES)
     assert str(caught.value) == message

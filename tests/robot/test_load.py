@@ -82,20 +82,20 @@ def test_messages_name_the_file_as_the_user_did(builtins: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "begins"),
     [
-        ("arn", "there is no file and no robot named 'arn'. Did you mean 'arm'?"),
-        ("SCARA.yaml", "there is no file and no robot named 'SCARA.yaml'. Did you mean 'scara'?"),
-        ("", "there is no file and no robot named ''."),
-        ("a\0b", "there is no file and no robot named 'a\\x00b'."),
-        ("no/such/file.yaml", "there is no file and no robot named 'no/such/file.yaml'."),
+        ("arn", "no file or robot named 'arn'. Did you mean 'arm'?"),
+        ("SCARA.yaml", "no file or robot named 'SCARA.yaml'. Did you mean 'scara'?"),
+        ("", "no file or robot named ''."),
+        ("a\0b", "no file or robot named 'a\\x00b'."),
+        ("no/such/file.yaml", "no file or robot named 'no/such/file.yaml'."),
     ],
 )
-def test_an_unknown_name_is_told_with_those_that_there_are(builtins: Path, name: str, begins: str) -> None:
+def test_the_error_of_an_unknown_name_lists_the_known_ones(builtins: Path, name: str, begins: str) -> None:
     with pytest.raises(UnknownRobotError) as caught:
         load_robot(name)
     assert str(caught.value) == f"{begins} Robots that come with dh2sim: arm, scara"
 
 
-def test_a_name_of_any_length_is_told_to_be_unknown(builtins: Path) -> None:
+def test_an_unknown_name_of_any_length_is_reported(builtins: Path) -> None:
     with pytest.raises(UnknownRobotError):
         load_robot("x" * 10_000)
 
@@ -106,7 +106,7 @@ def test_a_folder_is_refused(tmp_path: Path) -> None:
     assert str(caught.value) == f"{tmp_path}: is a folder, not a robot file"
 
 
-def test_a_folder_named_like_a_builtin_robot_is_told_how_to_get_the_robot(builtins: Path) -> None:
+def test_the_error_of_a_folder_named_like_a_builtin_robot_says_how_to_get_the_robot(builtins: Path) -> None:
     Path("arm").mkdir()
     with pytest.raises(Dh2simError) as caught:
         load_robot("arm")

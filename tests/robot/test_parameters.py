@@ -69,11 +69,11 @@ def test_a_long_chain_of_parameters_is_no_trouble() -> None:
         ("", ["5:1: parameters: expected a mapping of names to numbers, found nothing"]),
     ],
 )
-def test_wrong_parameters_are_told(parameters: str, messages: list[str]) -> None:
+def test_wrong_parameters_are_reported(parameters: str, messages: list[str]) -> None:
     assert complaints(with_keys(f"parameters: {parameters}\n")) == [f"r.yaml:{m}" for m in messages]
 
 
 @pytest.mark.parametrize("parameters", ["{a: x}", "{a: a}", "3", "{<<: {a: 1}}"])
-def test_a_wrong_parameter_is_not_told_again_where_it_is_used(parameters: str) -> None:
+def test_a_wrong_parameter_is_not_reported_again_where_it_is_used(parameters: str) -> None:
     joints = "joints:\n- {type: revolute, a: 2 * a, limits: {position: [a, -a]}, link: {mass: a}}\n"
     assert len(complaints(f"name: r\nconvention: standard\n{joints}parameters: {parameters}\n")) == 1

@@ -44,12 +44,12 @@ def _read(text: str | bytes) -> None:
 @example("%YAML 1.3\n---\na")
 @example('"\\x')
 @example("a: >\n  b\n\n\n c")
-def test_any_text_is_read_or_refused(text: str | bytes) -> None:
+def test_any_text_is_read_as_a_robot_or_refused(text: str | bytes) -> None:
     _read(text)
 
 
 @given(st.integers(0, len(FULL)), st.integers(0, 20), st.text(alphabet=SPICE, max_size=5))
-def test_a_file_with_a_piece_replaced_is_read_or_refused(start: int, length: int, piece: str) -> None:
+def test_a_robot_file_with_a_piece_replaced_is_read_or_refused(start: int, length: int, piece: str) -> None:
     _read(FULL[:start] + piece + FULL[start + length :])
 
 
@@ -88,7 +88,7 @@ def test_a_file_with_odd_keys_is_read_or_refused(pairs: list[tuple[str, str]], l
     ],
     ids=["names", "cycle", "keys", "rows", "configurations", "tags", "lines", "quotes", "empty", "dashes"],
 )
-def test_a_large_wrong_file_is_refused_soon(text: str) -> None:
+def test_a_large_wrong_robot_file_is_refused_quickly(text: str) -> None:
     start = time.perf_counter()
     with pytest.raises(RobotFileError):
         parse_robot(text)

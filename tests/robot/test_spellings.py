@@ -114,14 +114,14 @@ def test_names_like_joint_variables_may_be_parameters() -> None:
         ("a: 45deg", "{}", "'45deg' has a unit; lengths of this file are in m, written as numbers alone"),
     ],
 )
-def test_a_number_with_a_unit_is_told_the_units_of_the_file(entry: str, units: str, message: str) -> None:
+def test_the_error_of_a_number_with_a_unit_names_the_units_of_the_file(entry: str, units: str, message: str) -> None:
     text = with_joint(f"{{{entry}, type: revolute}}") + f"units: {units}\n"
     place = entry.index(":") + 6
     key = entry.partition(":")[0]
     assert complaints(text) == [f"r.yaml:4:{place}: joints[0].{key}: {message}"]
 
 
-def test_a_limit_with_a_unit_is_told_the_unit_of_its_joint() -> None:
+def test_the_error_of_a_limit_with_a_unit_names_the_unit_of_its_joint() -> None:
     limits = "limits: {position: [-90deg, 100mm]}"
     turning, sliding = (complaints(with_joint(f"{{type: {kind}, {limits}}}")) for kind in ("R", "P"))
     assert ["angles of this file are in rad" in message for message in turning] == [True, True]

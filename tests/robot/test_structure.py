@@ -1,4 +1,4 @@
-"""Every value that is wrong by itself is told with its place, what was found and what is allowed."""
+"""Every value that is wrong by itself is reported with its place, what was found and what is allowed."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def test_unknown_key_at_the_top_has_no_path() -> None:
     ]
 
 
-def test_a_misspelt_required_key_is_told_once() -> None:
+def test_a_misspelt_required_key_is_reported_once() -> None:
     assert complaints("nam: r\nconvention: standard\njoint:\n- {typ: revolute}\n") == [
         f"r.yaml:1:1: unknown key 'nam'. Did you mean 'name'? Allowed keys: {TOP}",
         f"r.yaml:3:1: unknown key 'joint'. Did you mean 'joints'? Allowed keys: {TOP}",
     ]
 
 
-def test_missing_keys_are_told_at_their_mapping() -> None:
+def test_missing_keys_are_reported_at_their_mapping() -> None:
     assert complaints("# a comment\ndescription: x\n") == [
         "r.yaml:2:1: missing key 'convention'",
         "r.yaml:2:1: missing key 'joints'",
@@ -56,7 +56,7 @@ def test_missing_keys_are_told_at_their_mapping() -> None:
 
 
 @pytest.mark.parametrize(("text", "found"), [("hello", "'hello'"), ("[1, 2]", "a list"), ("12", "12")])
-def test_a_file_that_holds_no_mapping_is_told_what_belongs_there(text: str, found: str) -> None:
+def test_the_error_of_a_file_without_a_mapping_says_what_belongs_there(text: str, found: str) -> None:
     assert complaints(text) == [f"r.yaml:1:1: expected a mapping with the keys {TOP}, found {found}"]
 
 
@@ -187,7 +187,7 @@ def test_a_file_that_holds_no_mapping_is_told_what_belongs_there(text: str, foun
         ),
     ],
 )
-def test_wrong_value_in_a_row_is_told(joint: str, message: str) -> None:
+def test_a_wrong_value_in_a_row_is_reported(joint: str, message: str) -> None:
     assert complaints(with_joint(joint)) == [f"r.yaml:{message}"]
 
 
@@ -209,11 +209,11 @@ def test_wrong_value_in_a_row_is_told(joint: str, message: str) -> None:
         ("actuators: position\n", "5:12: actuators: expected a mapping with the keys type, kp, kv, found 'position'"),
     ],
 )
-def test_wrong_value_at_the_top_is_told(keys: str, message: str) -> None:
+def test_a_wrong_value_at_the_top_of_a_robot_file_is_reported(keys: str, message: str) -> None:
     assert complaints(with_keys(keys)) == [f"r.yaml:{message}"]
 
 
-def test_joints_that_are_no_list_or_an_empty_one_are_told() -> None:
+def test_joints_must_be_a_list_that_is_not_empty() -> None:
     head = "name: r\nconvention: standard\n"
     assert complaints(head + "joints: []\n") == [
         "r.yaml:3:9: joints: the list is empty; at least one entry is needed"
@@ -245,11 +245,11 @@ def test_mesh_files_are_looked_for_beside_the_robot_file(tmp_path: Path) -> None
     assert complaints(with_joint("{type: fixed, link: {mesh: {file: b.stl}}}"), tmp_path) == []
     place = "r.yaml:4:37: joints[0].link.mesh.file"
     for name, message in {
-        "c.stl": f"there is no file 'c.stl' in {tmp_path}",
-        "d.stl": f"there is no file 'd.stl' in {tmp_path}",
+        "c.stl": f"file 'c.stl' not found in {tmp_path}",
+        "d.stl": f"file 'd.stl' not found in {tmp_path}",
         "b.txt": "'b.txt' is not a mesh file that can be read; allowed: .stl, .obj, .ply, .glb",
         "12": "expected text, found 12; put it in quotes",
-        "package://x/b.stl": f"there is no file 'package://x/b.stl' in {tmp_path}",
+        "package://x/b.stl": f"file 'package://x/b.stl' not found in {tmp_path}",
     }.items():
         joint = f"{{type: fixed, link: {{mesh: {{file: {name}}}}}}}"
         assert complaints(with_joint(joint), tmp_path) == [f"{place}: {message}"]
@@ -257,12 +257,12 @@ def test_mesh_files_are_looked_for_beside_the_robot_file(tmp_path: Path) -> None
 
 def test_mesh_of_the_base_is_looked_for_too(tmp_path: Path) -> None:
     assert complaints(with_keys("base: {mesh: {file: b.obj, scale: 0}}\n"), tmp_path) == [
-        f"r.yaml:5:21: base.mesh.file: there is no file 'b.obj' in {tmp_path}",
+        f"r.yaml:5:21: base.mesh.file: file 'b.obj' not found in {tmp_path}",
         "r.yaml:5:35: base.mesh.scale: must be greater than 0, found 0",
     ]
 
 
-def test_all_mistakes_are_told_at_once_in_the_order_of_the_file() -> None:
+def test_all_mistakes_of_a_robot_file_are_reported_in_its_order() -> None:
     text = """\
         name: 3r
         convention: standart

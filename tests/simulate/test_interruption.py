@@ -165,9 +165,9 @@ def test_blocks_that_were_damaged_by_hand_are_computed_again(run: Path, undistur
     (run / "qpos" / "c.4.0.0").unlink()
     chunk = run / "ctrl" / "c.7.0.0"
     chunk.write_bytes(bytes(byte ^ 1 if at == 40 else byte for at, byte in enumerate(chunk.read_bytes())))
-    told = dh2sim("runs", run)
-    assert (told.status, told.out) == (BAD_INPUT, "")
-    assert told.err == (
+    reported = dh2sim("runs", run)
+    assert (reported.status, reported.out) == (BAD_INPUT, "")
+    assert reported.err == (
         f"dh2sim: '{run}' is damaged; resume it with the same options to compute the damaged blocks again\n"
     )
     assert f"simulated {2 * BLOCK} in " in _finish(run).out
@@ -179,13 +179,13 @@ def test_a_run_whose_metadata_were_damaged_by_hand_is_computed_again_elsewhere(
 ) -> None:
     _finish(run)
     (run / "zarr.json").write_text("")
-    told = f"'{run / 'zarr.json'}' is missing or damaged and cannot be restored; "
+    reported = f"'{run / 'zarr.json'}' is missing or damaged and cannot be restored; "
     for arguments in (["runs", str(run)], _command(run, "--resume")):
         outcome = dh2sim(*arguments)
         assert (outcome.status, outcome.out) == (BAD_INPUT, "")
         assert (
             outcome.err
-            == f"dh2sim: {told}resume with the same options in a new folder, which computes the same bits\n"
+            == f"dh2sim: {reported}resume with the same options in a new folder, which computes the same bits\n"
         )
     assert dh2sim(*_command(run, "--resume", "--out", str(tmp_path / "new.zarr"))).status == 0
     new, old = open_dataset(tmp_path / "new.zarr"), open_dataset(undisturbed)
@@ -193,7 +193,7 @@ def test_a_run_whose_metadata_were_damaged_by_hand_is_computed_again_elsewhere(
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "reported"),
     [
         (("--seed", "1"), "seed was 0 and is now 1"),
         (("--controller", "hold"), "controller was 'pd' and is now 'hold'"),
@@ -201,13 +201,13 @@ def test_a_run_whose_metadata_were_damaged_by_hand_is_computed_again_elsewhere(
         (("--randomize", "mass=0.1"), "randomize was none and is now mass=0.1"),
     ],
 )
-def test_other_settings_are_refused(run: Path, options: Sequence[str], told: str) -> None:
+def test_other_settings_are_refused(run: Path, options: Sequence[str], reported: str) -> None:
     before = contents(run)
     outcome = dh2sim(*_command(run, *options, "--resume"))
     assert (outcome.status, outcome.out, outcome.err) == (
         BAD_INPUT,
         "",
-        f"dh2sim: '{run}' was made with other settings: {told}. Use the same options, or choose another folder\n",
+        f"dh2sim: '{run}' was made with other settings: {reported}. Use the same options, or choose another folder\n",
     )
     assert contents(run) == before
 
@@ -277,17 +277,17 @@ def test_on_a_full_disk_a_run_stops_and_carries_on_when_there_is_room(
         check=False,
     )
     assert done.stdout == "status 2\n", done.stderr
-    told = re.fullmatch(
+    reported = re.fullmatch(
         r"dh2sim: cannot write to 'run\.zarr': No space left on device; (\d+) of 60 rollouts are safe\. "
         r"Make room, then resume\n",
         done.stderr,
     )
-    assert told is not None, done.stderr
-    assert 0 < int(told[1]) < ROLLOUTS
+    assert reported is not None, done.stderr
+    assert 0 < int(reported[1]) < ROLLOUTS
     _assert_same(copied, undisturbed)
 
 
-def test_a_folder_that_cannot_be_made_is_told_of(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     outcome = dh2sim_process("rollout", "stanford", "--out", tmp_path / "file" / "run.zarr", "--steps", "1")
     assert (outcome.status, outcome.out, outcome.err) == (

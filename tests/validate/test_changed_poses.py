@@ -144,7 +144,7 @@ def test_all_dh_frames_may_be_missing_from_a_urdf_but_not_one(exported: Path) ->
     change(urdf, without({"dh_2"}))
     failed = failures(validated(exported / "odd.yaml", exported / "made"))
     assert {(engine, entry["reason"]) for (engine, _), entry in failed.items()} == {
-        (engine, f"{urdf}: there is no frame dh_2") for engine in FILE_ENGINES["odd.urdf"]
+        (engine, f"{urdf}: frame not found: dh_2") for engine in FILE_ENGINES["odd.urdf"]
     }
     change(urdf, without({f"dh_{i}" for i in range(6)}))
     assert validated(exported / "odd.yaml", exported / "made")["ok"] is True

@@ -48,14 +48,14 @@ def _delete_tool(root: ET.Element) -> None:
 @pytest.mark.parametrize(
     ("file", "how", "reason"),
     [
-        ("odd.urdf", _delete_joint_urdf, "there is no moving joint five"),
-        ("odd.xml", _delete_joint_mjcf, "there is no moving joint five"),
-        ("odd.urdf", _rename_joint, "there is no moving joint five"),
-        ("odd.xml", _rename_joint, "there is no moving joint five"),
+        ("odd.urdf", _delete_joint_urdf, "moving joint not found: five"),
+        ("odd.xml", _delete_joint_mjcf, "moving joint not found: five"),
+        ("odd.urdf", _rename_joint, "moving joint not found: five"),
+        ("odd.xml", _rename_joint, "moving joint not found: five"),
         ("odd.urdf", _free_joint_urdf, "the joint three moves, but the robot file has no such moving row"),
         ("odd.xml", _free_joint_mjcf, "the joint three moves, but the robot file has no such moving row"),
-        ("odd.urdf", _delete_tool, "there is no frame tool0"),
-        ("odd.xml", _delete_tool, "there is no frame tool0"),
+        ("odd.urdf", _delete_tool, "frame not found: tool0"),
+        ("odd.xml", _delete_tool, "frame not found: tool0"),
     ],
 )
 def test_joints_and_frames_that_are_missing_or_new_are_named(
@@ -83,11 +83,11 @@ def _replace_by_folder(path: Path) -> None:
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [
-        (_cut, "refuses the file: |there is no moving joint four, five"),
+        (_cut, "refuses the file: |moving joint not found: four, five"),
         (lambda path: path.write_bytes(b""), "refuses the file: "),
         (lambda path: path.write_bytes(b"name: odd\n"), "refuses the file: "),
         (lambda path: path.write_bytes(b"\xff\xfe\x00<"), "refuses the file: "),
-        (lambda path: path.write_bytes(b"<html></html>"), "refuses the file: |there is no moving joint one"),
+        (lambda path: path.write_bytes(b"<html></html>"), "refuses the file: |moving joint not found: one"),
         (Path.unlink, "no such file; write it with 'dh2sim export'"),
         (_replace_by_folder, "no such file; write it with 'dh2sim export'"),
     ],

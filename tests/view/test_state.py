@@ -207,7 +207,7 @@ def test_a_very_long_cell_is_refused_and_cut_short() -> None:
     assert len(state.table.rows[0].cells[0]) == 201
 
 
-def test_a_robot_too_large_to_be_drawn_is_refused() -> None:
+def test_an_edit_that_makes_a_robot_too_large_to_be_drawn_is_refused() -> None:
     state = after(STANFORD, events.EditCell(row=0, column="a", text="2e6"))
     assert state.table.errors[0].message == "the robot's reach is 2e+06 m; at most 1e+06 m can be shown"
 

@@ -80,7 +80,7 @@ class TipRule(StrEnum):
     """How the last frame was chosen."""
 
     TIP = "the last frame is the tip"
-    TIP_AXES = "the last frame is turned like the tip, which stands beside the axis"
+    TIP_AXES = "the last frame is turned like the tip, which is not on the axis"
     TIP_HEIGHT = "the last frame's origin is the tip's, which is turned otherwise"
     TOOL = "the tool takes the tip's pose"
 

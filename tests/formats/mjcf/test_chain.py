@@ -113,7 +113,7 @@ def test_a_tip_may_be_a_site_or_a_body_and_a_site_wins(tmp_path: Path) -> None:
     assert [joint.name for joint in read_text(tmp_path, text, tip="c").chain.joints] == ["A", "B", "C"]
 
 
-def test_an_arm_ends_at_its_hand(tmp_path: Path) -> None:
+def test_the_chain_of_an_mjcf_ends_at_the_hand(tmp_path: Path) -> None:
     hand = f'<body name="hand" pos="0 0 0.1">{BALL}{FINGERS}</body>'
     text = model_text(f'<body name="base">{body("a", body("b", body("c", hand)))}</body>')
     robot = read_text(tmp_path, text)

@@ -78,7 +78,7 @@ def test_broken_tables_are_read_or_refused(seed: int) -> None:
 @example("theta,d,a,alpha\n\n\n", "t.csv")
 @example('"theta","d","a\n', "t.csv")
 @example("theta d a alpha\n\x0b1", "")
-def test_any_text_is_read_or_refused(text: str | bytes, file: str) -> None:
+def test_any_text_is_read_as_a_table_or_refused(text: str | bytes, file: str) -> None:
     _read(text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text, file)
 
 
@@ -111,7 +111,7 @@ def test_any_cells_are_read_or_refused(rows: list[list[str]]) -> None:
     ],
     ids=range(15),
 )
-def test_a_large_wrong_file_is_refused_soon(text: str) -> None:
+def test_a_large_wrong_table_is_refused_quickly(text: str) -> None:
     start = time.perf_counter()
     with pytest.raises(ImportedFileError):
         read_table(text.encode(), file="t", name="r")

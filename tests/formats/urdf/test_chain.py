@@ -75,7 +75,7 @@ def test_tool0_is_not_the_tip_where_there_are_two_or_nothing_moves_it() -> None:
     )
 
 
-def test_an_arm_ends_at_its_hand() -> None:
+def test_the_chain_of_a_urdf_ends_at_the_hand() -> None:
     text = robot(
         links("l0", "l1", "l2", "l3", "hand", "left", "right", "nail", "grasp"),
         *THREE,

@@ -68,7 +68,7 @@ def test_limits_that_limit_are_read_and_others_noted(
     assert found == notes
 
 
-def test_a_continuous_joint_has_no_position_limits() -> None:
+def test_position_limits_of_a_continuous_urdf_joint_are_ignored() -> None:
     limits, found = one_joint('<limit lower="-3" upper="3" velocity="2" effort="1"/>', "continuous")
     assert values(limits) == (None, 2.0, 1.0)
     assert found == ("Position limits of continuous joints are left out: 'j' (-3.0, 3.0).",)

@@ -47,7 +47,7 @@ def axes(text: str) -> AxesSpec:
     return read_axes(text.encode(), file="a.yaml", directory=Path())
 
 
-def test_every_key_arrives_in_si_units() -> None:
+def test_every_key_of_an_axes_file_is_converted_to_si_units() -> None:
     spec = axes(FULL)
     turn, slide, roll = spec.joints
     assert (spec.name, spec.description, spec.source) == ("full", "Every key there is", "made up")

@@ -1,4 +1,4 @@
-"""Everything that is wrong in an axes file is told at once, with its place and what is allowed."""
+"""Everything that is wrong in an axes file is reported at once, with its place and what is allowed."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_a_good_axis_is_no_cause_for_complaint() -> None:
         ),
     ],
 )
-def test_a_wrong_axis_is_told(axis: str, message: str) -> None:
+def test_a_wrong_axis_is_reported(axis: str, message: str) -> None:
     assert _complaints(_with_axes(axis)) == [f"a.yaml:{message}"]
 
 
@@ -144,11 +144,11 @@ def test_a_wrong_axis_is_told(axis: str, message: str) -> None:
         ),
     ],
 )
-def test_a_wrong_value_at_the_top_is_told(more: str, message: str) -> None:
+def test_a_wrong_value_at_the_top_of_an_axes_file_is_reported(more: str, message: str) -> None:
     assert _complaints(_with_axes(GOOD, more=more)) == [f"a.yaml:{message}"]
 
 
-def test_a_missing_point_is_told_beside_other_unknown_keys() -> None:
+def test_a_missing_point_is_reported_along_with_unknown_keys() -> None:
     assert _complaints(_with_axes("{type: revolute, direction: [0, 0, 1], alpha: 90}")) == [
         "a.yaml:3:3: axes[0]: missing key 'point': a revolute joint needs a point of its axis; "
         "only a prismatic one does not",
@@ -184,11 +184,11 @@ def test_configurations_are_within_the_limits() -> None:
         (b"name: \xff\n", "1:7: not UTF-8: byte 0xff"),
     ],
 )
-def test_a_file_that_is_no_axes_file_is_told(text: str | bytes, message: str) -> None:
+def test_a_file_that_is_not_an_axes_file_is_refused(text: str | bytes, message: str) -> None:
     assert _complaints(text) == [f"a.yaml:{message}"]
 
 
-def test_all_mistakes_are_told_at_once_in_the_order_of_the_file() -> None:
+def test_all_mistakes_of_an_axes_file_are_reported_in_its_order() -> None:
     text = """\
 name: 3r
 convention: hayati
@@ -222,7 +222,7 @@ axes:
         ["name", "axes", "type", "point", "direction", "limits", "position", "tool", "home", "[0, 0, 1]"]
     ),
 )
-def test_a_file_with_a_piece_replaced_is_read_or_refused(piece: str, place: str) -> None:
+def test_an_axes_file_with_a_piece_replaced_is_read_or_refused(piece: str, place: str) -> None:
     limited = "{type: revolute, point: [0, 0, 0], direction: [0, 0, 1], limits: {position: [-1, 1]}}"
     text = _with_axes(limited, GOOD, more="tool: {xyz: [0, 0, 1]}\nconfigurations: {home: [0, 1]}\n")
     assert _complaints(text) == []

@@ -96,7 +96,7 @@ def _variables() -> list[Variable]:
         "mass_scale": (("rollout", "link"), "1"),
         "gain_scale": (("rollout", "actuator"), "1"),
     }
-    told = {"flag_values": list(STATUS.values()), "flag_meanings": " ".join(STATUS)}
+    reported = {"flag_values": list(STATUS.values()), "flag_meanings": " ".join(STATUS)}
     return [
         *(
             Variable(
@@ -109,7 +109,7 @@ def _variables() -> list[Variable]:
             for name, (dimensions, units) in recorded.items()
         ),
         Variable(name="contacts", dimensions=intervals, dtype=np.dtype(np.int32), fill=-1, attributes={"units": "1"}),
-        Variable(name="status", dimensions=("rollout",), dtype=np.dtype(np.int8), fill=-1, attributes=told),
+        Variable(name="status", dimensions=("rollout",), dtype=np.dtype(np.int8), fill=-1, attributes=reported),
         Variable(name="stop_step", dimensions=("rollout",), dtype=np.dtype(np.int64), fill=-1),
         Variable(name="saturation", dimensions=("rollout", "actuator"), dtype=np.dtype(np.int64), fill=0),
     ]

@@ -104,8 +104,8 @@ def test_a_damaged_run_is_an_error_and_leaves_nothing(tmp_path: Path, kind: str,
     with pytest.raises(RunDamagedError) as caught:
         CONVERTERS[kind](run, tmp_path / "new" / NAMES[kind])
     if file in ("qvel/c.1.0.0", "status/c.2"):
-        told = f"'{run}' is damaged; resume it with the same options to compute the damaged blocks again"
-        assert str(caught.value) == told
+        reported = f"'{run}' is damaged; resume it with the same options to compute the damaged blocks again"
+        assert str(caught.value) == reported
     else:
         assert f"'{run / file}' is missing or damaged" in str(caught.value)
     assert [path.name for path in tmp_path.iterdir()] == ["run.zarr"]
@@ -136,7 +136,7 @@ def _files_no_larger_than(size: int) -> Iterator[None]:
         *(("hdf5", limit) for limit in (0, 3_000, 30_000, 120_000)),
     ],
 )
-def test_a_disk_that_is_full_is_told_and_nothing_is_left(run: Path, tmp_path: Path, kind: str, limit: int) -> None:
+def test_a_full_disk_is_reported_and_nothing_is_left(run: Path, tmp_path: Path, kind: str, limit: int) -> None:
     with _files_no_larger_than(limit), pytest.raises(OutputError) as caught:
         CONVERTERS[kind](run, tmp_path / NAMES[kind])
     assert str(caught.value) == f"cannot write to '{tmp_path}': File too large; nothing was changed"
@@ -145,7 +145,7 @@ def test_a_disk_that_is_full_is_told_and_nothing_is_left(run: Path, tmp_path: Pa
 
 @pytest.mark.slow
 @both
-def test_a_file_system_without_room_is_told_and_nothing_is_left(run: Path, tmp_path: Path, kind: str) -> None:
+def test_a_full_file_system_is_reported_and_nothing_is_left(run: Path, tmp_path: Path, kind: str) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()
     script = 'mount -t tmpfs -o size=64k none "$1" || exit 77; shift; "$@"; status=$?; ls -A "$0"; exit $status'
@@ -169,7 +169,7 @@ def test_a_file_system_without_room_is_told_and_nothing_is_left(run: Path, tmp_p
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 @both
-def test_a_folder_that_may_not_be_written_to_is_told(run: Path, tmp_path: Path, kind: str) -> None:
+def test_a_folder_without_write_permission_is_reported(run: Path, tmp_path: Path, kind: str) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(OutputError) as caught:
         CONVERTERS[kind](run, tmp_path / NAMES[kind])
@@ -186,11 +186,11 @@ def test_a_folder_that_may_not_be_written_to_is_told(run: Path, tmp_path: Path, 
         ("h5py", "hdf5", "HDF5 needs the extra 'data': pip install 'dh2sim[data]'"),
     ],
 )
-def test_a_library_that_is_missing_is_told_with_how_to_get_it(
+def test_the_error_of_a_missing_library_says_how_to_install_it(
     run: Path, tmp_path: Path, package: str, kind: str, message: str
 ) -> None:
     without = "import sys; sys.modules[sys.argv.pop(1)] = None; from dh2sim.cli.main import main; main()"
-    told = _python(without, package, "runs", run, "--to", kind, "--out", tmp_path / "out")
-    assert told == Outcome(status=2, out="", err=f"dh2sim: {message}\n")
+    reported = _python(without, package, "runs", run, "--to", kind, "--out", tmp_path / "out")
+    assert reported == Outcome(status=2, out="", err=f"dh2sim: {message}\n")
     assert not list(tmp_path.iterdir())
     assert _python(without, package, "runs", run).status == 0

@@ -98,10 +98,10 @@ def test_a_robot_without_actuators_has_an_empty_dimension(tmp_path: Path) -> Non
     assert dataset["ctrl"].shape == (ROLLOUTS, 4, 0)
 
 
-def test_progress_is_told_by_blocks(run: Path, tmp_path: Path) -> None:
-    told: list[int] = []
-    to_hdf5(run, tmp_path / "run.h5", advance=told.append)
-    assert told == [3, 3, 1]
+def test_progress_of_an_hdf5_conversion_advances_by_blocks(run: Path, tmp_path: Path) -> None:
+    reported: list[int] = []
+    to_hdf5(run, tmp_path / "run.h5", advance=reported.append)
+    assert reported == [3, 3, 1]
 
 
 @given(

@@ -65,11 +65,11 @@ def test_an_interruption_leaves_nothing(
             time.sleep(0.001)  # until there is something to be left behind
         time.sleep(rng.uniform(0.0, 0.3))
         process.send_signal(kill)
-        told = process.communicate(timeout=60)[1]
+        reported = process.communicate(timeout=60)[1]
         if process.returncode == 0:
             continue  # it was done before
         interrupted += 1
-        assert (process.returncode, told) == (status, "dh2sim: interrupted\n" if kill is signal.SIGINT else "")
+        assert (process.returncode, reported) == (status, "dh2sim: interrupted\n" if kill is signal.SIGINT else "")
         assert not list(out.parent.iterdir())
     assert interrupted
 

@@ -132,17 +132,17 @@ def test_names_are_stored_once_and_read_by_pandas_as_categories(run: Path, tmp_p
 def test_the_metadata_hold_units_and_all_attributes(run: Path, tmp_path: Path) -> None:
     expected = dict(make_layout().attributes)
     for file in to_parquet(run, tmp_path / "out.parquet"):
-        told = {key.decode(): value.decode() for key, value in pq.read_schema(file).metadata.items()}
-        labels = {name: json.loads(told.pop(name)) for name in ("joint", "joint_unit", "joint_lower", "actuator")}
+        reported = {key.decode(): value.decode() for key, value in pq.read_schema(file).metadata.items()}
+        labels = {name: json.loads(reported.pop(name)) for name in ("joint", "joint_unit", "joint_lower", "actuator")}
         assert labels == {
             "joint": list(JOINTS),
             "joint_unit": ["rad", "rad", "m"],
             "joint_lower": [-2.0, None, 0.0],
             "actuator": list(ACTUATORS),
         }
-        assert json.loads(told.pop("actuator_unit")) == ["rad", "N"]
+        assert json.loads(reported.pop("actuator_unit")) == ["rad", "N"]
         assert {
-            name: value if isinstance(expected[name], str) else json.loads(value) for name, value in told.items()
+            name: value if isinstance(expected[name], str) else json.loads(value) for name, value in reported.items()
         } == expected
     fields = pq.read_schema(tmp_path / "out.parquet")
     assert fields.field("qpos").metadata == {b"units": b"rad or m", b"long_name": b"qpos of the run"}
@@ -196,10 +196,10 @@ def test_a_table_of_which_nothing_was_recorded_has_no_rows(tmp_path: Path) -> No
     assert (len(joints), len(steps), len(rollouts)) == (0, ROLLOUTS * (RECORDS + 1), ROLLOUTS)
 
 
-def test_progress_is_told_by_blocks(run: Path, tmp_path: Path) -> None:
-    told: list[int] = []
-    to_parquet(run, tmp_path / "out.parquet", advance=told.append)
-    assert told == [3, 3, 1]
+def test_progress_of_a_parquet_conversion_advances_by_blocks(run: Path, tmp_path: Path) -> None:
+    reported: list[int] = []
+    to_parquet(run, tmp_path / "out.parquet", advance=reported.append)
+    assert reported == [3, 3, 1]
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ def _refusal(path: Path, of: Layout) -> str:
 
 
 @pytest.mark.parametrize(
-    ("other", "told"),
+    ("other", "reported"),
     [
         ({"settings": {"seed": 1}}, "seed was 0 and is now 1"),
         (
@@ -58,12 +58,12 @@ def _refusal(path: Path, of: Layout) -> str:
     ],
 )
 def test_a_run_of_other_settings_is_not_resumed_and_every_difference_named(
-    tmp_path: Path, other: dict[str, Any], told: str
+    tmp_path: Path, other: dict[str, Any], reported: str
 ) -> None:
     path = make(tmp_path / "run.zarr", layout())
     before = contents(path)
     assert _refusal(path, layout(**other)) == (
-        f"'{path}' was made with other settings: {told}. Use the same options, or choose another folder"
+        f"'{path}' was made with other settings: {reported}. Use the same options, or choose another folder"
     )
     assert contents(path) == before
 

@@ -182,13 +182,13 @@ def _set(file: Path, attribute: str, value: object) -> None:
 def test_a_run_of_another_version_is_not_opened(tmp_path: Path, file: str, attribute: str, known: int) -> None:
     path = make(tmp_path / "run.zarr", layout())
     _set(path / file, attribute, 9)
-    told = f"'{path}' was written by another version of dh2sim: its format is 9, and this version reads {known}"
+    reported = f"'{path}' was written by another version of dh2sim: its format is 9, and this version reads {known}"
     with pytest.raises(RunError) as caught:
         open_dataset(path)
-    assert str(caught.value) == told
+    assert str(caught.value) == reported
     with pytest.raises(RunError) as caught:
         RunWriter.resume(path, layout())
-    assert str(caught.value) == told
+    assert str(caught.value) == reported
 
 
 def test_a_run_of_the_first_version_is_not_opened(tmp_path: Path) -> None:

@@ -68,14 +68,14 @@ def test_what_is_no_run_is_never_replaced(tmp_path: Path, make_it: Callable[[Pat
     path = tmp_path / "run.zarr"
     make_it(path)
     before = contents(tmp_path)
-    told = f"'{path}' is not a run of dh2sim"
+    reported = f"'{path}' is not a run of dh2sim"
     for overwrite in (False, True):
         with pytest.raises(RunExistsError) as caught:
             RunWriter.create(path, layout(), overwrite=overwrite)
-        assert str(caught.value) == f"{told}; remove it yourself, or choose another folder"
+        assert str(caught.value) == f"{reported}; remove it yourself, or choose another folder"
     with pytest.raises(RunError) as refused:
         RunWriter.resume(path, layout())
-    assert str(refused.value) == told
+    assert str(refused.value) == reported
     assert contents(tmp_path) == before
 
 
@@ -110,15 +110,15 @@ def test_a_run_has_the_permissions_that_files_have_here(tmp_path: Path) -> None:
 
 def test_there_is_one_writer_at_a_time(tmp_path: Path) -> None:
     path = tmp_path / "run.zarr"
-    told = f"another process is writing to '{path}'"
+    reported = f"another process is writing to '{path}'"
     with RunWriter.create(path, layout()) as first:
         first.write(0, block_of(layout(), 0), SECONDS)
         with pytest.raises(RunBusyError) as caught:
             RunWriter.resume(path, layout())
-        assert str(caught.value) == told
+        assert str(caught.value) == reported
         with pytest.raises(RunBusyError) as caught:
             RunWriter.create(path, layout(), overwrite=True)
-        assert str(caught.value) == told
+        assert str(caught.value) == reported
         assert finish(first) == (1, 2)
     assert resume(path, layout()) == ()
     assert os.listdir(tmp_path) == ["run.zarr"]
