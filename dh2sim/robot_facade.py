@@ -77,7 +77,7 @@ class TableRow:
     d: float = 0.0
     theta: float = 0.0
     beta: float = 0.0
-    """Second twist; of a Hayati row alone."""
+    """Second twist; of a Hayati row only."""
     flip: bool = False
     """True: the joint coordinate subtracts instead."""
     limits: Sequence[float] | Limits | None = None

@@ -37,7 +37,7 @@ class PinocchioEngine:
         import pinocchio
 
         if not hasattr(pinocchio, "buildModelFromUrdf"):
-            raise ImportError("another package of that name is; the one wanted comes with 'pip install pin'")
+            raise ImportError("another package of that name is installed; this one is installed by 'pip install pin'")
         self._pin: Any = pinocchio
         try:
             self._model: Any = pinocchio.buildModelFromUrdf(str(path))

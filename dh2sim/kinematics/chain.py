@@ -108,7 +108,7 @@ def build_chain(spec: SpecLike) -> KinematicChain:
     """Turn a Denavit-Hartenberg table into a chain of joint-placed bodies.
 
     With X = Tx(a) Rx(alpha) and Z = Rz(theta) Tz(d), a row's transform is Z X (standard), X Z (modified) or
-    Z X Ry(beta) (Hayati). The joint moves in Z, so what follows Z in a row is behind its joint and goes in
+    Z X Ry(beta) (Hayati). The joint moves in Z, so what follows Z in a row comes after its joint and goes in
     front of the next. A fixed row becomes a joint that does not move.
 
     Args:

@@ -1,7 +1,7 @@
 """A table rewritten in another convention; the arm, its links and its joint coordinates stay what they are.
 
 Every table is one product base · … X Z X Z … · tool of link parts X = Tx(a) Rx(alpha) and joint parts
-Z = Rz(theta) Tz(d); a Hayati row has Ry(beta) behind its X. The conventions cut it into rows at other places, so a
+Z = Rz(theta) Tz(d); a Hayati row has Ry(beta) after its X. The conventions cut it into rows at different places, so a
 conversion hands link parts from row to row and computes next to nothing: two that meet add up, as numbers.
 """
 
@@ -113,7 +113,7 @@ def convert_rows(spec: RobotSpec, to: Convention) -> Conversion:
     """Rewrite a robot's table in the standard or the modified convention, by the index shift.
 
     Joint parts and all else of a joint stay. Link parts move: a modified row takes the X before its Z, a standard one
-    the X behind it. Where that leaves a choice:
+    the X after it. Where that leaves a choice:
 
     * Two X that meet, where conventions were mixed, become one: a and alpha add, and the sum of two alpha that are
       not zero is brought to (-pi, pi]. Every other number of the table is handed on as it is.
@@ -127,8 +127,8 @@ def convert_rows(spec: RobotSpec, to: Convention) -> Conversion:
     there is a base pose and it is a pure Tx(a) Rx(alpha) or the first row has an X too. Then the ends are cut another
     way, and the arm is the same.
 
-    A Hayati row whose beta is not zero stays, since no other row has a second twist. It takes only what is behind its
-    Z, so that rows before it may have to stay standard, and rows behind it modified. One whose beta is zero is a
+    A Hayati row whose beta is not zero stays, since no other row has a second twist. It takes only what comes after
+    its Z, so that rows before it may have to stay standard, and rows after it modified. One whose beta is zero is a
     standard row.
 
     DH frames move with the cuts. Centres of mass, inertias and mesh poses, which the file gives in them, are
@@ -224,7 +224,7 @@ def _kept(row: Row) -> Row:
 
 def _rewritten(row: Row, link: XPart, to: Convention) -> Row:
     new = replace(row, convention=to, a=link.a, alpha=link.alpha, beta=0.0)
-    # both DH frames stand behind the same Z, which leaves what is behind it: T_joint_new⁻¹ T_joint_old
+    # both DH frames follow the same Z, so they differ only in what comes after it: T_joint_new⁻¹ T_joint_old
     return replace(new, link=_moved_link(row.link, merged(_tail(row), inverse(_tail(new)))))
 
 

@@ -99,7 +99,7 @@ def _change(root: Node, text: str, cell: Cell, typed: str | None) -> tuple[int, 
 
 
 def _removal(text: str, entry: Entry, *, flow: bool) -> tuple[int, int, str]:
-    """Return how a key is taken out of a row that has others: with the comma or the line end behind it, or before."""
+    """Return how a key is removed from a row that has others: with the comma or line end after it, or before it."""
     behind = re.compile(r"\s*,\s*" if flow else r"[ \t]*\n[ \t]*").match(text, entry.value.end)
     if behind:
         return entry.start, behind.end(), ""

@@ -296,7 +296,7 @@ class Row:
     ] = 0.0
     beta: Annotated[
         float,
-        Number("beta_i, second twist, about y, in the file's angle unit; of a Hayati row alone.", Dimension.ANGLE),
+        Number("beta_i, second twist, about y, in the file's angle unit; of a Hayati row only.", Dimension.ANGLE),
     ] = 0.0
     flip: Annotated[bool, Flag("True: the joint coordinate subtracts instead.")] = False
     limits: Annotated[

@@ -228,7 +228,7 @@ def _escaped(character: str) -> str:
 
 
 Tree: TypeAlias = "str | list[str] | dict[str, Tree]"
-"""Texts as they stand in the file, in lists and mappings."""
+"""Texts as written in the file, in lists and mappings."""
 
 _WORDS: Final = ("name", "type")
 _NUMBERS: Final = ("a", "alpha", "beta", "d", "theta")
@@ -413,7 +413,7 @@ def robot_file_text(
     """Return the text of a robot file that ``parse_robot`` reads as the same robot.
 
     Numbers read back as the same doubles in rad and m. In other units some have no text that does; those come back
-    an ulp off, and stay the same from then on. Parameters are not written: the numbers that they gave stand in
+    an ulp off, and stay the same from then on. Parameters are not written: the numbers that they gave are in
     their places. In description and source, characters that YAML cannot hold become U+FFFD. What a robot file
     does not allow (such as a kp of a velocity actuator) is written as it is, for the reader to complain of.
 

@@ -84,7 +84,7 @@ def test_distances_of_the_common_mistakes_are_as_printed(example: RobotSpec) -> 
     wrong = {
         "the wrong convention": read_as(example, Convention.MODIFIED),
         "degrees taken for radians": replace(example, rows=tuple(in_radians)),
-        "sign of alpha_1 turned": replace(example, rows=(replace(first, alpha=-first.alpha), second)),
+        "wrong sign of alpha_1": replace(example, rows=(replace(first, alpha=-first.alpha), second)),
         "a and alpha one row late": replace(example, rows=late),
         "the theta offset forgotten": replace(example, rows=(first, replace(second, theta=0))),
     }

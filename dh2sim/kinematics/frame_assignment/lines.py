@@ -94,10 +94,10 @@ def transversal(first: Line, second: Line, direction: Array, least_volume: float
         first: A line.
         second: Another one.
         direction: Unit vector, shape (3,).
-        least_volume: Of the box that the three directions span; where it is smaller the answer is badly determined.
+        least_volume: Of the box that the three directions span, at least.
 
     Returns:
-        A point of the first line, m, shape (3,); None where there is no such line.
+        A point of the first line, m, shape (3,); None if it is badly determined.
     """
     normal = np.cross(direction, second.direction)
     volume = float(first.direction @ normal)

@@ -21,7 +21,7 @@ from dh2sim.typing import Array
 def proximal_from(assignment: Assignment, convention: Convention) -> int:
     """Return from which row on, counted from 0, rows are modified ones.
 
-    A Hayati row is distal: its link part is behind its joint. So do those of all rows before it; only rows behind
+    A Hayati row is distal: its link part comes after its joint. So do those of all rows before it; only rows after
     the last Hayati row can be modified.
     """
     if convention is not Convention.MODIFIED:

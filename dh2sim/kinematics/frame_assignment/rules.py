@@ -210,7 +210,7 @@ def next_axis(chain: SerialChain, index: int, T: Array) -> Line | None:
     Args:
         chain: The chain.
         index: Of the joint, from 0.
-        T: Pose of that joint's link in the frame that the axis is wanted in, shape (4, 4).
+        T: Pose of that joint's link in the frame that the axis is expressed in, shape (4, 4).
     """
     if index + 1 >= chain.n:
         return None
@@ -284,7 +284,7 @@ def _normal(first: Line, second: Line | None) -> Array | None:
 
 
 def last_parts(T_frame_tip: Array, tolerances: Tolerances, *, last_link: bool) -> tuple[JointPart, LinkPart, TipRule]:
-    """Choose the last joint's part and the link part behind it so that as little as possible is left to the tool.
+    """Choose the last joint's part and the link part after it so that as little as possible is left to the tool.
 
     Args:
         T_frame_tip: Pose of the tip in the frame that the row before ends with, shape (4, 4).
