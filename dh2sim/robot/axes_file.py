@@ -1,6 +1,5 @@
 """Axes files: joint axes of a serial robot, to which frames are yet to be assigned."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +13,7 @@ from dh2sim.messages import Loc, closest
 from dh2sim.robot.checks import check_actuators, check_configurations, check_names, check_type, trees
 from dh2sim.robot.fields import WRONG, Choice, Configurations, Name, Numbers, Parameters, Scope, Text, Tree, UnitsLike
 from dh2sim.robot.parts import Internal, Part, Parts
-from dh2sim.robot.read import check_file, file_scope, units_of
+from dh2sim.robot.read import read_tree, units_of
 from dh2sim.robot.spec import (
     CONVENTIONS,
     JOINT_LETTERS,
@@ -30,7 +29,7 @@ from dh2sim.robot.spec import (
     filled_in,
     joint_vectors,
 )
-from dh2sim.robot.yaml_tree import Report, compose, decode
+from dh2sim.robot.yaml_tree import Report
 from dh2sim.typing import Array, read_only
 
 
@@ -137,29 +136,14 @@ def read_axes(data: bytes, *, file: str, directory: Path) -> AxesSpec:
     Raises:
         ImportedFileError: The file is wrong; the error holds everything that is.
     """
-    report = _AxesReport(file)
-    text = decode(data, report)
-    root = compose(text, report, needs="axes need at least name and axes")
-    scope = file_scope(root, report, directory)
-    tree = check_file(_AXES, root, scope)
-    if tree is not WRONG:
-        _check(tree, scope)
-    if report.problems:
-        raise report.error()
+    needs = "axes need at least name and axes"
+    tree, _ = read_tree(_AXES, _check, data, _AxesReport(file), directory, needs=needs)
     units = units_of(tree)
     joints = filled_in(tree["axes"], tree)
     point = joints[-1].get("point")
     tool = {**({} if point is None else {"xyz": point}), **tree.get("tool", {})}
     fields = _AXES.fields({**tree, "axes": joints, "tool": tool}, units)
-    return AxesSpec(
-        **{
-            **fields,
-            "configurations": joint_vectors(tree, joints, units),
-            "source_file": SourceFile(
-                name=Path(file).name, path=file, text=text, sha256=hashlib.sha256(data).hexdigest()
-            ),
-        }
-    )
+    return AxesSpec(**{**fields, "configurations": joint_vectors(tree, joints, units)})
 
 
 def _check(tree: Tree, scope: Scope) -> None:

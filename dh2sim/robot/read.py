@@ -6,10 +6,9 @@ import hashlib
 import math
 import os
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
 
 from dh2sim.errors import Dh2simError, RobotError, UnknownRobotError
 from dh2sim.messages import Loc, did_you_mean, listed, loc_of, path_of, shown
@@ -62,23 +61,56 @@ def parse_robot(
     """
     data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
     report = Report(file)
-    decoded = decode(data, report)
-    root = compose(decoded, report)
     folder = directory or Path.cwd()
-    scope = file_scope(root, report, folder if mesh_files else None)
-    tree = check_file(ROBOT, root, scope)
+    tree, places = read_tree(ROBOT, check, data, report, folder if mesh_files else None)
+    _locate_meshes(tree, places)
+    try:
+        return RobotSpec(**robot_fields(tree, units_of(tree)))
+    except RobotError as error:  # right in the file's units alone, such as a radius that is too small in m
+        for problem in error.problems:
+            places(loc_of(problem.path), f"{problem.message} once converted to SI units")
+        raise report.error() from None
+
+
+def read_tree(
+    kind: Part,
+    check: Callable[[Tree, Scope], None],
+    data: bytes,
+    report: Report,
+    directory: Path | None,
+    **compose_options: str,
+) -> tuple[Tree, Places]:
+    """Return the checked tree of a file, with its text as ``source_file``, and the places of its values.
+
+    Args:
+        kind: What the file describes.
+        check: Checks between the values.
+        data: The file's content.
+        report: Where problems are noted.
+        directory: Where paths in the file start; None where it may name no files.
+        **compose_options: As for ``compose``.
+
+    Raises:
+        RobotFileError: The file is wrong, in the form that ``report.error`` gives it.
+    """
+    text = decode(data, report)
+    root = compose(text, report, **compose_options)
+    places = Places(root, report)
+    scope = Scope(
+        report=places,
+        parameters=_evaluate_parameters(root, report),
+        directory=directory,
+        angle=_unit(root.at("units", "angle"), AngleUnit),
+        length=_unit(root.at("units", "length"), LengthUnit),
+    )
+    tree = kind.check(_plain(root), (), scope)
     if tree is not WRONG:
         check(tree, scope)
     if report.problems:
         raise report.error()
-    _locate_meshes(tree, scope.report)
-    source = SourceFile(name=Path(file).name, path=file, text=decoded, sha256=hashlib.sha256(data).hexdigest())
-    try:
-        return RobotSpec(**robot_fields({**tree, "source_file": source}, units_of(tree)))
-    except RobotError as error:  # right in the file's units alone, such as a radius that is too small in m
-        for problem in error.problems:
-            scope.report(loc_of(problem.path), f"{problem.message} once converted to SI units")
-        raise report.error() from None
+    file = report.file
+    source = SourceFile(name=Path(file).name, path=file, text=text, sha256=hashlib.sha256(data).hexdigest())
+    return {**tree, "source_file": source}, places
 
 
 class Places:
@@ -111,32 +143,10 @@ class Places:
         return next(node for end in range(len(loc), -1, -1) if (node := self._root.at(*loc[:end])))
 
 
-def file_scope(root: Node, report: Report, directory: Path | None) -> Scope:
-    """Return what checks need to know of a file; problems of its parameters are noted.
-
-    Args:
-        root: The tree of the file.
-        report: Where problems are noted.
-        directory: Where paths in the file start; None where it may name no files.
-    """
-    return Scope(
-        report=Places(root, report),
-        parameters=evaluate_parameters(root, report),
-        directory=directory,
-        angle=_unit(root.at("units", "angle"), AngleUnit),
-        length=_unit(root.at("units", "length"), LengthUnit),
-    )
-
-
 def _unit(node: Node | None, units: type[StrEnum]) -> str:
     """Return a unit of the file; the default one where it names none, or a wrong one."""
     allowed = [unit.value for unit in units]
     return str(node.value) if node is not None and node.value in allowed else allowed[0]
-
-
-def check_file(kind: Part, root: Node, scope: Scope) -> Any:
-    """Return the checked tree of a file that a kind describes."""
-    return kind.check(_plain(root), (), scope)
 
 
 def units_of(tree: Tree) -> Units:
@@ -155,7 +165,7 @@ def _plain(node: Node) -> object:
             return scalar
 
 
-def _locate_meshes(tree: Tree, places: Any) -> None:
+def _locate_meshes(tree: Tree, places: Places) -> None:
     """Note in the meshes of a checked tree where the file names them, for later messages."""
     owners: list[tuple[Loc, Tree]] = [(("base",), tree.get("base", {}))]
     owners += [(("joints", index, "link"), row.get("link", {})) for index, row in enumerate(tree["joints"])]
@@ -164,7 +174,7 @@ def _locate_meshes(tree: Tree, places: Any) -> None:
             owner["mesh"]["location"] = places.place((*loc, "mesh", "file"))
 
 
-def evaluate_parameters(root: Node, report: Report) -> Mapping[str, float]:
+def _evaluate_parameters(root: Node, report: Report) -> Mapping[str, float]:
     """Return every parameter's value; NaN for one that is wrong, which is then in ``report``.
 
     Where keys of ``parameters`` could not be read, every other name has the value NaN as well.
