@@ -46,7 +46,7 @@ def test_a_robot_file_named_without_its_ending_is_offered(tmp_path: Path, monkey
     write(tmp_path, small("mine"), "mine")
     run = dh2sim("fk", "mine", "home")
     assert (run.status, run.out) == (2, "")
-    assert run.err.startswith("dh2sim: there is no file and no robot named 'mine'. Did you mean 'mine.yaml'? ")
+    assert run.err.startswith("dh2sim: no file or robot named 'mine'. Did you mean 'mine.yaml'? ")
 
 
 def test_two_robots_of_one_name_are_refused(tmp_path: Path) -> None:
