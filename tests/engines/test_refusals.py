@@ -16,6 +16,7 @@ from dh2sim.model.build import build_model
 from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 from tests.engines.files import ENGINES, joint_names, path_of, pose_engine, write
 from tests.model.samples import model
+from tests.refusals import refusal
 
 READ: dict[str, Callable[[str], object]] = {
     "mujoco": mujoco.MjModel.from_xml_path,
@@ -30,9 +31,7 @@ JOINTS = joint_names(model("odd"))
 def message(name: str, folder: Path, joints: list[str] = JOINTS, rows: int = 6) -> str:
     """What an engine says of the file that it refuses, without the file's path."""
     path = path_of(name, folder)
-    with pytest.raises(EngineError) as caught:
-        pose_engine(name, path, joints, rows)
-    text = str(caught.value)
+    text = refusal(EngineError, pose_engine, name, path, joints, rows)
     assert text.startswith(f"{path}: ")
     return text.removeprefix(f"{path}: ")
 

@@ -15,6 +15,7 @@ from dh2sim.importing.serial import assemble
 from dh2sim.importing.sources import ImportOptions, import_data, import_robot
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import AngleUnit, Convention, RobotSpec
+from tests.refusals import refusal
 
 ARM = """\
 <?xml version="1.0"?>
@@ -40,9 +41,7 @@ ARM = """\
 
 def _refused(data: str | bytes, options: ImportOptions = ImportOptions(), file: str = "arm.urdf") -> str:  # noqa: B008
     raw = data.encode() if isinstance(data, str) else data
-    with pytest.raises(Dh2simError) as caught:
-        import_data(raw, file, options)
-    return str(caught.value)
+    return refusal(Dh2simError, import_data, raw, file, options)
 
 
 def test_a_urdf_becomes_a_robot_file_that_says_where_it_is_from() -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from dh2sim.errors import MeshError, RobotFileError
 from dh2sim.model.build import build_model
 from dh2sim.model.meshes import MAX_FACES
 from dh2sim.robot.read import parse_robot
+from tests.refusals import refusal
 
 WHERE = "robot.yaml:5:58: joints[1].link.mesh.file"
 
@@ -24,10 +26,7 @@ joints:
     build_model(parse_robot(text, file="robot.yaml", directory=folder))
 
 
-def message(folder: Path, name: str, extra: str = "") -> str:
-    with pytest.raises(MeshError) as caught:
-        build(folder, name, extra)
-    return str(caught.value)
+refused = partial(refusal, MeshError, build)
 
 
 def triangles(vertices: list[list[float]], faces: list[list[int]]) -> bytes:
@@ -50,7 +49,7 @@ def triangles(vertices: list[list[float]], faces: list[list[int]]) -> bytes:
 )
 def test_a_file_without_faces_is_refused(tmp_path: Path, name: str, data: bytes) -> None:
     (tmp_path / name).write_bytes(data)
-    assert message(tmp_path, name) == f"{WHERE}: the mesh '{tmp_path / name}' has no faces"
+    assert refused(tmp_path, name) == f"{WHERE}: the mesh '{tmp_path / name}' has no faces"
 
 
 @pytest.mark.parametrize(
@@ -67,7 +66,7 @@ def test_a_mesh_file_that_cannot_be_read_is_refused(tmp_path: Path, name: str, d
     with pytest.raises(Exception) as caught:  # noqa: PT011
         trimesh.load_mesh(file, process=False)
     assert str(caught.value)
-    assert message(tmp_path, name) == f"{WHERE}: cannot read the mesh '{file}': {caught.value}"
+    assert refused(tmp_path, name) == f"{WHERE}: cannot read the mesh '{file}': {caught.value}"
 
 
 def test_a_file_that_is_gone_is_named_with_its_place(tmp_path: Path) -> None:
@@ -94,28 +93,28 @@ def test_coordinates_that_are_no_finite_numbers_are_refused(tmp_path: Path, valu
     file = tmp_path / "part.obj"
     file.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {value}\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n")
     expected = f"{WHERE}: the mesh '{file}' has coordinates that are not finite"
-    assert message(tmp_path, file.name) == expected
+    assert refused(tmp_path, file.name) == expected
 
 
 def test_a_single_triangle_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "part.stl"
     file.write_bytes(triangles([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 1]]))
     expected = f"{WHERE}: the mesh '{file}' has fewer than 4 corners; MuJoCo refuses it"
-    assert message(tmp_path, file.name) == expected
+    assert refused(tmp_path, file.name) == expected
 
 
 def test_a_mesh_without_area_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "part.stl"
     file.write_bytes(triangles([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]], [[0, 1, 2], [1, 3, 2]]))
     expected = f"{WHERE}: the mesh '{file}' has an area of 0 m² with scale 1.0; MuJoCo needs at least 1e-12"
-    assert message(tmp_path, file.name) == expected
+    assert refused(tmp_path, file.name) == expected
 
 
 def test_a_mesh_that_its_scale_makes_too_small_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "part.stl"
     file.write_bytes(trimesh.creation.box((1, 1, 1)).export(file_type="stl"))
     expected = f"{WHERE}: the mesh '{file}' has an area of 6e-14 m² with scale 1e-07; MuJoCo needs at least 1e-12"
-    assert message(tmp_path, file.name, ", scale: 1e-7") == expected
+    assert refused(tmp_path, file.name, ", scale: 1e-7") == expected
 
 
 def test_more_faces_than_mujoco_reads_are_refused(tmp_path: Path) -> None:
@@ -123,7 +122,7 @@ def test_more_faces_than_mujoco_reads_are_refused(tmp_path: Path) -> None:
     faces = np.arange(MAX_FACES + 1)[:, None] + np.arange(3)
     file = tmp_path / "part.ply"
     file.write_bytes(trimesh.Trimesh(vertices, faces, process=False).export(file_type="ply"))
-    assert message(tmp_path, file.name) == (
+    assert refused(tmp_path, file.name) == (
         f"{WHERE}: the mesh '{file}' has 200001 faces; MuJoCo reads at most 200000. Simplify it, for instance "
         "with Blender's Decimate or trimesh's simplify_quadric_decimation"
     )

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from dh2sim.errors import SettingsError
 from dh2sim.simulate import rollout
 from dh2sim.simulate.initial_states import InitialStates, read_initial_states
+from tests.refusals import refusal
 
 JOINTS = ("joint_1", "slide")
 CONFIGURATIONS = {"home": np.array([0.1, 0.2]), "zero": np.zeros(2), "folded": np.array([0.3, 0.4])}
@@ -21,10 +23,7 @@ def read(text: str | Path, rollouts: int = 3) -> InitialStates:
     return read_initial_states(str(text), JOINTS, CONFIGURATIONS, rollouts)
 
 
-def refused(text: str | Path, rollouts: int = 3) -> str:
-    with pytest.raises(SettingsError) as caught:
-        read(text, rollouts)
-    return str(caught.value)
+refused = partial(refusal, SettingsError, read)
 
 
 @pytest.fixture

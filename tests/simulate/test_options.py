@@ -12,15 +12,14 @@ import pytest
 
 from dh2sim.errors import SettingsError
 from dh2sim.simulate.options import RANDOMIZABLE, RECORDABLE, RolloutKeywords, RolloutOptions
+from tests.refusals import refusal
 
 QUANTITIES = "mass, friction, damping, armature, gain"
 INTEGRATORS = "Euler, RK4, implicit, implicitfast"
 
 
 def problems(**how: Any) -> list[str]:
-    with pytest.raises(SettingsError) as caught:
-        RolloutOptions(**how)
-    return str(caught.value).splitlines()
+    return refusal(SettingsError, RolloutOptions, **how).splitlines()
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import json
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.prepare import prepare
 from tests.export.robots import write
 from tests.model.samples import ODD_ROBOT, model
+from tests.refusals import refusal
 from tests.simulate import robots
 
 
@@ -33,10 +35,7 @@ def job(robot: RobotModel | None = None, **how: Any) -> Job:
     return prepare(robot or model("stanford"), RolloutOptions(**{"rollouts": 3, "steps": 4, **how}))
 
 
-def refused(robot: RobotModel | None = None, **how: Any) -> str:
-    with pytest.raises(SettingsError) as caught:
-        job(robot, **how)
-    return str(caught.value)
+refused = partial(refusal, SettingsError, job)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -11,16 +12,14 @@ import pytest
 from dh2sim.errors import ImportedFileError
 from dh2sim.formats.serial_robot import SerialRobot
 from tests.formats.mjcf.reading import BALL, arm_text, model_text, read_text, residual
+from tests.refusals import refusal
 
 
 def ends(robot: SerialRobot) -> str:
     return robot.description.removeprefix("MJCF robot.xml, from ")
 
 
-def refusal(folder: Path, text: str, base: str | None = None, tip: str | None = None) -> str:
-    with pytest.raises(ImportedFileError) as caught:
-        read_text(folder, text, base, tip)
-    return str(caught.value)
+refused = partial(refusal, ImportedFileError, read_text)
 
 
 def body(name: str, inside: str = "", joint: str = "hinge") -> str:
@@ -53,7 +52,7 @@ def test_a_base_that_floats_is_where_the_table_starts(tmp_path: Path) -> None:
     assert ends(robot) == "hull to b"
     assert "The base 'hull' floats on a free joint; the table starts at the base." in robot.notes
     column = model_text(arm).index("<body") + 1
-    assert refusal(tmp_path, model_text(arm), base="world") == (
+    assert refused(tmp_path, model_text(arm), base="world") == (
         f"robot.xml:1:{column}: body[hull].joint: a free joint has no row in a table; "
         "choose a base or tip that leaves it out"
     )
@@ -64,14 +63,14 @@ def test_bodies_that_only_float_are_no_arm(tmp_path: Path) -> None:
     robot = read_text(tmp_path, model_text(f'{cube}<body name="base">{body("a")}</body>'))
     assert ends(robot) == "base to a"
     assert "What is not below the base 'base' is left out: body 'cube' (4.18879 kg)." in robot.notes
-    assert refusal(tmp_path, model_text(cube)) == (
+    assert refused(tmp_path, model_text(cube)) == (
         "robot.xml:1:1: the file has no joint that moves: no hinge and no slide"
     )
 
 
 def test_several_trees_are_a_choice(tmp_path: Path) -> None:
     text = model_text(f'<body name="base">{body("a", body("b"))}</body>{body("door")}')
-    assert refusal(tmp_path, text) == (
+    assert refused(tmp_path, text) == (
         "robot.xml:1:1: the file has several trees with joints; choose one arm: "
         "tip='b' (2 joints), tip='door' (1 joint)"
     )
@@ -146,14 +145,14 @@ def test_the_only_site_of_a_hand_is_the_tip(tmp_path: Path) -> None:
 def test_a_fork_that_is_no_hand_is_a_choice(arm: str, tips: str, tmp_path: Path) -> None:
     last = "b" if "FB" not in arm and '"c"' not in arm else "c"
     column = model_text(f'<body name="base">{arm}</body>').index(f'<body name="{last}"') + 1
-    assert refusal(tmp_path, model_text(f'<body name="base">{arm}</body>')) == (
+    assert refused(tmp_path, model_text(f'<body name="base">{arm}</body>')) == (
         f"robot.xml:1:{column}: the robot forks at '{last}'; choose one arm: {tips}"
     )
 
 
 def test_unknown_names_are_guessed(tmp_path: Path) -> None:
     text = arm_text(2, '<site name="flange"/>')
-    assert refusal(tmp_path, text, base="bose", tip="flnge") == (
+    assert refused(tmp_path, text, base="bose", tip="flnge") == (
         "robot.xml:1:1: base: the file has no body 'bose'. Did you mean 'base'? "
         "Its bodies: 'world', 'base', 'link_1', 'link_2'\n"
         "robot.xml:1:1: tip: the file has no site or body 'flnge'. Did you mean 'flange'? "
@@ -163,22 +162,22 @@ def test_unknown_names_are_guessed(tmp_path: Path) -> None:
 
 def test_a_tip_must_be_below_the_base(tmp_path: Path) -> None:
     text = model_text(f'<body name="base">{body("a", body("b"))}</body><body name="shelf"/>')
-    assert refusal(tmp_path, text, base="b", tip="a").endswith(
+    assert refused(tmp_path, text, base="b", tip="a").endswith(
         "the tip 'a' is not below the base 'b'; 'b' is below 'a': exchange base and tip"
     )
-    assert refusal(tmp_path, text, base="base", tip="shelf").endswith("the tip 'shelf' is not below the base 'base'")
-    assert refusal(tmp_path, text, tip="shelf").endswith(
+    assert refused(tmp_path, text, base="base", tip="shelf").endswith("the tip 'shelf' is not below the base 'base'")
+    assert refused(tmp_path, text, tip="shelf").endswith(
         "no joint moves between the base 'shelf' and the tip 'shelf'"
     )
     column = text.index('<body name="b"') + 1
-    assert refusal(tmp_path, text, base="b") == f"robot.xml:1:{column}: no joint moves below the base 'b'"
+    assert refused(tmp_path, text, base="b") == f"robot.xml:1:{column}: no joint moves below the base 'b'"
 
 
 def test_a_ball_joint_on_the_arm_is_refused_and_one_beside_it_is_not(tmp_path: Path) -> None:
     arm = body("a", body("s", body("b"), joint="ball"))
     text = model_text(f'<body name="base">{arm}</body>')
     column = text.index('<joint name="S"') + 1
-    assert refusal(tmp_path, text) == (
+    assert refused(tmp_path, text) == (
         f"robot.xml:1:{column}: joint[S]: a ball joint has no row in a table; choose a base or tip that leaves it out"
     )
     assert ends(read_text(tmp_path, text, tip="a")) == "base to a"
@@ -189,7 +188,7 @@ def test_a_place_in_an_included_file_is_named(tmp_path: Path) -> None:
     line = body("s", joint="ball")
     (tmp_path / "ball.xml").write_text(f"<x>\n{line}</x>")
     text = model_text('<body name="base"><include file="ball.xml"/></body>')
-    assert refusal(tmp_path, text) == (
+    assert refused(tmp_path, text) == (
         f"ball.xml:2:{line.index('<joint') + 1}: joint[S]: a ball joint has no row in a table; "
         "choose a base or tip that leaves it out"
     )

@@ -6,6 +6,7 @@ import os
 import random
 import re
 import warnings
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -16,14 +17,12 @@ from dh2sim.errors import Dh2simError, ImportedFileError
 from dh2sim.formats.mjcf import includes as mjcf_bytes
 from dh2sim.formats.mjcf.read import read_mjcf
 from tests.formats.mjcf.reading import BALL, arm_text, model_text, read_text
+from tests.refusals import refusal
 
 ARM = f'<body name="base"><body name="one"><joint name="a"/>{BALL}</body></body>'
 
 
-def refusal(folder: Path, text: str) -> str:
-    with pytest.raises(ImportedFileError) as caught:
-        read_text(folder, text)
-    return str(caught.value)
+refused = partial(refusal, ImportedFileError, read_text)
 
 
 @pytest.mark.parametrize(
@@ -64,7 +63,7 @@ def refusal(folder: Path, text: str) -> str:
     ],
 )
 def test_a_wrong_file_is_reported_with_its_place(text: str, message: str, tmp_path: Path) -> None:
-    assert refusal(tmp_path, text) == message.replace("FOLDER", str(tmp_path))
+    assert refused(tmp_path, text) == message.replace("FOLDER", str(tmp_path))
 
 
 @pytest.mark.parametrize("tag", ["include", "model", "flexcomp"])
@@ -74,7 +73,7 @@ def test_only_files_in_the_models_folder_are_read(tag: str, path: str, tmp_path:
     folder.mkdir()
     (tmp_path / "x.xml").write_text("<x/>")
     shown = path.replace("\\", "\\\\")
-    assert refusal(folder, f'<mujoco><{tag} file="{path}"/></mujoco>') == (
+    assert refused(folder, f'<mujoco><{tag} file="{path}"/></mujoco>') == (
         f"robot.xml:1:9: {tag}.file: found '{shown}'; only files in the model's folder and those below it are read"
     )
 
@@ -84,34 +83,34 @@ def test_included_files_are_looked_through_too(tmp_path: Path) -> None:
     (tmp_path / "sub" / "one.xml").write_text('<x><include file="two.xml"/></x>')
     (tmp_path / "sub" / "two.xml").write_text('<x>\n<include file="../../three.xml"/></x>')
     place = os.path.join("sub", "two.xml")
-    assert refusal(tmp_path, '<mujoco><include file="sub/one.xml"/></mujoco>') == (
+    assert refused(tmp_path, '<mujoco><include file="sub/one.xml"/></mujoco>') == (
         f"{place}:2:1: include.file: found '../../three.xml'; only files in the model's folder and those below it "
         "are read"
     )
 
 
 def test_a_file_that_includes_itself_is_refused(tmp_path: Path) -> None:
-    assert refusal(tmp_path, '<mujoco><include file="robot.xml"/></mujoco>') == (
+    assert refused(tmp_path, '<mujoco><include file="robot.xml"/></mujoco>') == (
         "robot.xml:1:9: include: the file 'robot.xml' is included already; MuJoCo includes a file once"
     )
 
 
 def test_models_that_attach_each_other_are_refused(tmp_path: Path) -> None:
     (tmp_path / "b.xml").write_text('<mujoco><asset><model name="r" file="robot.xml"/></asset></mujoco>')
-    assert refusal(tmp_path, '<mujoco><asset><model name="b" file="b.xml"/></asset></mujoco>') == (
+    assert refused(tmp_path, '<mujoco><asset><model name="b" file="b.xml"/></asset></mujoco>') == (
         "b.xml:1:16: model: 'robot.xml' is refused: a model cannot be attached to itself"
     )
 
 
 def test_repetitions_that_explode_are_refused(tmp_path: Path) -> None:
     text = model_text('<replicate count="1000"><replicate count="1000"><body/></replicate></replicate>')
-    assert refusal(tmp_path, text) == (
+    assert refused(tmp_path, text) == (
         "robot.xml:1:35: replicate: this makes more than 200000 elements once it is expanded"
     )
     soft = model_text('<flexcomp name="f" type="grid" count="1000 1000 1000"/>')
-    assert "more than 200000 elements" in refusal(tmp_path, soft)
+    assert "more than 200000 elements" in refused(tmp_path, soft)
     mesh = model_text(ARM, '<asset><mesh name="m" builtin="box" params="1000 1000 1000 1 1 1"/></asset>')
-    assert "more than 200000 elements" in refusal(tmp_path, mesh)
+    assert "more than 200000 elements" in refused(tmp_path, mesh)
 
 
 def test_attachments_that_explode_are_refused(tmp_path: Path) -> None:
@@ -121,7 +120,7 @@ def test_attachments_that_explode_are_refused(tmp_path: Path) -> None:
         inner = 8 * twice if i < 8 else 8 * "<body/>"
         (tmp_path / f"{i}.xml").write_text(model_text(f'<body name="b">{inner}</body>', asset if i < 8 else ""))
     text = '<mujoco><asset><model file="0.xml"/></asset></mujoco>'
-    assert "this makes more than 200000 elements once it is expanded" in refusal(tmp_path, text)
+    assert "this makes more than 200000 elements once it is expanded" in refused(tmp_path, text)
 
 
 def test_elements_are_not_nested_deeper_through_includes(tmp_path: Path) -> None:
@@ -129,12 +128,12 @@ def test_elements_are_not_nested_deeper_through_includes(tmp_path: Path) -> None
         inner = f'<include file="{i + 1}.xml"/>' if i < 5 else ""
         (tmp_path / f"{i}.xml").write_text(f"<x>{'<body>' * 100}{inner}{'</body>' * 100}</x>")
     text = model_text('<include file="0.xml"/>')
-    assert "elements are nested more than 510 deep" in refusal(tmp_path, text)
+    assert "elements are nested more than 510 deep" in refused(tmp_path, text)
 
 
 def test_a_file_that_is_too_large_is_refused_unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mjcf_bytes, "MAX_BYTES", 100)
-    assert refusal(tmp_path, model_text(ARM)) == (
+    assert refused(tmp_path, model_text(ARM)) == (
         "robot.xml:1:1: the file is too large: at most 100 bytes are read, with all that it includes"
     )
 
@@ -167,14 +166,14 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
 
 def test_a_problem_in_an_included_file_has_no_line_of_the_first(tmp_path: Path) -> None:
     (tmp_path / "x.xml").write_text("<x>\n\n\n<bodi/></x>")
-    assert refusal(tmp_path, model_text('<include file="x.xml"/>')) == (
+    assert refused(tmp_path, model_text('<include file="x.xml"/>')) == (
         "robot.xml:1:1: MuJoCo refuses the file: Schema violation: unrecognized element (element 'bodi')"
     )
 
 
 def test_a_line_of_one_of_several_models_is_no_line_of_the_first(tmp_path: Path) -> None:
     (tmp_path / "x.xml").write_text("<mujoco>\n\n\n<bodi/></mujoco>")
-    assert refusal(tmp_path, '<mujoco><asset><model file="x.xml"/></asset></mujoco>') == (
+    assert refused(tmp_path, '<mujoco><asset><model file="x.xml"/></asset></mujoco>') == (
         "robot.xml:1:1: MuJoCo refuses the file: could not parse model file with error: "
         "XML Error: Schema violation: unrecognized element (element 'bodi') (element 'model') "
         "(line 4, of this model or of one that it attaches)"
@@ -192,7 +191,7 @@ def test_numbers_that_are_no_use_are_refused(tmp_path: Path) -> None:
         f'<body name="base"><body name="one" pos="nan 0 0"><joint name="a" pos="1e40 0 0"/>{BALL}</body></body>'
     )
     column = text.index('<body name="one"') + 1
-    assert refusal(tmp_path, text) == (
+    assert refused(tmp_path, text) == (
         f"robot.xml:1:{column}: body[one]: the body's pose has a number that is not finite, or greater than 1e+30\n"
         f"robot.xml:1:{text.index('<joint') + 1}: joint[a]: the joint has a number that is not finite, "
         "or greater than 1e+30"

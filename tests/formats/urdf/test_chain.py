@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from dh2sim.errors import ImportedFileError
 from tests.formats.urdf.samples import joint, links, read, robot
+from tests.refusals import refusal
 
-
-def refusal(text: str, *, base: str | None = None, tip: str | None = None) -> str:
-    with pytest.raises(ImportedFileError) as caught:
-        read(text, base=base, tip=tip)
-    return str(caught.value)
+refused = partial(refusal, ImportedFileError, read)
 
 
 def ends(text: str, *, base: str | None = None, tip: str | None = None) -> str:
@@ -66,7 +65,7 @@ def test_tool0_is_not_the_tip_where_there_are_two_or_nothing_moves_it() -> None:
         joint("ta", "a", "a_tool0", "fixed"),
         joint("tb", "b", "b_tool0", "fixed"),
     )
-    assert refusal(arms) == (
+    assert refused(arms) == (
         "arm.urdf:2:1: the robot forks at 'l0'; choose one arm: tip='a_tool0' (1 joint), tip='b_tool0' (1 joint)"
     )
     assert ends(arms.replace("b_tool0", "tool0")) == "from l0 to tool0"
@@ -104,7 +103,7 @@ def test_a_fork_behind_two_joints_or_into_a_branch_as_long_as_the_arm_is_no_hand
         joint("jx", "l2", "x"),
         joint("jy", "l2", "y"),
     )
-    assert refusal(short) == (
+    assert refused(short) == (
         "arm.urdf:2:35: the robot forks at 'l2'; choose one arm: tip='x' (3 joints), tip='y' (3 joints)"
     )
     long = robot(
@@ -118,7 +117,7 @@ def test_a_fork_behind_two_joints_or_into_a_branch_as_long_as_the_arm_is_no_hand
         joint("jg", "y2", "g"),
         joint("jy3", "y2", "y3", "fixed"),
     )
-    assert refusal(long) == (
+    assert refused(long) == (
         "arm.urdf:2:52: the robot forks at 'l3'; choose one arm: tip='x' (4 joints), tip='y2' (6 joints)"
     )
     assert ends(long, tip="y2") == "from l0 to y2"
@@ -129,7 +128,7 @@ def test_a_branch_of_as_many_joints_as_the_arm_is_no_finger() -> None:
     text = robot(links("l0", "l1", "l2", "l3", "x", "y", "y1"), *THREE, *tree)
     assert ends(text) == "from l0 to l3"
     text = robot(links("l0", "l1", "l2", "l3", "x", "y", "y1", "y2"), *THREE, *tree, joint("jy2", "y1", "y2"))
-    assert refusal(text) == (
+    assert refused(text) == (
         "arm.urdf:2:52: the robot forks at 'l3'; choose one arm: tip='x' (4 joints), tip='y2' (6 joints)"
     )
 
@@ -152,7 +151,7 @@ def test_where_several_frames_are_fixed_to_the_last_link_that_link_is_the_tip_an
 def test_a_base_and_a_tip_that_do_not_exist_are_reported_with_those_that_do() -> None:
     text = robot(links("l0", "l1", "l2", "l3"), *THREE)
     known = "Its links: 'l0', 'l1', 'l2', 'l3'"
-    assert refusal(text, base="l9", tip="L3") == (
+    assert refused(text, base="l9", tip="L3") == (
         f"arm.urdf:1:1: base: the file has no link 'l9'. {known}\n"
         f"arm.urdf:1:1: tip: the file has no link 'L3'. Did you mean 'l3'? {known}"
     )
@@ -160,26 +159,26 @@ def test_a_base_and_a_tip_that_do_not_exist_are_reported_with_those_that_do() ->
 
 def test_a_tip_that_is_not_below_the_base_is_refused() -> None:
     text = robot(links("l0", "l1", "l2", "l3"), links("other"), *THREE, joint("o", "l1", "other"))
-    assert refusal(text, base="l2", tip="other") == "arm.urdf:3:1: the tip 'other' is not below the base 'l2'"
-    assert refusal(text, base="l3", tip="l1") == (
+    assert refused(text, base="l2", tip="other") == "arm.urdf:3:1: the tip 'other' is not below the base 'l2'"
+    assert refused(text, base="l3", tip="l1") == (
         "arm.urdf:2:18: the tip 'l1' is not below the base 'l3'; 'l3' is below 'l1': exchange base and tip"
     )
 
 
 def test_an_arm_without_a_joint_that_moves_is_refused() -> None:
     text = robot(links("l0", "l1", "l2"), joint("j1", "l0", "l1", "fixed"), joint("j2", "l1", "l2"))
-    assert refusal(text, tip="l1") == "arm.urdf:2:18: no joint moves between the base 'l0' and the tip 'l1'"
+    assert refused(text, tip="l1") == "arm.urdf:2:18: no joint moves between the base 'l0' and the tip 'l1'"
     assert (
-        refusal(text, base="l1", tip="l1") == "arm.urdf:2:18: no joint moves between the base 'l1' and the tip 'l1'"
+        refused(text, base="l1", tip="l1") == "arm.urdf:2:18: no joint moves between the base 'l1' and the tip 'l1'"
     )
-    assert refusal(text, base="l2") == "arm.urdf:2:35: no joint moves below the base 'l2'"
-    assert refusal(robot(links("box"))) == "arm.urdf:2:1: no joint moves below the base 'box'"
+    assert refused(text, base="l2") == "arm.urdf:2:35: no joint moves below the base 'l2'"
+    assert refused(robot(links("box"))) == "arm.urdf:2:1: no joint moves below the base 'box'"
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar"])
 def test_a_joint_of_several_coordinates_is_refused_on_the_arm_and_noted_off_it(kind: str) -> None:
     on = robot(links("world", "l0", "l1", "l2", "l3"), joint("free", "world", "l0", kind), *THREE)
-    assert refusal(on) == (
+    assert refused(on) == (
         f"arm.urdf:3:1: joint[free].type: a {kind} joint has no row in a table; "
         "choose a base or tip that leaves it out"
     )
@@ -193,7 +192,7 @@ def test_a_joint_that_mimics_another_is_refused_on_the_arm() -> None:
     text = robot(
         links("l0", "l1", "l2"), joint("a", "l0", "l1"), joint("b", "l1", "l2", inside='\n<mimic joint="a"/>')
     )
-    assert refusal(text) == (
+    assert refused(text) == (
         "arm.urdf:5:1: joint[b].mimic: the joint mimics joint 'a', which no table can; "
         "choose a base or tip that leaves it out"
     )

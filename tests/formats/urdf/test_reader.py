@@ -12,13 +12,12 @@ from dh2sim.kinematics.serial_chain import serial_link_poses
 from dh2sim.robot.spec import JointType
 from tests.formats.urdf.samples import joint, links, read, robot
 from tests.model.samples import model
+from tests.refusals import refusal
 from tests.robots.samples import NAMES
 
 
-def refusal(text: str, *, base: str | None = None, tip: str | None = None) -> list[str]:
-    with pytest.raises(ImportedFileError) as caught:
-        read(text, base=base, tip=tip)
-    return str(caught.value).split("\n")
+def problems(text: str, *, base: str | None = None, tip: str | None = None) -> list[str]:
+    return refusal(ImportedFileError, read, text, base=base, tip=tip).split("\n")
 
 
 TYPES = "revolute, continuous, prismatic, fixed, floating, planar"
@@ -108,11 +107,11 @@ def test_the_default_axis_is_x() -> None:
 
 
 def test_what_is_no_urdf_is_named() -> None:
-    assert refusal("<mujoco/>") == ["arm.urdf:1:1: expected <robot>, found <mujoco>: this is an MJCF, not a URDF"]
-    assert refusal("<sdf/>") == ["arm.urdf:1:1: expected <robot>, found <sdf>: this is an SDF, not a URDF"]
-    assert refusal("<html/>") == ["arm.urdf:1:1: expected <robot>, found <html>"]
-    assert refusal("<robot/>") == ["arm.urdf:1:1: the file has no <link>"]
-    assert refusal("joints: []") == ["arm.urdf:1:1: not well-formed XML: syntax error"]
+    assert problems("<mujoco/>") == ["arm.urdf:1:1: expected <robot>, found <mujoco>: this is an MJCF, not a URDF"]
+    assert problems("<sdf/>") == ["arm.urdf:1:1: expected <robot>, found <sdf>: this is an SDF, not a URDF"]
+    assert problems("<html/>") == ["arm.urdf:1:1: expected <robot>, found <html>"]
+    assert problems("<robot/>") == ["arm.urdf:1:1: the file has no <link>"]
+    assert problems("joints: []") == ["arm.urdf:1:1: not well-formed XML: syntax error"]
 
 
 def test_every_error_in_the_structure_is_reported_with_its_place() -> None:
@@ -129,7 +128,7 @@ def test_every_error_in_the_structure_is_reported_with_its_place() -> None:
         '<joint name="e"><parent link="base"/><child link="hand"/></joint>',
         joint("d", "hand", "elbow"),
     )
-    assert refusal(text) == [
+    assert problems(text) == [
         "arm.urdf:3:1: link: <link> has no name",
         "arm.urdf:4:1: link[elbow]: a second link of this name; the first is on line 2",
         "arm.urdf:5:54: joint[a].child: the file has no link 'elbo'. Did you mean 'elbow'?",
@@ -156,14 +155,14 @@ def test_loops_and_several_roots_are_refused() -> None:
         joint("ec", "e", "c"),
         joint("ff", "f", "f"),
     )
-    assert refusal(text) == [
+    assert problems(text) == [
         "arm.urdf:4:1: joint[cd]: these joints form a loop: 'cd', 'de', 'ec'; a URDF is a tree",
         "arm.urdf:7:1: joint[ff]: the joint joins a link to itself: 'ff'; a URDF is a tree",
     ]
-    assert refusal(robot(links("a", "b"), links("c"), joint("ab", "a", "b"))) == [
+    assert problems(robot(links("a", "b"), links("c"), joint("ab", "a", "b"))) == [
         "arm.urdf:3:1: link[c]: several links have no parent: 'a', 'c'; a URDF has one root"
     ]
-    assert refusal(robot(links("a", "b"), joint("ab", "a", "b"), joint("ba", "b", "a"))) == [
+    assert problems(robot(links("a", "b"), joint("ab", "a", "b"), joint("ba", "b", "a"))) == [
         "arm.urdf:3:1: joint[ab]: these joints form a loop: 'ab', 'ba'; a URDF is a tree"
     ]
 
@@ -177,7 +176,7 @@ def test_every_wrong_number_of_the_arm_is_reported_with_its_place() -> None:
         joint("bc", "b", "c", "fixed", '<origin xyz="1e999 0 0" rpy="0,5 0 0"/>'),
         joint("cd", "c", "d", inside='<origin xzy="1 2 3" quat_xyzw="0 0 0 1"/><axis rpy="1 0 0"/><origin/>'),
     )
-    assert refusal(text) == [
+    assert problems(text) == [
         "arm.urdf:4:1: joint[ab].origin.rpy: expected 3 numbers, found '0 0'",
         "arm.urdf:4:1: joint[ab].origin.xyz: expected 3 numbers, found '0 nan 0'",
         "arm.urdf:4:34: joint[ab].axis.xyz: the axis of a joint that moves cannot be '0 0 0'",
@@ -208,13 +207,13 @@ def test_a_number_as_xml_writes_it_is_read(word: str, number: float) -> None:
 )
 def test_a_word_that_only_some_readers_take_for_a_number_is_refused(word: str) -> None:
     text = robot(links("a", "b"), joint("j", "a", "b", inside=f'<origin xyz="{word} 0 0"/>'))
-    [problem] = refusal(text)
+    [problem] = problems(text)
     assert problem.startswith("arm.urdf:3:68: joint[j].origin.xyz: expected 3 numbers")
 
 
 def test_a_misspelt_element_or_attribute_of_a_joint_is_refused() -> None:
     inside = '<orgin xyz="1 0 0"/><axes xyz="0 0 1"/><Limit/><limit lowr="-1" uper="1"/><dynamics dampening="1"/>'
-    assert refusal(robot(links("a", "b"), joint("j", "a", "b", inside=inside))) == [
+    assert problems(robot(links("a", "b"), joint("j", "a", "b", inside=inside))) == [
         "arm.urdf:3:68: joint[j]: unknown element <orgin>. Did you mean <origin>?",
         "arm.urdf:3:88: joint[j]: unknown element <axes>. Did you mean <axis>?",
         "arm.urdf:3:107: joint[j]: unknown element <Limit>. Did you mean <limit>?",
@@ -228,11 +227,11 @@ def test_xacro_that_is_not_expanded_is_refused_with_what_to_do() -> None:
     arm = (links("a", "b"), joint("j", "a", "b"))
     hint = "this is xacro. Expand it first: xacro FILE > out.urdf"
     xacro = 'r" xmlns:xacro="http://www.ros.org/wiki/xacro'
-    assert refusal(robot(*arm, '<xacro:include filename="a.xacro"/>', name=xacro)) == [
+    assert problems(robot(*arm, '<xacro:include filename="a.xacro"/>', name=xacro)) == [
         f"arm.urdf:4:1: found <xacro:include>: {hint}"
     ]
     short = 'r" xmlns:x="http://ros.org/wiki/xacro'
-    assert refusal(robot("<gazebo><x:if/></gazebo>", *arm, name=short)) == [f"arm.urdf:2:9: found <x:if>: {hint}"]
-    assert refusal(robot(links("${prefix}a"), name=xacro)) == [f"arm.urdf:2:1: found '${{prefix}}a': {hint}"]
-    assert refusal(robot(*arm, joint("k", "a", "$(arg tool)"))) == [f"arm.urdf:4:51: found '$(arg tool)': {hint}"]
+    assert problems(robot("<gazebo><x:if/></gazebo>", *arm, name=short)) == [f"arm.urdf:2:9: found <x:if>: {hint}"]
+    assert problems(robot(links("${prefix}a"), name=xacro)) == [f"arm.urdf:2:1: found '${{prefix}}a': {hint}"]
+    assert problems(robot(*arm, joint("k", "a", "$(arg tool)"))) == [f"arm.urdf:4:51: found '$(arg tool)': {hint}"]
     assert read(robot(*arm, '<gazebo config="$(find pkg)/a.yaml"/>', name=xacro)).name == "r"

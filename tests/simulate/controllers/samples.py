@@ -11,11 +11,13 @@ import mujoco
 import numpy as np
 
 import dh2sim
+from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Convention, Dynamics, JointType, Limits, RobotSpec, Row
 from dh2sim.simulate.controllers.protocol import Controller, RolloutBatch
 from dh2sim.simulate.controllers.registry import choose
 from dh2sim.simulate.plant import Plant, make_plant
 from dh2sim.typing import Array, read_only
+from tests.refusals import refusal
 
 ODD = 0.651
 
@@ -96,6 +98,11 @@ def make(text: str, spec: RobotSpec, rollouts: range = range(7), **options: Any)
     choice = choose(text)
     group = started(spec if choice.actuation is None else driven(spec, choice.actuation), rollouts, **options)
     return choice.make(group), group
+
+
+def refused(text: str, rollouts: range = range(7)) -> str:
+    """Why there is no such controller of the arm."""
+    return refusal(ControllerError, make, text, arm(), rollouts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

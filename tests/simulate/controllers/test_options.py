@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from typing import Annotated, Any, Literal, Optional
 
 import pytest
@@ -11,6 +12,7 @@ from pydantic import Field
 from dh2sim.errors import ControllerError
 from dh2sim.simulate.controllers.options import Within, join_pairs, options_of, read_options, split_pairs
 from dh2sim.simulate.controllers.registry import choose
+from tests.refusals import refusal
 
 
 def constructor(  # type: ignore[no-untyped-def]
@@ -37,10 +39,7 @@ def read(text: str) -> dict[str, Any]:
     return read_options("swing", OPTIONS, text)
 
 
-def refusal(text: str) -> str:
-    with pytest.raises(ControllerError) as caught:
-        read(text)
-    return str(caught.value)
+refused = partial(refusal, ControllerError, read)
 
 
 def test_options_are_the_keywords_of_a_signature() -> None:
@@ -101,11 +100,11 @@ def test_only_options_that_are_given_are_returned_in_the_signatures_order() -> N
     ],
 )
 def test_a_mistake_is_reported_with_what_is_allowed(text: str, problem: str) -> None:
-    assert refusal(text) == f"controller 'swing': {problem} {LISTED}"
+    assert refused(text) == f"controller 'swing': {problem} {LISTED}"
 
 
 def test_all_mistakes_are_reported_at_once() -> None:
-    assert refusal("gian=2,turns=x,share=-1") == (
+    assert refused("gian=2,turns=x,share=-1") == (
         "controller 'swing':\n"
         "  unknown option 'gian'. Did you mean 'gain'?\n"
         "  option 'turns' must be a whole number, got 'x'\n"

@@ -7,20 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate import rollout
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, Observation, OpenLoop, RolloutBatch
 from dh2sim.simulate.controllers.registry import choose
 from dh2sim.typing import Array
 from tests.simulate.controllers.own_code import SWING, line, write
-from tests.simulate.controllers.samples import arm, make, observe
-
-
-def refused(text: str) -> str:
-    with pytest.raises(ControllerError) as caught:
-        make(text, arm())
-    return str(caught.value)
+from tests.simulate.controllers.samples import arm, make, observe, refused
 
 
 def test_a_class_in_the_current_directory_is_a_controller(folder: Path) -> None:

@@ -7,13 +7,7 @@ import pytest
 from dh2sim.errors import ControllerError
 from dh2sim.simulate.controllers.protocol import Follows
 from tests.simulate.controllers.own_code import SWING, line, write
-from tests.simulate.controllers.samples import arm, make
-
-
-def refused(text: str) -> str:
-    with pytest.raises(ControllerError) as caught:
-        make(text, arm())
-    return str(caught.value)
+from tests.simulate.controllers.samples import arm, make, refused
 
 
 @pytest.mark.parametrize(

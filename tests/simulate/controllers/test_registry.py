@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import inspect
+from functools import partial
 
 import pytest
 
@@ -8,16 +9,14 @@ from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, OpenLoop
 from dh2sim.simulate.controllers.registry import BUILT_IN, choose
+from tests.refusals import refusal
 from tests.simulate.controllers.samples import arm, make
 
 NAMES = ["passive", "hold", "gravity-compensation", "pd", "computed-torque", "sine", "random", "replay"]
 KNOWN = "passive, hold, gravity-compensation, pd, computed-torque, sine, random, replay"
 
 
-def refused(text: str) -> str:
-    with pytest.raises(ControllerError) as caught:
-        choose(text)
-    return str(caught.value)
+refused = partial(refusal, ControllerError, choose)
 
 
 @pytest.mark.parametrize(

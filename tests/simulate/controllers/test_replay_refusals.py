@@ -7,16 +7,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dh2sim.errors import ControllerError
 from dh2sim.simulate.controllers.protocol import OpenLoop
 from tests.simulate.controllers.files import JOINTS, run, table
-from tests.simulate.controllers.samples import arm, make
-
-
-def refused(text: str, rollouts: range = range(7)) -> str:
-    with pytest.raises(ControllerError) as caught:
-        make(text, arm(), rollouts)
-    return str(caught.value)
+from tests.simulate.controllers.samples import arm, make, refused
 
 
 @pytest.mark.parametrize(

@@ -1,22 +1,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from dh2sim.errors import RunDiffersError
-from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.store.writer import RunWriter
 from tests.program import contents
+from tests.refusals import refusal
 from tests.simulate.store.runs import finish, lasting, layout, make, resume
 
-
-def _refusal(path: Path, of: Layout) -> str:
-    with pytest.raises(RunDiffersError) as caught:
-        RunWriter.resume(path, of)
-    return str(caught.value)
+refused = partial(refusal, RunDiffersError, RunWriter.resume)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +59,7 @@ def test_a_run_of_other_settings_is_not_resumed_and_every_difference_named(
 ) -> None:
     path = make(tmp_path / "run.zarr", layout())
     before = contents(path)
-    assert _refusal(path, layout(**other)) == (
+    assert refused(path, layout(**other)) == (
         f"'{path}' was made with other settings: {reported}. Use the same options, or choose another folder"
     )
     assert contents(path) == before
@@ -70,7 +67,7 @@ def test_a_run_of_other_settings_is_not_resumed_and_every_difference_named(
 
 def test_a_run_of_another_number_of_rollouts_is_not_resumed(tmp_path: Path) -> None:
     path = make(tmp_path / "run.zarr", layout(rollouts=7))
-    assert _refusal(path, layout(rollouts=8)) == (
+    assert refused(path, layout(rollouts=8)) == (
         f"'{path}' was made with other settings: rollouts was 7 and is now 8. "
         "Use the same options, or choose another folder"
     )
@@ -79,7 +76,7 @@ def test_a_run_of_another_number_of_rollouts_is_not_resumed(tmp_path: Path) -> N
 def test_a_run_of_other_variables_is_not_resumed(tmp_path: Path) -> None:
     path = make(tmp_path / "run.zarr", layout())
     fewer = replace(layout(), variables=layout().variables[3:])
-    assert _refusal(path, fewer) == (
+    assert refused(path, fewer) == (
         f"'{path}' was made with other settings: the variables were qpos, ctrl, tool_pose, contacts, status, "
         "stop_step, saturation and are now contacts, status, stop_step, saturation. "
         "Use the same options, or choose another folder"
