@@ -6,9 +6,9 @@ Every method calls functions that are public themselves, and imports what it nee
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import cached_property
+from functools import cached_property, wraps
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, TypeAlias, Unpack, cast
@@ -89,6 +89,27 @@ class TableRow:
     """What drives the joint; by default position control with gains that dh2sim chooses."""
     convention: Convention | str | None = None
     """By default the robot's."""
+
+
+def _reporting_arguments(init: Callable[..., None]) -> Callable[..., None]:
+    """Let ``__init__`` of a row report wrong arguments under the row's own name, and show the ones it has."""
+
+    @wraps(init)
+    def checked(self: TableRow, *unnamed: object, **values: object) -> None:
+        row, names = type(self).__name__, [argument.name for argument in fields(TableRow)]
+        if unnamed:
+            raise TypeError(f"{row} takes named arguments only, as in {row}(d=0.4, alpha=-pi / 2)")
+        for name in values:
+            if name not in names:
+                raise TypeError(
+                    f"{row} has no argument '{name}'.{did_you_mean(name, names)} Arguments: {listed(names)}"
+                )
+        init(self, **values)
+
+    return checked
+
+
+TableRow.__init__ = _reporting_arguments(TableRow.__init__)  # type: ignore[method-assign]
 
 
 class Revolute(TableRow):

@@ -68,6 +68,19 @@ def test_the_python_of_the_readme_runs() -> None:
     assert [getattr(names[name], "shape", None) for name in ("T_base_tool", "J")] == [(1000, 4, 4), (1000, 6, 3)]
 
 
+def test_the_python_of_the_importing_page_runs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    [code] = re.findall(
+        r"^```python\n(.*?)^```", IMPORTING.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL
+    )
+    monkeypatch.chdir(ROOT)
+    names: dict[str, object] = {}
+    exec(compile(code, "importing.md", "exec"), names)
+    assert capsys.readouterr().out.startswith("Residual(position=")
+    assert "model" in names
+
+
 def test_the_readmes_first_commands_write_into_no_tracked_file() -> None:
     exports = [line for line in README.splitlines() if re.match(r"(\$ |python3 .*/)dh2sim export", line)]
     assert len(exports) == 2

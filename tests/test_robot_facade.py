@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import inspect
 import pickle
 from collections.abc import Callable
 from html.parser import HTMLParser
@@ -95,6 +96,36 @@ def test_an_unknown_frame_and_a_wrong_joint_vector_are_named(arm: Robot) -> None
         arm.fk([0.0, 0.0, 0.2], frame="dh_4")
     with pytest.raises(ConfigurationError, match="expected 3 joint coordinates"):
         arm.fk([0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda arm: arm.fk("zero", frame=2), "unknown frame 2. Frames: base_link, link_1 to link_3, "),
+        (lambda arm: arm.fk(0.0, 0.0), "unknown frame 0.0. Frames: "),
+        (lambda arm: arm.random_configurations(-1), "the count must be a whole number of at least 0, got -1"),
+        (lambda arm: arm.random_configurations(2.5), "the count must be a whole number of at least 0, got 2.5"),
+        (lambda arm: arm.validate(samples=0), "samples must be a whole number of at least 1, got 0"),
+        (lambda arm: arm.validate(samples="all"), "samples must be a whole number of at least 1, got 'all'"),
+    ],
+)
+def test_a_wrong_argument_is_named(arm: Robot, wrong: Callable[[Robot], object], message: str) -> None:
+    with pytest.raises(Dh2simError) as caught:
+        wrong(arm)
+    assert str(caught.value).startswith(message)
+
+
+def test_rows_take_named_arguments_only_and_show_the_ones_they_have() -> None:
+    with pytest.raises(TypeError) as caught:
+        Revolute(0.0, 0.0, 0.4, 0.0)  # type: ignore[call-arg,arg-type]
+    assert str(caught.value) == "Revolute takes named arguments only, as in Revolute(d=0.4, alpha=-pi / 2)"
+    with pytest.raises(TypeError) as caught:
+        Prismatic(theat=0.3)  # type: ignore[call-arg]
+    assert str(caught.value) == (
+        "Prismatic has no argument 'theat'. Did you mean 'theta'? Arguments: name, a, alpha, d, theta, beta, flip, "
+        "limits, dynamics, link, actuator, convention"
+    )
+    assert "alpha: 'float' = 0.0" in str(inspect.signature(Fixed))
 
 
 def test_limits_are_those_of_the_table_or_assumed(arm: Robot) -> None:

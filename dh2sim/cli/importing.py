@@ -91,7 +91,6 @@ def import_robot(
     )
     folder = Path.cwd() if out is None else out.resolve().parent
     data = sys.stdin.buffer.read() if file == STDIN else read_file(Path(file))
-    _refuse_yaml(data, file)
     try:
         imported = import_data(data, file, options, folder=folder)
     except ImportedFileError as error:
@@ -99,20 +98,6 @@ def import_robot(
             replace(problem, message=_with_options(problem.message)) for problem in error.problems
         ) from error
     hand_over(imported.text, out, summary=summary(imported), notes=imported.notes, quiet=quiet)
-
-
-def _refuse_yaml(data: bytes, file: str) -> None:
-    """Refuse robot files and axes files, which are not imported.
-
-    Raises:
-        Dh2simError: It is one.
-    """
-    if not file.lower().endswith((".yaml", ".yml")):
-        return
-    if re.search(rb"^joints\s*:", data, re.MULTILINE):
-        raise Dh2simError(f"{file}: this is a robot file already; 'dh2sim info {shlex.quote(file)}' shows its table")
-    if re.search(rb"^axes\s*:", data, re.MULTILINE):
-        raise Dh2simError(f"{file}: this lists joint axes: run 'dh2sim frames {shlex.quote(file)}'")
 
 
 def _read_axes_file(file: str) -> bytes:

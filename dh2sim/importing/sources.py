@@ -230,6 +230,8 @@ def read_file(path: Path) -> bytes:
 def import_data(data: bytes, file: str, options: ImportOptions, *, folder: Path | None = None) -> Imported:
     """Import content that was read already, as ``import_robot``; ``file`` is its path, or '-' for standard input."""
     root = _root_element(data)
+    if root is None and file.lower().endswith((".yaml", ".yml")):
+        _refuse_yaml(data, file)
     match root:
         case "robot":
             return _serial(_read_urdf(data, file, options), data, options, folder)
@@ -243,6 +245,13 @@ def import_data(data: bytes, file: str, options: ImportOptions, *, folder: Path 
                 f"{file}: a file of <{root}> cannot be imported. Allowed: URDF (<robot>), MJCF (<mujoco>), and "
                 f"tables in Markdown, CSV or TSV.{hint}"
             )
+
+
+def _refuse_yaml(data: bytes, file: str) -> None:
+    if re.search(rb"^joints\s*:", data, re.MULTILINE):
+        raise Dh2simError(f"{file}: this is a robot file already, and needs no import")
+    if re.search(rb"^axes\s*:", data, re.MULTILINE):
+        raise Dh2simError(f"{file}: this lists joint axes; 'dh2sim frames' makes a robot file of them")
 
 
 def _root_element(data: bytes) -> str | None:

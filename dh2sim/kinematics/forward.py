@@ -182,9 +182,9 @@ def require_frame(chain: KinematicChain, frame: str) -> None:
     names = frame_names(chain)
     if frame not in names:
         n = len(chain.joints)
+        found, hint = (shown(frame), did_you_mean(frame, names)) if isinstance(frame, str) else (repr(frame), "")
         raise UnknownFrameError(
-            f"unknown frame {shown(frame)}.{did_you_mean(frame, names)} Frames: base_link, link_1 to link_{n}, "
-            f"dh_0 to dh_{n}, tool0"
+            f"unknown frame {found}.{hint} Frames: base_link, link_1 to link_{n}, dh_0 to dh_{n}, tool0"
         )
 
 

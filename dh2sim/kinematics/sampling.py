@@ -22,8 +22,11 @@ def random_configurations(lower: ArrayLike, upper: ArrayLike, count: int, seed: 
         Shape (count, n).
 
     Raises:
-        ConfigurationError: The bounds have different shapes, are not finite, or are the wrong way round.
+        ConfigurationError: The bounds have different shapes, are not finite, or are the wrong way round; ``count`` is
+            not a whole number of at least 0.
     """
+    if not isinstance(count, int | np.integer) or count < 0:
+        raise ConfigurationError(f"the count must be a whole number of at least 0, got {count!r}")
     low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
     if low.ndim != 1 or low.shape != high.shape:
         raise ConfigurationError(f"expected bounds of shape (n,), got shapes {low.shape} and {high.shape}")

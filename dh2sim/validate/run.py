@@ -13,7 +13,7 @@ import numpy as np
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
-from dh2sim.errors import EngineCapacityError, EngineError
+from dh2sim.errors import Dh2simError, EngineCapacityError, EngineError
 from dh2sim.export import export_robot
 from dh2sim.files import signals_deferred
 from dh2sim.kinematics.sampling import random_configurations
@@ -76,9 +76,12 @@ def validate_robot(
         The report. A file that is missing or that an engine refuses is a check that failed.
 
     Raises:
+        Dh2simError: ``samples`` is not a whole number of at least 1.
         ModelError: A format cannot hold the robot.
         OutputError: The files cannot be written to the temporary folder.
     """
+    if not isinstance(samples, int | np.integer) or samples < 1:
+        raise Dh2simError(f"samples must be a whole number of at least 1, got {samples!r}")
     model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
     if folder is not None:
         return _validate(model, folder, samples, seed, tolerance, advance)

@@ -135,7 +135,7 @@ def test_a_robot_file_and_axes_are_not_imported(tmp_path: Path) -> None:
     robot.write_text("name: arm\nconvention: standard\njoints: [{type: revolute}]\n")
     axes.write_text("name: arm\naxes:\n  - {type: revolute, point: [0, 0, 0], direction: [0, 0, 1]}\n")
     for file, reason in (
-        (robot, f"this is a robot file already; 'dh2sim info {robot}' shows its table"),
-        (axes, f"this lists joint axes: run 'dh2sim frames {axes}'"),
+        (robot, "this is a robot file already, and needs no import"),
+        (axes, "this lists joint axes; 'dh2sim frames' makes a robot file of them"),
     ):
         assert dh2sim("import", file) == Outcome(status=2, out="", err=f"dh2sim: {file}: {reason}\n")
