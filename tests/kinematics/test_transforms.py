@@ -14,13 +14,15 @@ from dh2sim.kinematics.transforms import (
     invert,
     joint_part,
     link_part,
+    move_point,
     pose_from_rpy,
     quaternion_from_rotation,
+    rotate_tensor,
     rpy_from_rotation,
 )
 from dh2sim.typing import Array
 from tests.kinematics.robots import ODD
-from tests.strategies import angles, lengths, vectors
+from tests.strategies import angles, inertias, lengths, vectors
 
 turns = st.floats(-math.pi, math.pi, allow_subnormal=False)
 tiny = st.sampled_from([0.0, 1e-16, 1e-15, 1e-12, 1e-10, 1e-9, 1e-8, 1e-5])
@@ -161,3 +163,19 @@ def test_no_result_holds_minus_zero(order: list[int], rpy: Array, p: Array) -> N
         joint_part(-0.0, -0.0),
     ):
         assert not np.signbit(array[array == 0.0]).any()
+
+
+@given(vectors(lengths), vectors(angles), vectors(lengths))
+def test_a_point_moves_with_its_frame(xyz: Array, rpy: Array, point: Array) -> None:
+    T = pose_from_rpy(xyz, rpy)
+    np.testing.assert_allclose(move_point(T, point), T[:3, :3] @ point + xyz, rtol=0, atol=1e-15)
+
+
+@given(vectors(angles), inertias())
+def test_a_tensor_turns_with_its_frame(rpy: Array, tensor: Array) -> None:
+    T = pose_from_rpy([0.1, 0.2, 0.3], rpy)
+    turned = rotate_tensor(T, tensor)
+    np.testing.assert_allclose(turned, T[:3, :3] @ tensor @ T[:3, :3].T, rtol=0, atol=2e-15)
+    np.testing.assert_array_equal(turned, turned.T)
+    np.testing.assert_array_equal(rotate_tensor(T[:3, :3], tensor), turned)
+    assert not turned.flags.writeable

@@ -6,8 +6,8 @@ import pytest
 
 from dh2sim.errors import ControllerError
 from dh2sim.simulate.controllers.protocol import Follows
-from tests.simulate.controllers.own_code import SWING, line, write
 from tests.simulate.controllers.samples import arm, make, refused
+from tests.simulate.controllers.user_code import SWING, line, write
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from dh2sim.robot.axes_file import AxesSpec, read_axes
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import ActuatorType, Convention, JointType
 
-PUMA = Path(__file__).parents[3] / "docs" / "puma560_axes.yaml"
+PUMA = Path(__file__).parents[2] / "docs" / "puma560_axes.yaml"
 
 FULL = """\
 name: full

@@ -12,8 +12,8 @@ from dh2sim.simulate import rollout
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, Observation, OpenLoop, RolloutBatch
 from dh2sim.simulate.controllers.registry import choose
 from dh2sim.typing import Array
-from tests.simulate.controllers.own_code import SWING, line, write
 from tests.simulate.controllers.samples import arm, make, observe, refused
+from tests.simulate.controllers.user_code import SWING, line, write
 
 
 def test_a_class_in_the_current_directory_is_a_controller(folder: Path) -> None:
