@@ -48,7 +48,7 @@ limits, configurations, `com`, `radius`. Everything else is SI. Every export is 
 ## Conventions
 
 `convention` says how a row's numbers are read: [docs/conventions.md](conventions.md). A Hayati row, for nearly
-parallel axes, has a second twist `beta`, and a `d` only if it slides; `beta` in any other row is an error.
+parallel axes, has a second twist `beta`, and a `d` only if it is prismatic; `beta` in any other row is an error.
 
 ## Meshes
 

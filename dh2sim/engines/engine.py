@@ -51,10 +51,10 @@ def present_frames(path: str, found: Sequence[str], rows: int, *, dh_frames_requ
     """Return those of dh_0 … dh_n and tool0 that a file has.
 
     Args:
-        path: of the file, for the message.
-        found: names of all frames in the file.
-        rows: n.
-        dh_frames_required: whether a file may leave out all DH frames (never only some of them).
+        path: Of the file, for the message.
+        found: Names of all frames in the file.
+        rows: Number of rows of the table.
+        dh_frames_required: Whether a file may leave out all DH frames (never only some of them).
 
     Raises:
         EngineError: tool0 or a DH frame is missing.
@@ -73,7 +73,7 @@ def require_joints(path: str, found: Sequence[str], wanted: Sequence[str]) -> No
     """Check that a file's moving joints are those of the robot, in any order.
 
     Raises:
-        EngineError: a joint is missing, or another one moves.
+        EngineError: A joint is missing, or another one moves.
     """
     missing = [name for name in wanted if name not in set(found)]
     extra = [name for name in found if name not in set(wanted)]

@@ -25,9 +25,9 @@ class MujocoEngine:
         """Compile a file.
 
         Args:
-            path: an .xml (MJCF) or .urdf file.
-            joints: names of the moving joints, in the order of a joint vector.
-            rows: number of rows of the table.
+            path: An .xml (MJCF) or .urdf file.
+            joints: Names of the moving joints, in the order of a joint vector.
+            rows: Number of rows of the table.
 
         Raises:
             EngineError: MuJoCo refuses the file, or frames or joints are missing.
@@ -63,7 +63,7 @@ class MujocoEngine:
         """Return the poses of ``frames`` in the world, which is base_link; see ``PoseEngine``.
 
         Raises:
-            EngineError: a coordinate is NaN or so large that MuJoCo would silently replace it.
+            EngineError: A coordinate is NaN or so large that MuJoCo would silently replace it.
         """
         if not (np.abs(q) <= mujoco.mjMAXVAL).all():
             raise EngineError(f"{self._path}: MuJoCo takes joint coordinates up to {mujoco.mjMAXVAL!r} only")
@@ -92,7 +92,7 @@ class MujocoEngine:
         """Return the mass properties of a body in its own frame.
 
         Raises:
-            EngineError: the body is unknown.
+            EngineError: The body is unknown.
         """
         number = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, body)
         if number < 0:

@@ -25,13 +25,13 @@ class PinocchioEngine:
         """Read a file.
 
         Args:
-            path: a .urdf file.
-            joints: names of the moving joints, in the order of a joint vector.
-            rows: number of rows of the table.
+            path: A .urdf file.
+            joints: Names of the moving joints, in the order of a joint vector.
+            rows: Number of rows of the table.
 
         Raises:
             ImportError: pinocchio is not installed.
-            EngineCapacityError: the robot has more than ``MAX_JOINTS`` moving joints.
+            EngineCapacityError: The robot has more than ``MAX_JOINTS`` moving joints.
             EngineError: pinocchio refuses the file, or frames or joints are missing.
         """
         import pinocchio

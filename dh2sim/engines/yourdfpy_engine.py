@@ -22,9 +22,9 @@ class YourdfpyEngine:
         """Read a file.
 
         Args:
-            path: a .urdf file.
-            joints: names of the moving joints, in the order of a joint vector.
-            rows: number of rows of the table.
+            path: A .urdf file.
+            joints: Names of the moving joints, in the order of a joint vector.
+            rows: Number of rows of the table.
 
         Raises:
             EngineError: yourdfpy refuses the file, or frames or joints are missing.

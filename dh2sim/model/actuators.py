@@ -24,9 +24,9 @@ def gravity_loads(
     """Return the generalised force that each joint must exert to hold the robot still.
 
     Args:
-        chain: the chain, n rows of which m move.
-        bodies: mass properties of the n links in their joint frames; None for a massless one.
-        q: joint vector, rad or m, shape (m,).
+        chain: The chain, n rows of which m move.
+        bodies: Mass properties of the n links in their joint frames; None for a massless one.
+        q: Joint vector, rad or m, shape (m,).
         gravity: m/s² in base_link, shape (3,).
 
     Returns:
@@ -58,9 +58,9 @@ def seen_inertias(chain: KinematicChain, bodies: Sequence[MassProperties | None]
     """Return the inertia or mass that each joint sees with all others locked: the diagonal of the mass matrix.
 
     Args:
-        chain: as for ``gravity_loads``.
-        bodies: likewise.
-        q: likewise.
+        chain: As for ``gravity_loads``.
+        bodies: Likewise.
+        q: Likewise.
 
     Returns:
         m values, kg·m² or kg; a joint that carries nothing sees 0.
@@ -115,8 +115,8 @@ def actuator_model(actuator: ActuatorSpec, inertia: float) -> ActuatorModel:
     """Fill in gains that make a joint a critically damped oscillator, kp = I w² and kv = 2 I w.
 
     Args:
-        actuator: as in the robot file.
-        inertia: what the joint moves, armature included, kg·m² or kg.
+        actuator: As in the robot file.
+        inertia: What the joint moves, armature included, kg·m² or kg.
     """
     kp = kv = 0.0
     assumed = False

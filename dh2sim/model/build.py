@@ -65,14 +65,14 @@ def build_model(spec: SpecLike) -> RobotModel:
     """Give a robot shapes, mass, inertia, limits and actuators.
 
     Args:
-        spec: the robot as its file describes it.
+        spec: The robot as its file describes it.
 
     Returns:
         The model, read-only. What was estimated or assumed is marked in it.
 
     Raises:
-        MeshError: a mesh file cannot be used.
-        ModelError: a number is too large or too small to compute with.
+        MeshError: A mesh file cannot be used.
+        ModelError: A number is too large or too small to compute with.
     """
     spec = spec_of(spec)
     _check_sizes(spec)
@@ -119,7 +119,7 @@ def _check_sizes(spec: RobotSpec) -> None:
     """Refuse numbers whose products would leave the range of doubles.
 
     Raises:
-        ModelError: one is too large, or too small where it is divided by.
+        ModelError: One is too large, or too small where it is divided by.
     """
     parts = {f"joints[{index}]": row for index, row in enumerate(spec.rows)}
     for part, value in {**parts, "base": spec.base.pose, "tool": spec.tool, "gravity": spec.gravity}.items():

@@ -42,10 +42,10 @@ def excluded_pairs(
     """List the pairs of links that touch because they are neighbours, or in one of the configurations.
 
     Args:
-        chain: the chain, n rows.
-        names: of the n + 1 links, the base link's first.
-        shapes: of the links, each in its link's frame.
-        configurations: joint vectors (rad, m); links that touch in one of them do so by construction.
+        chain: The chain, n rows.
+        names: Of the n + 1 links, the base link's first.
+        shapes: Of the links, each in its link's frame.
+        configurations: Joint vectors (rad, m); links that touch in one of them do so by construction.
 
     Returns:
         The pairs in the order of the links. Shapes count as capsules here, a cylinder with rounded ends of its own

@@ -75,10 +75,10 @@ def filled_limits(row: Row, position: Range | None, load: float, inertia: float)
     """Fill in the limits that a row leaves open.
 
     Args:
-        row: the row.
-        position: its range, from ``position_ranges``.
-        load: what gravity asks of the joint at most, N·m or N.
-        inertia: what the joint moves at home, kg·m² or kg.
+        row: The row.
+        position: Its range, from ``position_ranges``.
+        load: What gravity asks of the joint at most, N·m or N.
+        inertia: What the joint moves at home, kg·m² or kg.
 
     Returns:
         The limits, and which of 'position', 'velocity' and 'effort' were assumed.
@@ -108,10 +108,10 @@ def load_bound(
     """Return an upper bound of what gravity asks of joint ``i``, counted from 0, in any pose, N·m or N.
 
     Args:
-        i: the joint.
-        chain: the chain, n rows.
-        ranges: of the n coordinates, rad or m.
-        bodies: mass properties of the n links in their joint frames; None for a massless one.
+        i: The joint.
+        chain: The chain, n rows.
+        ranges: Of the n coordinates, rad or m.
+        bodies: Mass properties of the n links in their joint frames; None for a massless one.
         gravity: m/s² in base_link, shape (3,); where it is zero, the earth's counts.
     """
     g = _length(gravity) or 9.81

@@ -43,8 +43,8 @@ def link_scale(chain: KinematicChain, travels: Sequence[tuple[float, float]]) ->
     """Return the mean length, m, of the segments and travels that a robot is made of; 1 m for a robot without any.
 
     Args:
-        chain: the chain.
-        travels: lowest and highest displacement along +z of every joint, m; (0, 0) for those that do not slide.
+        chain: The chain.
+        travels: Lowest and highest displacement along +z of every joint, m; (0, 0) for those that do not slide.
     """
     lengths = [
         length
@@ -69,10 +69,10 @@ def lay_out(
     """Return the shapes of the base link and of every link, each in its link's frame.
 
     Args:
-        chain: the chain, n rows.
-        travels: as for ``link_scale``.
-        radii: of the base link and the n links, m.
-        scale: from ``link_scale``, m.
+        chain: The chain, n rows.
+        travels: As for ``link_scale``.
+        radii: Of the base link and the n links, m.
+        scale: From ``link_scale``, m.
 
     Returns:
         n + 1 tuples, the base link's first. A link has a shape unless it is fixed and of no length.

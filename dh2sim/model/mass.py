@@ -139,9 +139,9 @@ def link_inertial(
     """Return the mass properties of a link; what the robot file gives wins over estimates from the shapes.
 
     Args:
-        link: as in the file; centre of mass and inertia in DH frame i.
-        joint: the link's joint.
-        shapes: of the link, solid. A given mass scales their inertia, a given centre of mass moves it.
+        link: As in the file; centre of mass and inertia in DH frame i.
+        joint: The link's joint.
+        shapes: Of the link, solid. A given mass scales their inertia, a given centre of mass moves it.
 
     Returns:
         The properties in the joint frame, and which of 'mass', 'com' and 'inertia' were estimated; None for a link

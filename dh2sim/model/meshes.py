@@ -43,11 +43,11 @@ def load_mesh(mesh: MeshSpec, link_name: str) -> MeshAsset:
     """Read a mesh file.
 
     Args:
-        mesh: which file, its scale and its pose.
-        link_name: names the exported file.
+        mesh: Which file, its scale and its pose.
+        link_name: Names the exported file.
 
     Raises:
-        MeshError: it cannot be read, has no faces or too many, fewer than four corners, no area, or numbers that
+        MeshError: It cannot be read, has no faces or too many, fewer than four corners, no area, or numbers that
             are not finite; the text names the row of the robot file, or the link.
     """
     place = mesh.location or link_name

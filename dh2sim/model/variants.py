@@ -14,8 +14,8 @@ def with_actuators(model: RobotModel, kind: ActuatorType) -> RobotModel:
     """Drive every moving joint by an actuator of one kind.
 
     Args:
-        model: the robot; where it has actuators of that kind already, their gains stay.
-        kind: position, velocity, motor, or none to drive no joint at all.
+        model: The robot; where it has actuators of that kind already, their gains stay.
+        kind: Position, velocity, motor, or none to drive no joint at all.
 
     Returns:
         The robot, with gains chosen like those that a robot file leaves open.
