@@ -50,7 +50,7 @@ def export(
     Examples:
       dh2sim export stanford
       dh2sim export my_arm.yaml --out build --format urdf
-      dh2sim export robots/*.yaml --check        # in CI: are the files up to date?
+      dh2sim export robots/*.yaml --check       # in CI: are the files up to date?
     """
     chosen = _formats(formats)
     models = build_all(robots)
