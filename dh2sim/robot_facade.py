@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError, Dh2simError, OutputError, Problem, RobotError
 from dh2sim.messages import did_you_mean, listed, member, shown
-from dh2sim.robot.configurations import named_configurations
 from dh2sim.robot.spec import (
     ActuatorSpec,
     AngleUnit,
@@ -341,7 +340,7 @@ class Robot:
     @cached_property
     def configurations(self) -> Mapping[str, Array]:
         """Named joint vectors, rad and m, each of shape (n,): ``zero``, ``home`` and those of the robot file."""
-        return named_configurations(self.spec)
+        return self.spec.named_configurations
 
     @cached_property
     def limits(self) -> tuple[Array, Array]:

@@ -63,14 +63,13 @@ def read_joint_vector(
     Raises:
         ConfigurationError: The number of coordinates is wrong, one is not a number, or a name is unknown.
     """
-    from dh2sim.robot.configurations import named_configurations
     from dh2sim.robot.spec import AngleUnit, Units
 
     if degrees and radians:
         raise typer.BadParameter("cannot be combined", param_hint="--degrees, --radians")
     units = Units(angle=AngleUnit.DEG if degrees else AngleUnit.RAD) if degrees or radians else spec.units
     words = list(texts or ["home"])
-    known = named_configurations(spec)
+    known = spec.named_configurations
     rows = spec.moving_rows
     if len(words) == 1 and words[0] in known:
         vector = JointVector(q=tuple(known[words[0]].tolist()), name=words[0], units=units, rows=rows)
@@ -140,7 +139,6 @@ def _split_outside_parentheses(text: str, separators: str) -> list[str]:
 
 def _wrong_count(spec: RobotSpec, words: Sequence[str], parts: Sequence[str], units: Units) -> str:
     from dh2sim.messages import did_you_mean, listed, shown
-    from dh2sim.robot.configurations import named_configurations
 
     rows = spec.moving_rows
     names = ", ".join(f"{row.name} ({_unit(row, units)})" for row in rows)
@@ -148,7 +146,7 @@ def _wrong_count(spec: RobotSpec, words: Sequence[str], parts: Sequence[str], un
     message = f"{spec.name} has {count}, got {len(parts)}" + (f": {names}" if names else "")
     if len(words) > 1 or not words[0].isidentifier():
         return message
-    known = named_configurations(spec)
+    known = spec.named_configurations
     hint = did_you_mean(words[0], known)
     return f"{spec.name} has no configuration {shown(words[0])}.{hint} Configurations: {listed(known)}"
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from dh2sim.errors import PictureError
 from dh2sim.messages import did_you_mean, listed, shown
-from dh2sim.robot.configurations import named_configurations
 from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:
@@ -113,7 +112,7 @@ def motion_of_robot(robot: RobotModel, configuration: str | None = None) -> Moti
     from dh2sim.formats.mjcf.scene import to_scene
     from dh2sim.formats.mjcf.write import to_mjcf
 
-    configurations = named_configurations(robot.spec)
+    configurations = robot.spec.named_configurations
     q = configurations.get("home" if configuration is None else configuration)
     if q is None:
         hint = did_you_mean(str(configuration), configurations)

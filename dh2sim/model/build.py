@@ -18,7 +18,6 @@ from dh2sim.model.mass import link_inertial
 from dh2sim.model.meshes import load_mesh
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape
-from dh2sim.robot.configurations import named_configurations
 from dh2sim.robot.spec import JointType, RobotSpec, Row
 
 LARGEST = 1e20
@@ -93,7 +92,7 @@ def build_model(spec: SpecLike) -> RobotModel:
         estimated=(),
     )
     bodies = [link.inertial for link in links]
-    home = named_configurations(spec)["home"]
+    home = spec.named_configurations["home"]
     zero = np.zeros_like(home)
     seen = iter(seen_inertias(chain, bodies, home))
     joints = []

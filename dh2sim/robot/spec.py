@@ -380,6 +380,16 @@ class RobotSpec:
         """The rows that have a joint coordinate, in the order of a joint vector."""
         return tuple(row for row in self.rows if row.type.moves)
 
+    @property
+    def named_configurations(self) -> Mapping[str, Array]:
+        """Home and zero, which every robot has, and those of the robot file: rad and m, each of shape (n,).
+
+        Where the file has no ``home``, it is zero moved inside the limits.
+        """
+        limits = [row.limits.position or (0.0, 0.0) for row in self.moving_rows]
+        home = read_only([min(max(0.0, lower), upper) for lower, upper in limits])
+        return MappingProxyType({"home": home, "zero": read_only([0.0] * len(limits)), **self.configurations})
+
 
 ROBOT: Final = Part("", RobotSpec, more={"actuators": Part("What drives every joint.", ActuatorSpec)})
 """The robot file as a whole."""

@@ -15,7 +15,6 @@ from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
-from dh2sim.robot.configurations import named_configurations
 from dh2sim.simulate.block import Job, rehearse
 from dh2sim.simulate.controllers.registry import ControllerChoice, choose
 from dh2sim.simulate.dataset_layout import FORMAT, rollout_bytes, run_layout
@@ -94,7 +93,7 @@ def _resolved(model: RobotModel, options: RolloutOptions) -> tuple[ControllerCho
     joints = tuple(joint.name for joint in model.moving_joints)
     if not joints:
         problems.append(("", f"{model.name} has no joint that moves: there is nothing to simulate"))
-    configurations = named_configurations(model.spec)
+    configurations = model.spec.named_configurations
     initial = attempt(lambda: read_initial_states(options.start, joints, configurations, options.rollouts))
     if problems or controller is None or initial is None:
         raise SettingsError(problems)

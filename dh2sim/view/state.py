@@ -10,7 +10,6 @@ from typing import Final, TypeAlias
 
 from dh2sim.draw.projection import Pinhole
 from dh2sim.model.robot_model import JointModel, RobotModel
-from dh2sim.robot.configurations import named_configurations
 from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Units
 from dh2sim.view.scene.items import Vector
 
@@ -203,5 +202,5 @@ def _within(joint: JointModel, value: float) -> float:
 
 def configurations(model: RobotModel) -> dict[str, tuple[float, ...]]:
     """Return the named configurations inside the limits, rad and m: home, zero and the robot file's."""
-    named = named_configurations(model.spec)
+    named = model.spec.named_configurations
     return {name: within(model, tuple(vector.tolist())) for name, vector in named.items()}

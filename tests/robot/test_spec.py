@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from dh2sim.errors import Dh2simError, RobotError
-from dh2sim.robot.configurations import named_configurations
 from dh2sim.robot.spec import (
     ActuatorSpec,
     ActuatorType,
@@ -216,8 +215,8 @@ def test_a_number_that_is_wrong_in_si_units_alone_is_reported_at_its_place() -> 
 
 def test_every_robot_has_the_configurations_zero_and_home() -> None:
     spec = make(row(limits=Limits(position=(0.5, 1.0))), row())
-    named = {name: q.tolist() for name, q in named_configurations(spec).items()}
+    named = {name: q.tolist() for name, q in spec.named_configurations.items()}
     assert named == {"home": [0.5, 0.0], "zero": [0.0, 0.0]}
     given = dataclasses.replace(spec, configurations={"home": np.array([0.75, 0.1]), "bent": np.array([0.6, 1])})
-    named = {name: q.tolist() for name, q in named_configurations(given).items()}
+    named = {name: q.tolist() for name, q in given.named_configurations.items()}
     assert named == {"home": [0.75, 0.1], "zero": [0.0, 0.0], "bent": [0.6, 1.0]}
