@@ -93,8 +93,8 @@ def _overlaps(chain: KinematicChain, shapes: Sequence[Sequence[Shape]], q: Array
 def segment_distance(a: Array, b: Array, starts: Array, ends: Array) -> Array:
     """Return the distance, m, shape (k,), of a segment from a to b, shape (3,), to k segments, shape (k, 3) each.
 
-    Neither may be of zero length; those that are parallel to within 1e-6 rad count as parallel. (Ericson, Real-Time
-    Collision Detection, 5.1.9.)
+    Those that are parallel to within 1e-6 rad count as parallel, and those shorter than 1e-100 m as points. (Ericson,
+    Real-Time Collision Detection, 5.1.9.)
     """
     d1, d2 = b - a, ends - starts
     between = a - starts
@@ -103,11 +103,13 @@ def segment_distance(a: Array, b: Array, starts: Array, ends: Array) -> Array:
     mixed = _dots(d1, d2)
     c, f = _dots(d1, between), _dots(d2, between)
     denominator = length1 * length2 - mixed * mixed
-    parallel = denominator <= 1e-12 * length1 * length2
+    point1, point2 = length1 < 1e-200, length2 < 1e-200
+    parallel = point1 | point2 | (denominator <= 1e-12 * length1 * length2)
     s = np.where(parallel, 0.0, np.clip((mixed * f - c * length2) / np.where(parallel, 1.0, denominator), 0.0, 1.0))
-    t = (mixed * s + f) / length2
+    t = (mixed * s + f) / np.where(point2, 1.0, length2)
     clipped = np.clip(t, 0.0, 1.0)
-    s = np.where(t == clipped, s, np.clip((clipped * mixed - c) / length1, 0.0, 1.0))
+    foot = np.clip((clipped * mixed - c) / np.where(point1, 1.0, length1), 0.0, 1.0)
+    s = np.where((t == clipped) & ~point2, s, foot)
     gap = (a + s[:, None] * d1) - (starts + clipped[:, None] * d2)
     return np.asarray(np.sqrt(_dots(gap, gap)))
 

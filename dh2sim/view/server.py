@@ -109,8 +109,8 @@ class Viewer:
         self._server = start_server(host, port)
         self.port: int = self._server.get_port()
         _configure(self._server, state)
-        self._preload = threading.Thread(target=_preload, name="preload", daemon=True)
-        self._preload.start()
+        # not a daemon: Python crashes if it ends while a library is being loaded
+        threading.Thread(target=_preload, name="preload").start()
         self._websockets = _websockets(self._server)
         self._websockets.on_client_connect(self._check_origin)
         self._server.on_client_connect(self._open)
@@ -147,7 +147,6 @@ class Viewer:
         for page in (*pages, *self._leaving):  # a stopped server complains about what is sent to it
             page.join(STOP_TIMEOUT)
         stop_server(self._server)
-        self._preload.join()  # Python crashes if it ends while a library is being loaded
 
     async def _check_origin(self, connection: infra.WebsockClientConnection) -> None:
         """Close a connection from another site's page before anything is sent to it."""

@@ -45,12 +45,26 @@ class Callback:
     def __del__(self):  # Python drops whatever is raised here
         signal.raise_signal(int(kind))
 
+class Unraisable:
+    def __del__(self):
+        raise ValueError
+
 def wait_after_the_signal(viewer):
-    callback = Callback()
-    del callback
+    if where == "callback":
+        callback = Callback()
+        del callback
+    elif where == "hook":  # what reports an exception that was dropped is itself interrupted
+        sys.__unraisablehook__ = lambda error: signal.raise_signal(int(kind))
+        dropped = Unraisable()
+        del dropped
+    else:  # a library catches everything
+        try:
+            signal.raise_signal(int(kind))
+        except:
+            pass
     wait(viewer)
 
-kind = sys.argv.pop(1)
+kind, where = sys.argv.pop(1), sys.argv.pop(1)
 wait, Viewer.wait = Viewer.wait, wait_after_the_signal
 main()
 """
@@ -173,10 +187,11 @@ def test_an_interruption_while_it_starts_makes_no_traceback() -> None:
     [(signal.SIGINT, 130, "dh2sim: interrupted\n"), (signal.SIGTERM, 143, "")],
     ids=["SIGINT", "SIGTERM"],
 )
-def test_a_signal_that_a_callback_swallows_still_wakes_and_ends_the_viewer(
-    kind: signal.Signals, status: int, message: str
+@pytest.mark.parametrize("where", ["callback", "hook", "library"])
+def test_a_signal_that_others_swallow_still_wakes_and_ends_the_viewer(
+    where: str, kind: signal.Signals, status: int, message: str
 ) -> None:
-    program = ["-c", SIGNAL_LOST, str(kind.value)]
+    program = ["-c", SIGNAL_LOST, str(kind.value), where]
     with serving("stanford", "--port", str(unused_port()), program=program) as process:
         _, err = process.communicate(timeout=TIMEOUT)
     assert (process.returncode, err) == (status, message)

@@ -17,7 +17,7 @@ from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import Dynamics, JointType, RobotSpec, Row
+from dh2sim.robot.spec import Convention, Dynamics, JointType, LinkSpec, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 from tests.engines.files import DYNAMIC, ENGINES, dynamics_engine, joint_names, path_of, pose_engine, write
 from tests.formats.readers import parsed
@@ -125,6 +125,20 @@ def test_dynamic_terms_of_all_engines_are_the_same(folder: Path) -> None:
     np.testing.assert_allclose(mass, mass.transpose(0, 2, 1), rtol=0, atol=1e-12 * np.abs(mass).max())
     assert (np.linalg.eigvalsh(mass) > 0).all()
     assert np.abs(terms[0].bias - terms[0].gravity).max() > 0.1
+
+
+@pytest.mark.parametrize("name", DYNAMIC)
+def test_a_center_of_mass_close_to_the_axis_is_not_taken_to_be_on_it(name: str, tmp_path: Path) -> None:
+    mass, offset = 2.0, 9e-7
+    link = LinkSpec(mass=mass, com=read_only([offset, 0.0, 0.0]), inertia=read_only(1e-5 * np.eye(3)))
+    gravity = read_only([0.0, -9.81, 0.0])
+    row = Row(name="hinge", type=JointType.CONTINUOUS, link=link)
+    built = build_model(RobotSpec(name="wheel", rows=(row,), convention=Convention.STANDARD, gravity=gravity))
+    write(built, tmp_path)
+    zero = np.zeros((1, 1))
+    terms = dynamics_engine(name, path_of(name, tmp_path), ["hinge"], 1).dynamic_terms(zero, zero, gravity)
+    np.testing.assert_allclose(terms.gravity, [[mass * 9.81 * offset]], rtol=1e-12)
+    np.testing.assert_allclose(terms.mass_matrix, [[[1e-5 + mass * offset**2]]], rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", ENGINES)

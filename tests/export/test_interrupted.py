@@ -18,8 +18,9 @@ from tests.program import contents, dh2sim, environment
 FOREVER = """
 import sys
 from dh2sim.cli.app import app
-from dh2sim.cli.main import interrupt_again
-sys.unraisablehook = interrupt_again  # as in the program: what a library's callback drops comes again
+from dh2sim.cli.signals import Signals
+signals = Signals()
+signals.listen()
 try:
     while True:
         for robot in sys.argv[2:]:
@@ -31,6 +32,8 @@ try:
             sys.stdout.flush()
 except KeyboardInterrupt:  # between two exports
     sys.exit(130)
+finally:
+    signals.end()
 """
 """Export versions of a robot in turn, for ever."""
 

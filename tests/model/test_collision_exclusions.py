@@ -141,3 +141,11 @@ def test_segments_that_cross_or_share_a_point_have_no_distance() -> None:
     starts = np.array([[0.5, -1, 0], [1, 0, 0], [0.2, 0, 0], [0.5, 0, 0]])
     ends = np.array([[0.5, 1, 0], [2, 3, 0], [0.7, 0, 0], [9, 0, 0]])
     np.testing.assert_allclose(segment_distance(a, b, starts, ends), 0.0, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("length", [0.0, 1e-200, 1e-162, 1e-120])
+def test_segments_that_are_as_good_as_points_have_their_distance(length: float) -> None:
+    point, end = np.array([0.5, 1.0, 0.0]), np.array([0.5 + length, 1.0, length])
+    starts, ends = np.array([[0.0, 0.0, 0.0], [2.0, 1.0, 0.0]]), np.array([[1.0, 0.0, 0.0], [2.0, 1.0, length]])
+    np.testing.assert_allclose(segment_distance(point, end, starts, ends), [1.0, 1.5], rtol=1e-15)
+    np.testing.assert_allclose(segment_distance(starts[0], ends[0], point[None], end[None]), 1.0, rtol=1e-15)

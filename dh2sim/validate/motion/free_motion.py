@@ -8,6 +8,7 @@ from itertools import combinations
 import mujoco
 import numpy as np
 
+from dh2sim.engines.mujoco_engine import keep_centers_of_mass
 from dh2sim.errors import EngineError
 from dh2sim.formats.mjcf.write import EXPORTED, MjcfOptions, to_mjcf
 from dh2sim.model.collision_exclusions import ExcludedPair, Reason
@@ -81,9 +82,11 @@ def compile_model(model: RobotModel, options: MjcfOptions = EXPORTED) -> mujoco.
         EngineError: MuJoCo refuses the model.
     """
     try:
-        return mujoco.MjModel.from_xml_string(to_mjcf(without_meshes(model), options))
+        compiled = mujoco.MjModel.from_xml_string(to_mjcf(without_meshes(model), options))
     except ValueError as error:
         raise EngineError(f"MuJoCo refuses the model: {' '.join(str(error).split())}") from error
+    keep_centers_of_mass(compiled)
+    return compiled
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,0 +1,113 @@
+"""The end of the program on SIGINT (Ctrl-C) or SIGTERM, whatever it is doing at that moment.
+
+The handler raises an exception in the main thread. That alone is not enough: Python drops what is raised in a
+finalizer or in a callback of the garbage collector, and libraries may catch it, as some do while they are imported.
+So a thread repeats the signal until the program ends. A repetition raises nothing while the exception is on its way,
+so that cleaning up is not disturbed; only a second signal from outside cuts it short.
+"""
+
+from __future__ import annotations
+
+import _thread
+import signal
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable
+from types import FrameType
+
+PAUSE = 0.05
+"""s between repetitions of a signal."""
+
+
+class Signals:
+    """Turns SIGINT into KeyboardInterrupt, and SIGTERM into SystemExit with the status that a shell reports."""
+
+    def __init__(self) -> None:
+        """Prepare to listen."""
+        self.first: int | None = None
+        """The first signal that arrived."""
+        self._ended = False
+        self._repeated = False
+        """Whether the signal under way is a repetition."""
+        self._sending = _thread.allocate_lock()
+        self._handler = self._handle
+
+    def listen(self) -> None:
+        """Handle signals from now on."""
+        _install(signal.SIGINT, self._handler)
+        _install(signal.SIGTERM, self._handler)
+        sys.unraisablehook = self._report_dropped
+
+    def end(self) -> None:
+        """Let signals end the program at once from now on: Python itself takes a while to end."""
+        self._ended = True
+        with self._sending:  # no repetition is on its way any more
+            _install(signal.SIGINT, signal.SIG_DFL)
+            _install(signal.SIGTERM, signal.SIG_DFL)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        repeated, self._repeated = self._repeated, False
+        if self._ended:
+            return
+        if self.first is None:
+            self.first = number
+            # libraries warn of coroutines that are cut off
+            warnings.filterwarnings("ignore", message="coroutine .* was never awaited", category=RuntimeWarning)
+            # a threading.Thread takes locks, which the interrupted code may hold
+            _thread.start_new_thread(self._repeat, ())
+        if self._is_reporting(frame) or (repeated and _is_ending()):
+            return
+        if number == signal.SIGINT:
+            raise KeyboardInterrupt
+        raise SystemExit(128 + number)
+
+    def _repeat(self) -> None:
+        """Repeat the first signal until the program ends."""
+        assert self.first is not None
+        while True:
+            time.sleep(PAUSE)
+            with self._sending:
+                if self._ended:
+                    return
+                # whoever has installed another handler meanwhile waits for signals from outside
+                if signal.getsignal(self.first) == self._handler:
+                    self._repeated = True
+                    _interrupt_main_thread(self.first)
+
+    def _report_dropped(self, error: sys.UnraisableHookArgs) -> None:
+        """Report an exception that Python drops, unless it is that of a signal, which is repeated."""
+        if self.first is None or not isinstance(error.exc_value, KeyboardInterrupt | SystemExit):
+            sys.__unraisablehook__(error)
+
+    def _is_reporting(self, frame: FrameType | None) -> bool:
+        """Return whether ``_report_dropped`` is interrupted: Python reports what is raised there."""
+        while frame is not None:
+            if frame.f_code is Signals._report_dropped.__code__:
+                return True
+            frame = frame.f_back
+        return False
+
+
+def _is_ending() -> bool:
+    """Return whether the main thread is cleaning up after an exception that ends the program."""
+    error = sys.exception()
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt | SystemExit):
+            return True
+        error = error.__context__
+    return False
+
+
+def _install(kind: signal.Signals, handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
+    """Handle a signal, unless the program was started with it ignored, as by 'nohup'."""
+    if signal.getsignal(kind) is not signal.SIG_IGN:
+        signal.signal(kind, handler)
+
+
+def _interrupt_main_thread(number: int) -> None:
+    if hasattr(signal, "pthread_kill"):  # wakes the main thread, which may be asleep
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        _thread.interrupt_main(signal.Signals(number))
