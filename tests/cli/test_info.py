@@ -9,7 +9,7 @@ import pytest
 from dh2sim import build_chain, build_model, forward_kinematics, frame_poses, load_robot
 from tests.export.robots import ODD, RICH, write
 from tests.program import dh2sim
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES
 
 FLIPPED = """\
 name: flipped

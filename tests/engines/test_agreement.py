@@ -21,7 +21,7 @@ from dh2sim.robot.spec import Convention, Dynamics, JointType, LinkSpec, RobotSp
 from dh2sim.typing import Array, read_only
 from tests.engines.files import DYNAMIC, ENGINES, dynamics_engine, joint_names, path_of, pose_engine, write
 from tests.formats.readers import parsed
-from tests.model.samples import ODD_ROBOT, in_limits, model
+from tests.sample_robots import ODD_ROBOT, in_limits, model
 from tests.strategies import robots_with_joint_vectors
 
 DAMPED = dataclasses.replace(

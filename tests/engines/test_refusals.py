@@ -15,8 +15,8 @@ from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 from tests.engines.files import ENGINES, joint_names, path_of, pose_engine, write
-from tests.model.samples import model
 from tests.refusals import refusal
+from tests.sample_robots import model
 
 READ: dict[str, Callable[[str], object]] = {
     "mujoco": mujoco.MjModel.from_xml_path,

@@ -8,7 +8,7 @@ import pytest
 
 from dh2sim import build_model
 from dh2sim.export import drift
-from tests.robots.samples import NAMES, robot
+from tests.sample_robots import NAMES, robot
 
 GENERATED = Path(__file__).parents[2] / "generated"
 

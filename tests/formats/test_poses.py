@@ -15,8 +15,19 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import BaseSpec, LinkSpec, Pose, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 from tests.formats.readers import body_poses, in_mujoco, site_poses
-from tests.model.samples import FIXED, HAYATI, MODIFIED, ODD, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
-from tests.robots.samples import NAMES, robot
+from tests.sample_robots import (
+    FIXED,
+    HAYATI,
+    MODIFIED,
+    NAMES,
+    ODD,
+    PRISMATIC,
+    REVOLUTE,
+    STANDARD,
+    in_limits,
+    model,
+    robot,
+)
 from tests.strategies import robot_specs, robots_with_joint_vectors
 
 TOLERANCE = 1e-13

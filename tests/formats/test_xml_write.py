@@ -17,7 +17,7 @@ from dh2sim.model.build import build_model
 from dh2sim.robot.spec import Limits, LinkSpec, RobotSpec, Row, SourceFile
 from dh2sim.typing import read_only
 from tests.formats.readers import in_check_urdf, in_mujoco, parsed
-from tests.model.samples import CONTINUOUS, FIXED, ODD_ROBOT, REVOLUTE, STANDARD, model
+from tests.sample_robots import CONTINUOUS, FIXED, ODD_ROBOT, REVOLUTE, STANDARD, model
 
 SMALLEST = 2.2250738585072014e-308
 

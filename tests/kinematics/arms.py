@@ -7,7 +7,7 @@ import numpy as np
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import BaseSpec, Convention, Pose, RobotSpec, Row
 from dh2sim.typing import Array, read_only
-from tests.kinematics.robots import HAYATI, MODIFIED, ODD, STANDARD, row
+from tests.sample_robots import HAYATI, MODIFIED, ODD, STANDARD, row
 
 KINDS = (STANDARD, MODIFIED)
 PURE = Pose(xyz=read_only([0.25, 0, 0]), rpy=read_only([-ODD, 0, 0]))

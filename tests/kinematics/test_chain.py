@@ -13,7 +13,7 @@ from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses
 from dh2sim.kinematics.transforms import compose, joint_part, link_part
 from dh2sim.robot.spec import Pose, RobotSpec, Row
 from dh2sim.typing import Array, read_only
-from tests.kinematics.robots import HAYATI, MODIFIED, ODD, ODD_ARM, STANDARD, STANFORD, row
+from tests.sample_robots import HAYATI, MODIFIED, ODD, ODD_ROBOT, STANDARD, STANFORD, row
 from tests.strategies import robot_specs, robots_with_joint_vectors
 
 Q = np.random.default_rng(1).uniform(-2, 2, (20, 5))
@@ -55,16 +55,16 @@ def spoil(wrong: Row, change: str) -> Row:
     ("index", "change"),
     [
         (index, change)
-        for index, one in enumerate(ODD_ARM.rows)
+        for index, one in enumerate(ODD_ROBOT.rows)
         for change in ("alpha", "theta", "a", "d", "flip", "convention")
         if change != "flip" or one.type.moves
     ],
 )
 def test_an_error_in_one_row_of_the_chain_is_noticed(index: int, change: str) -> None:
-    rows = list(ODD_ARM.rows)
+    rows = list(ODD_ROBOT.rows)
     rows[index] = spoil(rows[index], change)
-    chain = build_chain(dataclasses.replace(ODD_ARM, rows=tuple(rows)))
-    gap = np.abs(frame_poses(chain, Q) - table_frame_poses(ODD_ARM, Q)).max()
+    chain = build_chain(dataclasses.replace(ODD_ROBOT, rows=tuple(rows)))
+    gap = np.abs(frame_poses(chain, Q) - table_frame_poses(ODD_ROBOT, Q)).max()
     assert gap > 0.01
 
 
@@ -113,18 +113,18 @@ def test_a_hayati_row_without_a_second_twist_is_a_standard_one() -> None:
 
 
 def test_the_first_joint_stands_in_base_link() -> None:
-    chain = build_chain(ODD_ARM)
+    chain = build_chain(ODD_ROBOT)
     expected = chain.T_base_link_dh0 @ joint_part(0.3, 0.2)
     np.testing.assert_allclose(chain.joints[0].T_parent_joint, expected, rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(chain.T_base_link_dh0[:3, 3], ODD_ARM.base.pose.xyz)
+    np.testing.assert_array_equal(chain.T_base_link_dh0[:3, 3], ODD_ROBOT.base.pose.xyz)
 
 
 def test_a_flipped_row_has_a_negative_sign() -> None:
-    assert [joint.sign for joint in build_chain(ODD_ARM).joints] == [1, -1, 1, -1, 1, 1]
+    assert [joint.sign for joint in build_chain(ODD_ROBOT).joints] == [-1, -1, 1, 1, 1, 1]
 
 
 def test_a_fixed_row_is_a_body_without_a_coordinate() -> None:
-    chain = build_chain(ODD_ARM)
+    chain = build_chain(ODD_ROBOT)
     assert [joint.name for joint in chain.joints] == ["one", "two", "three", "four", "five", "six"]
     assert [joint.name for joint in chain.moving_joints] == ["one", "two", "four", "five", "six"]
     assert chain.n == 5
@@ -138,7 +138,7 @@ def test_right_angles_give_exact_zeros_and_ones() -> None:
 
 
 def test_all_of_the_chain_is_read_only() -> None:
-    chain = build_chain(ODD_ARM)
+    chain = build_chain(ODD_ROBOT)
     arrays = [chain.T_base_link_dh0, chain.T_dhn_tool0]
     arrays += [T for joint in chain.joints for T in (joint.T_parent_joint, joint.T_joint_dh)]
     assert not any(array.flags.writeable for array in arrays)

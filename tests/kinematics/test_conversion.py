@@ -25,7 +25,7 @@ from tests.kinematics.arms import (
     numbers,
     pose_numbers,
 )
-from tests.kinematics.robots import HAYATI, MODIFIED, ODD, ODD_ARM, STANDARD, STANFORD, row
+from tests.sample_robots import HAYATI, MODIFIED, ODD, ODD_ROBOT, STANDARD, STANFORD, row
 from tests.strategies import robots_with_joint_vectors
 
 
@@ -141,7 +141,7 @@ def test_a_table_of_one_row_is_converted(to: Convention) -> None:
 
 
 def test_modified_frames_stand_at_their_joints_and_standard_ones_at_the_next() -> None:
-    spec = dataclasses.replace(ODD_ARM, convention=STANDARD)
+    spec = dataclasses.replace(ODD_ROBOT, convention=STANDARD)
     n, q = len(spec.rows), Q[0, :5]
     behind = table_frame_poses(convert_rows(spec, STANDARD).spec, q)
     before = table_frame_poses(convert_rows(spec, MODIFIED).spec, q)

@@ -17,7 +17,7 @@ from tests.kinematics.arms import (
     pose_numbers,
     table,
 )
-from tests.kinematics.robots import HAYATI, MODIFIED, STANDARD
+from tests.sample_robots import HAYATI, MODIFIED, STANDARD
 
 
 @pytest.mark.parametrize("to", KINDS)

@@ -19,7 +19,7 @@ from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import BaseSpec, Convention, LinkSpec, MeshSpec, RobotSpec
 from dh2sim.typing import Array, read_only
-from tests.kinematics.robots import HAYATI, MODIFIED, ODD, STANDARD, row
+from tests.sample_robots import HAYATI, MODIFIED, ODD, STANDARD, row
 from tests.strategies import inertias, lengths, poses, robots_with_joint_vectors, vectors
 
 KINDS = (STANDARD, MODIFIED)

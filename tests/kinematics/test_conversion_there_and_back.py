@@ -11,8 +11,7 @@ from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import Convention, Pose, RobotSpec
 from dh2sim.typing import Array
 from tests.kinematics.arms import GENERAL, KINDS, PURE, Q, arm, assert_same_arm, assert_same_numbers, table
-from tests.kinematics.robots import MODIFIED, STANDARD
-from tests.robots.samples import NAMES
+from tests.sample_robots import MODIFIED, NAMES, STANDARD
 from tests.strategies import robots_with_joint_vectors
 
 

@@ -10,7 +10,7 @@ from dh2sim.kinematics.conversion import XPart, as_pose, before, behind, inverse
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.robot.spec import Pose
 from dh2sim.typing import Array, read_only
-from tests.kinematics.robots import ODD
+from tests.sample_robots import ODD
 from tests.strategies import angles, lengths, poses
 
 

@@ -16,10 +16,10 @@ from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.trig import sin_cos
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
-from tests.kinematics.robots import ODD_ARM, STANFORD, row
+from tests.sample_robots import ODD_ROBOT, STANFORD, row
 from tests.strategies import robots_with_joint_vectors
 
-ODD_CHAIN = build_chain(ODD_ARM)
+ODD_CHAIN = build_chain(ODD_ROBOT)
 NAMES = "5 joint coordinates (one, two, four, five, six)"
 
 
@@ -51,7 +51,7 @@ def test_joint_poses_equal_the_exact_ones(robot: tuple[RobotSpec, Array]) -> Non
 
 @pytest.mark.parametrize("count", [1, BLOCK - 1, BLOCK, BLOCK + 1, 2 * BLOCK + 77])
 def test_blocks_join_without_a_seam(count: int) -> None:
-    for spec in (ODD_ARM, STANFORD):
+    for spec in (ODD_ROBOT, STANFORD):
         q = np.random.default_rng(count).uniform(-3, 3, (count, len(spec.moving_rows)))
         chain, expected = build_chain(spec), table_frame_poses(spec, q)
         np.testing.assert_allclose(frame_poses(chain, q), expected, rtol=0, atol=1e-14)

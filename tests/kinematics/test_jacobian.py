@@ -11,7 +11,7 @@ from dh2sim.kinematics.forward import frame_names, frame_pose, geometric_jacobia
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
-from tests.kinematics.robots import ODD_ARM, STANFORD, row
+from tests.sample_robots import ODD_ROBOT, STANFORD, row
 from tests.strategies import robots_with_joint_vectors
 
 
@@ -34,14 +34,14 @@ def test_jacobian_equals_central_differences_of_the_table(robot: tuple[RobotSpec
     np.testing.assert_allclose(found, differences_of_the_table(spec, q), rtol=0, atol=3e-9)
 
 
-@pytest.mark.parametrize("spec", [ODD_ARM, STANFORD])
+@pytest.mark.parametrize("spec", [ODD_ROBOT, STANFORD])
 def test_jacobian_blocks_join_without_a_seam(spec: RobotSpec) -> None:
     q = np.random.default_rng(2).uniform(-3, 3, (BLOCK + 10, len(spec.moving_rows)))
     found = geometric_jacobian(build_chain(spec), q)
     np.testing.assert_allclose(found[-40:], differences_of_the_table(spec, q[-40:]), rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("spec", [ODD_ARM, STANFORD])
+@pytest.mark.parametrize("spec", [ODD_ROBOT, STANFORD])
 def test_jacobian_of_any_frame_equals_its_central_differences(spec: RobotSpec) -> None:
     chain, step = build_chain(spec), 1e-5
     n = chain.n
@@ -57,7 +57,7 @@ def test_jacobian_of_any_frame_equals_its_central_differences(spec: RobotSpec) -
 
 @pytest.mark.parametrize("batch", [(), (0,), (1,), (2, 3)])
 def test_jacobian_takes_any_batch_shape(batch: tuple[int, ...]) -> None:
-    chain = build_chain(ODD_ARM)
+    chain = build_chain(ODD_ROBOT)
     q = np.random.default_rng(0).uniform(-1, 1, (*batch, 5))
     found = geometric_jacobian(chain, q)
     assert found.shape == (*batch, 6, 5)
@@ -81,6 +81,6 @@ def test_a_flipped_joint_flips_its_column() -> None:
 
 def test_jacobian_of_what_is_no_joint_vector_is_refused() -> None:
     with pytest.raises(ConfigurationError) as caught:
-        geometric_jacobian(build_chain(ODD_ARM), [0.0])
+        geometric_jacobian(build_chain(ODD_ROBOT), [0.0])
     expected = "expected 5 joint coordinates (one, two, four, five, six) along the last axis, got shape (1,)"
     assert str(caught.value) == expected

@@ -12,7 +12,7 @@ from dh2sim.kinematics import table_oracle as table
 from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses, table_tool_pose
 from dh2sim.robot.spec import Convention, Pose, RobotSpec
 from dh2sim.typing import read_only
-from tests.kinematics.robots import HAYATI, MODIFIED, ODD, ODD_ARM, STANDARD, STANFORD, row
+from tests.sample_robots import HAYATI, MODIFIED, ODD, ODD_ROBOT, STANDARD, STANFORD, row
 
 BETA = math.radians(123.4)
 # cos and sin of 37.3 degrees, of 20 degrees and of 123.4 degrees, from tables
@@ -112,28 +112,28 @@ def test_stanford_arm_is_where_its_closed_form_says() -> None:
 
 def test_base_and_tool_poses_stand_at_the_ends() -> None:
     q = [0.1, 0.2, 0.3, 0.4, 0.5]
-    bare = RobotSpec(name="bare", rows=ODD_ARM.rows)
-    poses = table_frame_poses(ODD_ARM, q)
+    bare = RobotSpec(name="bare", rows=ODD_ROBOT.rows)
+    poses = table_frame_poses(ODD_ROBOT, q)
     np.testing.assert_allclose(poses, poses[0] @ table_frame_poses(bare, q), rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(poses[0, :3, 3], ODD_ARM.base.pose.xyz)
-    T_dhn_tool0 = np.linalg.inv(poses[-1]) @ table_tool_pose(ODD_ARM, q)
-    np.testing.assert_allclose(T_dhn_tool0[:3, 3], ODD_ARM.tool.xyz, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(poses[0, :3, 3], ODD_ROBOT.base.pose.xyz)
+    T_dhn_tool0 = np.linalg.inv(poses[-1]) @ table_tool_pose(ODD_ROBOT, q)
+    np.testing.assert_allclose(T_dhn_tool0[:3, 3], ODD_ROBOT.tool.xyz, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("batch", [(), (0,), (1,), (2, 3), (5000,)])
 def test_table_poses_take_any_batch_shape(batch: tuple[int, ...]) -> None:
     q = np.random.default_rng(0).uniform(-1, 1, (*batch, 5))
-    poses = table_frame_poses(ODD_ARM, q)
+    poses = table_frame_poses(ODD_ROBOT, q)
     assert poses.shape == (*batch, 7, 4, 4)
-    assert table_tool_pose(ODD_ARM, q).shape == (*batch, 4, 4)
+    assert table_tool_pose(ODD_ROBOT, q).shape == (*batch, 4, 4)
     for index in list(np.ndindex(batch))[-3:]:
-        np.testing.assert_allclose(poses[index], table_frame_poses(ODD_ARM, q[index]), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(poses[index], table_frame_poses(ODD_ROBOT, q[index]), rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("q", [0.3, [0.1, 0.2], np.zeros((2, 6))])
 def test_table_poses_refuse_a_wrong_shape(q: object) -> None:
     with pytest.raises(ConfigurationError) as caught:
-        table_frame_poses(ODD_ARM, np.asarray(q))
+        table_frame_poses(ODD_ROBOT, np.asarray(q))
     assert str(caught.value) == f"expected an array of shape (..., 5), got shape {np.shape(np.asarray(q))}"
 
 

@@ -21,7 +21,7 @@ from dh2sim.kinematics.transforms import (
     rpy_from_rotation,
 )
 from dh2sim.typing import Array
-from tests.kinematics.robots import ODD
+from tests.sample_robots import ODD
 from tests.strategies import angles, inertias, lengths, vectors
 
 turns = st.floats(-math.pi, math.pi, allow_subnormal=False)

@@ -12,8 +12,8 @@ from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import RobotSpec, Row
 from dh2sim.typing import Array, read_only
-from tests.model.samples import ODD_ROBOT, PRISMATIC, REVOLUTE, STANDARD, compiled, in_limits, model
-from tests.robots.samples import NAMES
+from tests.model.samples import compiled
+from tests.sample_robots import NAMES, ODD_ROBOT, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
 from tests.strategies import robot_specs
 
 SIDEWAYS = read_only([3.0, -4.0, -7.5])

@@ -19,8 +19,7 @@ from dh2sim.model.actuators import ASSUMED_BANDWIDTH, ActuatorModel, seen_inerti
 from dh2sim.model.build import BASE_COLOR, JOINT_COLOR, PALETTE, build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, BaseSpec, Dynamics, JointType, LinkSpec, RobotSpec, Row
-from tests.model.samples import ODD_ROBOT, REVOLUTE, STANDARD, model
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES, ODD_ROBOT, REVOLUTE, STANDARD, model
 
 ROOT = Path(__file__).parents[2]
 
@@ -38,7 +37,7 @@ def test_the_same_robot_makes_the_same_model_twice(name: str) -> None:
 @pytest.mark.parametrize("seed", ["1", "2"])
 def test_another_process_makes_the_same_model(seed: str) -> None:
     script = (
-        "import sys; from tests.model.samples import model; from tests.model.test_build import texts; "
+        "import sys; from tests.sample_robots import model; from tests.model.test_build import texts; "
         "sys.stdout.buffer.write(''.join(texts(model('odd'))).encode())"
     )
     environment = {**os.environ, "PYTHONHASHSEED": seed}

@@ -14,8 +14,8 @@ from dh2sim.model.collision_exclusions import ExcludedPair, Reason, segment_dist
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import JointType, RobotSpec, Row
 from dh2sim.typing import Array, read_only
-from tests.model.samples import FIXED, MODIFIED, REVOLUTE, STANDARD, compiled, model
-from tests.robots.samples import NAMES
+from tests.model.samples import compiled
+from tests.sample_robots import FIXED, MODIFIED, NAMES, REVOLUTE, STANDARD, model
 from tests.strategies import robot_specs
 
 

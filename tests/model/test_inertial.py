@@ -14,8 +14,8 @@ from dh2sim.model.mass import ASSUMED_DENSITY, MIN_INERTIA, MIN_MASS, MassProper
 from dh2sim.model.robot_model import LinkModel
 from dh2sim.robot.spec import Convention, LinkSpec, RobotSpec, Row
 from dh2sim.typing import Array, read_only
-from tests.model.samples import FIXED, HAYATI, MODIFIED, ODD, REVOLUTE, STANDARD
 from tests.model.test_mass import plates
+from tests.sample_robots import FIXED, HAYATI, MODIFIED, ODD, REVOLUTE, STANDARD
 
 MASS = 4.2
 COM = read_only([0.05, -0.03, 0.11])

@@ -13,8 +13,18 @@ from dh2sim.model.limits import ASSUMED_SLIDE_RATE, ASSUMED_TURN_RATE
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import BaseSpec, JointType, Limits, Pose, RobotSpec, Row
 from dh2sim.typing import read_only
-from tests.model.samples import CONTINUOUS, FIXED, MODIFIED, ODD, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
-from tests.robots.samples import NAMES
+from tests.sample_robots import (
+    CONTINUOUS,
+    FIXED,
+    MODIFIED,
+    NAMES,
+    ODD,
+    PRISMATIC,
+    REVOLUTE,
+    STANDARD,
+    in_limits,
+    model,
+)
 from tests.strategies import robot_specs
 
 

@@ -15,8 +15,8 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
-from tests.model.samples import body_inertia, compiled, model
-from tests.robots.samples import NAMES
+from tests.model.samples import body_inertia, compiled
+from tests.sample_robots import NAMES, model
 from tests.strategies import robot_specs
 
 DENSITY = 850.0

@@ -11,8 +11,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart, along_z, between, placed, pose_with_z
 from dh2sim.robot.spec import Limits, RobotSpec, Row
 from dh2sim.typing import Array
-from tests.model.samples import CONTINUOUS, MODIFIED, ODD, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
-from tests.robots.samples import NAMES
+from tests.sample_robots import CONTINUOUS, MODIFIED, NAMES, ODD, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
 from tests.strategies import robot_specs
 
 

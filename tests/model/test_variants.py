@@ -16,8 +16,7 @@ from dh2sim.model.mass import MIN_MASS
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType
-from tests.model.samples import ODD_ROBOT, model
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES, ODD_ROBOT, model
 
 KINDS = list(ActuatorType)
 

@@ -13,9 +13,10 @@ from dh2sim import build_chain, forward_kinematics, frame_poses, load_robot
 from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
+from tests.sample_robots import NAMES, ROBOTS_DIR, robot
 
 from .closed_forms import PARTS, PROVENANCE, ROBOTS, Form
-from .samples import NAMES, ROBOTS_DIR, random_configurations, robot
+from .samples import random_configurations
 
 TOLERANCE = 1e-13
 """m, and units of a rotation matrix's entries; rounding at the longest arm's 33 m comes to about 1e-14."""

@@ -10,8 +10,9 @@ import pytest
 
 from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.typing import Array
+from tests.sample_robots import robot
 
-from .samples import random_configurations, robot
+from .samples import random_configurations
 
 
 class Misprint(NamedTuple):

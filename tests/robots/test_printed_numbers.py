@@ -12,8 +12,7 @@ from dh2sim import build_chain, forward_kinematics
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
-
-from .samples import robot
+from tests.sample_robots import robot
 
 STANFORD_PRINTED_POSE = np.array(
     [

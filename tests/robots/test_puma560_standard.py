@@ -24,9 +24,10 @@ import numpy as np
 
 from dh2sim import build_chain, forward_kinematics, frame_poses
 from dh2sim.typing import Array
+from tests.sample_robots import robot
 
 from .closed_forms import puma560
-from .samples import limits, random_configurations, robot
+from .samples import limits, random_configurations
 
 RZ_180 = np.diag([-1.0, -1.0, 1.0, 1.0])
 """T_base-standard_base-modified."""

@@ -9,8 +9,9 @@ import pytest
 
 from dh2sim import build_chain, frame_poses, geometric_jacobian
 from dh2sim.robot.spec import Convention
+from tests.sample_robots import NAMES, robot
 
-from .samples import NAMES, limits, random_configurations, robot
+from .samples import limits, random_configurations
 
 PARAMETERS = {
     "arm_5r": {"L2": 0.4, "L3": 0.3},

@@ -12,7 +12,7 @@ import pytest
 from dh2sim.simulate.dataset_layout import STATUS, Layout
 from dh2sim.simulate.options import RECORDABLE, RolloutOptions
 from dh2sim.simulate.prepare import prepare
-from tests.model.samples import model
+from tests.sample_robots import model
 from tests.simulate import robots
 
 EVERYTHING = {"record": RECORDABLE, "controller": "pd", "integrator": "Euler"}

@@ -16,8 +16,7 @@ from dh2sim.robot.spec import Limits
 from dh2sim.simulate import rollout
 from dh2sim.simulate.randomization import Purpose, generator
 from dh2sim.typing import Array, read_only
-from tests.model.samples import model
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES, model
 from tests.simulate import robots
 
 

@@ -18,7 +18,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import ActuatorType, RobotSpec
 from dh2sim.simulate import rollout
 from dh2sim.simulate.options import RECORDABLE
-from tests.model.samples import model
+from tests.sample_robots import model
 from tests.simulate import plain, robots
 from tests.strategies import robot_specs
 

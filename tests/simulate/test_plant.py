@@ -9,7 +9,7 @@ from dh2sim.robot.spec import ActuatorType, Convention, Limits, RobotSpec, Row
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.plant import Plant, compile_plant
 from dh2sim.simulate.prepare import prepare
-from tests.model.samples import CONTINUOUS, FIXED, PRISMATIC, REVOLUTE, model
+from tests.sample_robots import CONTINUOUS, FIXED, PRISMATIC, REVOLUTE, model
 from tests.simulate import robots
 
 

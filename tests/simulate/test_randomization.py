@@ -12,7 +12,7 @@ from dh2sim.robot.spec import ActuatorSpec, ActuatorType
 from dh2sim.simulate import rollout
 from dh2sim.simulate.options import RANDOMIZABLE
 from dh2sim.simulate.randomization import Generators, Purpose, generator
-from tests.model.samples import model
+from tests.sample_robots import model
 from tests.simulate import plain, robots
 
 ALL = {"mass": 0.3, "friction": 0.4, "damping": 0.5, "armature": 0.2, "gain": 0.1}

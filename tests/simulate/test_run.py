@@ -17,8 +17,8 @@ from dh2sim.simulate import open_dataset, rollout
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.run import fill, open_run
-from tests.model.samples import model
 from tests.program import contents
+from tests.sample_robots import model
 from tests.simulate import robots
 
 EVERYTHING: dict[str, Any] = {

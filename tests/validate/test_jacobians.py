@@ -10,7 +10,7 @@ from dh2sim.robot.spec import JointType, RobotSpec
 from dh2sim.typing import Array
 from dh2sim.validate.kinematics import LibraryEngine, check_jacobian, check_poses, table_jacobian
 from dh2sim.validate.report import Check
-from tests.kinematics.robots import row
+from tests.sample_robots import row
 
 A1, A2 = 1.0, 0.7
 PLANAR = RobotSpec(name="planar", rows=(row("one", a=A1), row("two", a=A2)))

@@ -15,7 +15,7 @@ from dh2sim.robot.spec import RobotSpec
 from dh2sim.validate.run import validate_robot
 from tests.export.broken import SHIFT, shifted_chain
 from tests.export.robots import ODD, RICH, small, write
-from tests.robots.samples import NAMES, ROBOTS_DIR
+from tests.sample_robots import NAMES, ROBOTS_DIR
 from tests.strategies import robot_specs
 from tests.validate.files import failures, validated
 

@@ -14,8 +14,7 @@ from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Row
 from dh2sim.typing import Array
 from dh2sim.view.scene.annotations import COLORS, Quantity, row_annotations
 from dh2sim.view.scene.items import Arrow, Item, Label, Polyline, Scene
-from tests.kinematics.robots import HAYATI, MODIFIED, ODD_ARM, STANDARD, row
-from tests.robots.samples import robot
+from tests.sample_robots import HAYATI, MODIFIED, ODD_ROBOT, STANDARD, robot, row
 from tests.strategies import robots_with_joint_vectors
 
 SIZE = 0.2
@@ -134,7 +133,7 @@ def test_labels_carry_name_index_value_and_a_star_where_the_joint_moves() -> Non
 
 
 def test_a_modified_row_carries_a_and_alpha_of_the_index_before() -> None:
-    scene = explained(ODD_ARM, 1, [0.0, 0.12, 0.0, 0.0, 0.0])
+    scene = explained(ODD_ROBOT, 1, [0.0, 0.12, 0.0, 0.0, 0.0])
     texts = [label(scene, name) for name in ("a", "alpha", "theta", "d")]
     assert texts == ["a₁ = -0.2 m", "α₁ = -63.0254°", "θ₂ = -40.107°", "d₂* = -0.070 m"]
 
@@ -148,8 +147,8 @@ def test_a_hayati_row_tells_beta_and_rows_have_more_than_one_figure() -> None:
 
 
 def test_angles_can_be_shown_in_radians() -> None:
-    scene = explained(ODD_ARM, 0, [0.5, 0.0, 0.0, 0.0, 0.0], angle=AngleUnit.RAD)
-    assert (label(scene, "theta"), label(scene, "alpha")) == ("θ₁* = 0.800 rad", "α₁ = 0.651008 rad")
+    scene = explained(ODD_ROBOT, 0, [0.5, 0.0, 0.0, 0.0, 0.0], angle=AngleUnit.RAD)
+    assert (label(scene, "theta"), label(scene, "alpha")) == ("θ₁* = -0.200 rad", "α₁ = 0.651008 rad")
 
 
 def test_a_tiny_coordinate_has_no_minus_sign_and_rounding_is_shown_as_zero() -> None:

@@ -23,8 +23,7 @@ from dh2sim.view.scene.ghost import (
     misread_text,
 )
 from dh2sim.view.scene.items import Placed, Solid
-from tests.kinematics.robots import HAYATI, MODIFIED, ODD_ARM, STANDARD, row
-from tests.robots.samples import robot
+from tests.sample_robots import HAYATI, MODIFIED, ODD_ROBOT, STANDARD, robot, row
 from tests.strategies import robots_with_joint_vectors
 
 
@@ -37,7 +36,7 @@ def arm(name: str, *rows: Row, **more: Array) -> RobotSpec:
 
 
 def test_a_ghost_is_the_robot_in_one_translucent_colour() -> None:
-    model = build_model(ODD_ARM)
+    model = build_model(ODD_ROBOT)
     q = model.home + 0.1
     scene = ghost_scene(model, q, (0.1, 0.2, 0.3), 0.25)
     assert scene["/ghost"] == Placed()
@@ -51,7 +50,7 @@ def test_a_ghost_is_the_robot_in_one_translucent_colour() -> None:
 
 def test_a_ghost_needs_a_joint_vector_of_its_own_length() -> None:
     with pytest.raises(ConfigurationError, match="expected 5 joint coordinates"):
-        ghost_scene(build_model(ODD_ARM), np.zeros(6))
+        ghost_scene(build_model(ODD_ROBOT), np.zeros(6))
 
 
 def test_joints_are_matched_by_name_whatever_their_order() -> None:
@@ -104,20 +103,20 @@ def test_another_robot_is_described_by_its_tool_and_the_joints_that_differ() -> 
 
 
 def test_misreading_keeps_the_numbers_and_changes_the_convention() -> None:
-    read = misread(ODD_ARM)
+    read = misread(ODD_ROBOT)
     assert [entry.convention for entry in read.rows] == [
-        STANDARD if entry.convention is MODIFIED else MODIFIED for entry in ODD_ARM.rows
+        STANDARD if entry.convention is MODIFIED else MODIFIED for entry in ODD_ROBOT.rows
     ]
     for name in ("name", "type", "a", "alpha", "d", "theta", "beta", "flip", "limits"):
-        assert [getattr(entry, name) for entry in read.rows] == [getattr(entry, name) for entry in ODD_ARM.rows]
+        assert [getattr(entry, name) for entry in read.rows] == [getattr(entry, name) for entry in ODD_ROBOT.rows]
     assert (read.name, read.convention) == ("odd_misread", MODIFIED)
-    assert read.base is ODD_ARM.base
-    assert read.tool is ODD_ARM.tool
+    assert read.base is ODD_ROBOT.base
+    assert read.tool is ODD_ROBOT.tool
 
 
 def test_misreading_twice_gives_the_table_back() -> None:
-    back = misread(misread(ODD_ARM))
-    assert [entry.convention for entry in back.rows] == [entry.convention for entry in ODD_ARM.rows]
+    back = misread(misread(ODD_ROBOT))
+    assert [entry.convention for entry in back.rows] == [entry.convention for entry in ODD_ROBOT.rows]
 
 
 def test_hayati_rows_have_no_other_reading() -> None:
@@ -149,7 +148,7 @@ def test_the_offset_of_the_misread_puma_is_given_in_metres_and_degrees() -> None
 
 
 def test_mixed_conventions_are_swapped() -> None:
-    assert misread_text(ODD_ARM, np.zeros(5)).startswith(
+    assert misread_text(ODD_ROBOT, np.zeros(5)).startswith(
         "Read with standard and modified swapped, this table has tool0 "
     )
 

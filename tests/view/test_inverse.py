@@ -16,21 +16,16 @@ from dh2sim.kinematics.forward import forward_kinematics
 from dh2sim.kinematics.transforms import identity, pose_from_rpy
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 from dh2sim.typing import Array
 from dh2sim.view.motion.inverse import InverseKinematics, Solution
 from tests import strategies
+from tests.sample_robots import model as robot
 
 ROBOTS = ("planar_2r", "rpr", "scara", "cylindrical", "arm_5r", "spherical_wrist", "stanford", "puma560", "ssrms")
 FEW_JOINTS = ("planar_2r", "scara", "arm_5r")
 PATIENT = 60.0
 """s: more than any solution takes, so that what is found does not depend on the speed of the machine."""
-
-
-@cache
-def robot(name: str) -> RobotModel:
-    return build_model(load_robot(name))
 
 
 @cache

@@ -31,7 +31,7 @@ from dh2sim.view.page_export import (
 from dh2sim.view.scene.items import Arrow, Label, Placed, Scene, Solid, Triad
 from dh2sim.view.scene.items import Polyline as Line
 from tests.draw.datasets import stopped, swinging
-from tests.robots.samples import NAMES, robot
+from tests.sample_robots import NAMES, robot
 from tests.view.test_solids import matrix
 
 RED = (1.0, 0.0, 0.0)

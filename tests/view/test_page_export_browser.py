@@ -21,7 +21,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.view.page_export import BoundingSphere, export_page, page_html
 from dh2sim.view.scene.items import ORIGIN, Color, Placed, Scene, Solid, Vector
 from tests.draw.datasets import swinging
-from tests.robots.samples import robot
+from tests.sample_robots import robot
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Route

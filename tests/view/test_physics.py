@@ -17,21 +17,16 @@ from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian, jo
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators
-from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import ActuatorType, Convention, Dynamics, JointType, LinkSpec, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 from dh2sim.validate.motion.free_motion import frictionless, without_contacts
 from dh2sim.validate.motion.mechanics import energy
 from dh2sim.view.motion.applied_force import LinkPoint, drag_spring, find_point
 from dh2sim.view.motion.physics import STEPS_PER_CLOCK_READING, Drive, Physics
+from tests.sample_robots import model as robot
 
 PATIENT = 600.0
 """s: more than any simulation here takes, so that time never runs out."""
-
-
-@cache
-def robot(name: str) -> RobotModel:
-    return build_model(load_robot(name))
 
 
 @cache

@@ -23,8 +23,7 @@ from dh2sim.view.scene.solids import (
     robot_solids,
     shape_triangles,
 )
-from tests.model.samples import ODD_ROBOT
-from tests.robots.samples import NAMES, robot
+from tests.sample_robots import NAMES, ODD_ROBOT, robot
 
 
 def shape(kind: ShapeKind, radius: float, length: float) -> Shape:

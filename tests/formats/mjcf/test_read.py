@@ -12,8 +12,7 @@ from dh2sim.formats.mjcf.read import read_mjcf
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.robot.spec import ActuatorType, JointType
 from tests.formats.mjcf.reading import BALL, arm_text, model_text, read_text, residual
-from tests.model.samples import model
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES, model
 
 
 @pytest.mark.parametrize("name", NAMES)

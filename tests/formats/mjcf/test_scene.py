@@ -16,8 +16,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import BaseSpec, JointType, Pose, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 from tests.formats.readers import no_mujoco_warnings, parsed
-from tests.model.samples import ODD_ROBOT, REVOLUTE, STANDARD, model
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES, ODD_ROBOT, REVOLUTE, STANDARD, model
 from tests.strategies import robot_specs
 
 

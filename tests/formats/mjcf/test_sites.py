@@ -14,7 +14,7 @@ from dh2sim.model.mass import MassProperties
 from dh2sim.robot.spec import RobotSpec, Row
 from dh2sim.typing import Array, read_only
 from tests.formats.readers import in_mujoco
-from tests.model.samples import ODD, REVOLUTE, STANDARD
+from tests.sample_robots import ODD, REVOLUTE, STANDARD
 
 TURNED = pose_from_rpy([0.3, 0.2, 0.1], [0.4, 0.5, 0.6])
 

@@ -16,8 +16,7 @@ from dh2sim.model.shapes import ShapeKind, ShapePart
 from dh2sim.robot.spec import Dynamics, RobotSpec, Row
 from dh2sim.typing import read_only
 from tests.formats.readers import floats, in_mujoco, normal, parsed
-from tests.model.samples import CONTINUOUS, FIXED, ODD_ROBOT, REVOLUTE, STANDARD, model
-from tests.robots.samples import NAMES
+from tests.sample_robots import CONTINUOUS, FIXED, NAMES, ODD_ROBOT, REVOLUTE, STANDARD, model
 from tests.strategies import robot_specs
 
 

@@ -16,8 +16,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Limits, RobotSpec, Row
 from dh2sim.typing import read_only
 from tests.formats.readers import in_mujoco
-from tests.model.samples import CONTINUOUS, MODIFIED, ODD, PRISMATIC, REVOLUTE, STANDARD, model
-from tests.robots.samples import NAMES
+from tests.sample_robots import CONTINUOUS, MODIFIED, NAMES, ODD, PRISMATIC, REVOLUTE, STANDARD, model
 
 LIMITS = Limits(position=(-1.5, 2.0), velocity=3.0, effort=40.0)
 HOME, BENT = [0.1, 0.2, 0.3, -0.4, 0.5], [-1.0, 0.4, 1.9, 2.5, -0.6]

@@ -15,8 +15,7 @@ from dh2sim.model.variants import with_base_mass
 from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 from dh2sim.typing import Array
 from tests.formats.readers import parsed
-from tests.model.samples import in_limits, model
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES, in_limits, model
 from tests.strategies import robot_specs
 
 TINY = RobotSpec(

@@ -11,9 +11,8 @@ from dh2sim.kinematics.forward import forward_kinematics
 from dh2sim.kinematics.serial_chain import serial_link_poses
 from dh2sim.robot.spec import JointType
 from tests.formats.urdf.samples import joint, links, read, robot
-from tests.model.samples import model
 from tests.refusals import refusal
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES, model
 
 
 def problems(text: str, *, base: str | None = None, tip: str | None = None) -> list[str]:

@@ -16,8 +16,7 @@ from dh2sim.model.shapes import ShapeKind, ShapePart
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.formats.readers import body_poses, floats, in_mujoco, normal, parsed
-from tests.model.samples import in_limits, model
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES, in_limits, model
 from tests.strategies import robot_specs
 
 

@@ -9,8 +9,7 @@ from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import RobotSpec
 from tests.formats.readers import in_check_urdf, in_mujoco, in_pinocchio, in_yourdfpy
-from tests.model.samples import model
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES, model
 from tests.strategies import robot_specs
 
 

@@ -17,7 +17,7 @@ from dh2sim.validate.motion.conservation import check_energy, check_momentum
 from dh2sim.validate.motion.free_motion import RECORDS, State, free_model, random_states
 from dh2sim.validate.report import Check
 from tests.export.robots import ODD
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES
 from tests.validate.motion.robots import FRICTION, LIFT, PENDULUM, TURNTABLE, built, heavier
 
 

@@ -14,7 +14,7 @@ from dh2sim.validate.motion.free_motion import compile_model
 from dh2sim.validate.motion.self_contact import by_construction, check_self_contact, random_tour
 from dh2sim.validate.report import Check
 from tests.export.robots import ODD, snake
-from tests.robots.samples import NAMES
+from tests.sample_robots import NAMES
 from tests.validate.motion.robots import FOLDED, built
 
 
