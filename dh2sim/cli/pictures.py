@@ -90,7 +90,11 @@ def render(
     from dh2sim.draw.video import VIDEOS, VideoSpeed, require_picture, video_positions, write_image, write_video
 
     number = 0 if rollout is None else rollout
-    path = (_default(source, number) if of_run else Path(f"{Path(source).stem}.png")) if out is None else out
+    path = (
+        (_beside(Path(source), f"-{number}.mp4") if of_run else Path(f"{Path(source).stem}.png"))
+        if out is None
+        else out
+    )
     require_picture(path)
     video, gif = path.suffix.lower() in VIDEOS, path.suffix.lower() == ".gif"
     if video and not of_run:
@@ -122,10 +126,10 @@ def render(
         print(f"{path}: {summary}, {options.width}x{options.height}")
 
 
-def _default(source: str, rollout: int) -> Path:
-    """Return the name of a video beside its run."""
-    run = Path(source)
-    return run.with_name(f"{run.stem}-{rollout}.mp4")
+def _beside(run: Path, ending: str) -> Path:
+    """Return the path of a file beside a run, named after it; the run may be given as '.', from inside."""
+    named = run.resolve() if run.name in ("", "..") else run
+    return named.parent / f"{named.stem}{ending}"
 
 
 def _warn_if_stopped(data: RolloutData | None) -> None:
@@ -207,7 +211,7 @@ def plot(
     from dh2sim.draw.rollout_data import open_rollout
 
     require_kind(what)
-    path = run.with_name(f"{run.stem}-{rollout}-{what}.png") if out is None else out
+    path = _beside(run, f"-{rollout}-{what}.png") if out is None else out
     require_plot(path)
     pixels = None if size is None else _parse_size(size)
     if pixels is not None and not all(200 <= length <= 20_000 for length in pixels):

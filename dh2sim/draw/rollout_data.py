@@ -88,10 +88,10 @@ def open_rollout(path: Path, number: int) -> RolloutData:
     from dh2sim.simulate.store.reader import open_dataset, reading
 
     with open_dataset(path) as run:
-        _check_number(run, number, path.name)
+        _check_number(run, number, path.absolute().name)
         with reading(path):
             data = run.isel(rollout=number).load()
-    return _rollout_data(data, number, path.name)
+    return _rollout_data(data, number, path.absolute().name)
 
 
 def select_rollout(run: Dataset, number: int, name: str) -> RolloutData:

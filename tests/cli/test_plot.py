@@ -68,6 +68,21 @@ def test_what_is_not_a_run_is_reported(tmp_path: Path) -> None:
     assert dh2sim("plot", "no.zarr") == Outcome(status=2, out="", err="dh2sim: there is no 'no.zarr'\n")
 
 
+@pytest.mark.parametrize("command", ["plot", "render"])
+@pytest.mark.parametrize("place", ["", ".", "/"])
+def test_a_folder_without_a_name_is_not_a_run(command: str, place: str) -> None:
+    printed = f"dh2sim: '{Path(place)}' is not a run of dh2sim\n"
+    assert dh2sim(command, place) == Outcome(status=2, out="", err=printed)
+
+
+def test_a_run_can_be_plotted_from_inside(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(run)
+    done = dh2sim("plot", ".", "--what", "tracking")
+    assert done == Outcome(
+        status=0, out=f"{run.parent}/run-0-tracking.png: tracking of run.zarr, rollout 0\n", err=""
+    )
+
+
 @pytest.mark.parametrize(
     ("arguments", "printed"),
     [
