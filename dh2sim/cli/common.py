@@ -161,12 +161,17 @@ def complain(error: object) -> int:
         case RobotFileError():
             text = str(error)
         case SettingsError():
-            options = ((name and f"--{name.replace('_', '-')} ", message) for name, message in error.problems)
-            text = "\n".join(f"dh2sim: {option}{message}" for option, message in options)
+            text = "\n".join(f"dh2sim: {_as_option(name, message)}" for name, message in error.problems)
         case _:
             text = f"dh2sim: {error}"
     print(text, file=sys.stderr)
     return FELL_SHORT if isinstance(error, MismatchError) else BAD_INPUT
+
+
+def _as_option(name: str, message: str) -> str:
+    """Return what is wrong with an argument of the library, and with the one it excludes, in options' names."""
+    option = f"--{name.replace('_', '-')} " if name else ""
+    return option + re.sub(r"(?<=\btogether with )(?=\w)", "--", message)
 
 
 # ---------------------------------------------------------------------------- robots

@@ -152,7 +152,7 @@ def test_every_mistake_is_reported_at_once(folder: Path) -> None:
         (["--timestep", "nan"], "--timestep must be above 0 s and at most 1 s, got nan"),
         (["--timestep", "-1"], "--timestep must be above 0 s and at most 1 s, got -1.0"),
         (["--record", ","], f"--record must not be empty. Allowed: {KNOWN}"),
-        (["--resume", "--overwrite"], "--resume must not be given together with overwrite"),
+        (["--resume", "--overwrite"], "--resume must not be given together with --overwrite"),
         (
             ["--timestep", "1e-9"],
             "one rollout would record 283.1 GB, and at most 1 GB are possible; record fewer states (every) or fewer "
