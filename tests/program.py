@@ -12,6 +12,13 @@ from pathlib import Path
 
 from dh2sim.cli.app import app
 
+STARTED = """
+print("started", flush=True)
+from dh2sim.cli.main import main
+main()
+"""
+"""The program, which reports when Python has started."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
@@ -51,6 +58,19 @@ def dh2sim_process(
         capture_output=True,
         encoding="utf-8",
         errors="surrogateescape",
+        timeout=120,
+        check=False,
+    )
+    return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
+
+
+def shell(script: str, **variables: str) -> Outcome:
+    """Run a script in a shell, in which $PYTHON is this Python and $DH2SIM the program."""
+    done = subprocess.run(
+        ["sh", "-c", script],
+        env=environment(PYTHON=sys.executable, DH2SIM=f"{sys.executable} -m dh2sim", **variables),
+        capture_output=True,
+        encoding="utf-8",
         timeout=120,
         check=False,
     )

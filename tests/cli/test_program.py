@@ -16,7 +16,7 @@ import pytest
 
 from dh2sim.robot.catalog import builtin_robots
 from tests.export.robots import small, write
-from tests.program import Outcome, dh2sim, dh2sim_process, environment
+from tests.program import Outcome, dh2sim, dh2sim_process, environment, shell
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = (
@@ -260,25 +260,13 @@ def test_schema_prints_a_json_schema_that_any_editor_can_read() -> None:
     assert set(schema["required"]) == {"name", "convention", "joints"}
 
 
-def _shell(script: str, **variables: str) -> Outcome:
-    done = subprocess.run(
-        ["sh", "-c", script],
-        env=environment(DH2SIM=f"{sys.executable} -m dh2sim", **variables),
-        capture_output=True,
-        encoding="utf-8",
-        timeout=120,
-        check=False,
-    )
-    return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["schema", "info stanford", "fk stanford --json"])
 def test_a_reader_that_closes_the_output_is_not_an_error(command: str) -> None:
-    run = _shell(f"{{ $DH2SIM {command}; echo $? >&2; }} | head -c 1")
+    run = shell(f"{{ $DH2SIM {command}; echo $? >&2; }} | head -c 1")
     assert (run.status, len(run.out)) == (0, 1)
     assert run.err == "0\n"
-    assert _shell(f"{{ sleep 0.2; $DH2SIM {command}; echo $? >&2; }} | true").err == "0\n"
+    assert shell(f"{{ sleep 0.2; $DH2SIM {command}; echo $? >&2; }} | true").err == "0\n"
 
 
 @pytest.mark.slow
@@ -286,14 +274,14 @@ def test_a_reader_that_closes_the_output_is_not_an_error(command: str) -> None:
 def test_a_program_without_standard_output_or_error_does_its_work(command: str, tmp_path: Path) -> None:
     expected = 1 if command.startswith("export") else 0
     for closed in (">&-", "2>&-", ">&- 2>&-"):
-        run = _shell(f"cd {tmp_path} && $DH2SIM {command} {closed}")
+        run = shell(f"cd {tmp_path} && $DH2SIM {command} {closed}")
         assert run.status == expected
         assert "Traceback" not in run.err
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 def test_results_that_cannot_be_written_are_an_error() -> None:
-    run = _shell("$DH2SIM list >/dev/full")
+    run = shell("$DH2SIM list >/dev/full")
     assert run == Outcome(status=2, out="", err="dh2sim: No space left on device\n")
 
 

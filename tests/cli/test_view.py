@@ -25,16 +25,11 @@ from dh2sim.robot.read import load_robot
 from dh2sim.view.initial_state import folder_of, open_state
 from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.server import is_local_only
-from tests.program import dh2sim, dh2sim_process, environment
+from tests.program import STARTED, dh2sim, dh2sim_process, environment
 
 ADDRESS = "127.0.0.1"
 TIMEOUT = 60.0
 """s."""
-STARTED = """
-print("started", flush=True)
-from dh2sim.cli.main import main
-main()
-"""
 
 SIGNAL_LOST = """
 import signal, sys

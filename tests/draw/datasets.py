@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import xarray as xr
 
+from dh2sim.draw.rollout_data import RolloutData, select_rollout
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.model.build import build_model
@@ -133,3 +134,8 @@ def stopped(run: xr.Dataset, rollout: int, record: int) -> xr.Dataset:
     run["status"][rollout] = STATUS["bad_qacc"]
     run["stop_step"][rollout] = record * EVERY + 1
     return run
+
+
+def rollout(run: xr.Dataset | None = None, number: int = 0) -> RolloutData:
+    """One rollout of a run, by default the first one of ``swinging()``."""
+    return select_rollout(swinging() if run is None else run, number, "run.zarr")

@@ -5,20 +5,14 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-import xarray as xr
 
 from dh2sim.draw.motion import MOST_POSES, Motion, motion_of_robot, motion_of_run
-from dh2sim.draw.rollout_data import RolloutData, select_rollout
 from dh2sim.errors import PictureError
 from dh2sim.model.build import build_model
 from dh2sim.robot.read import load_robot
 from dh2sim.typing import read_only
-from tests.draw.datasets import STEPS, arm, stopped, swinging
+from tests.draw.datasets import STEPS, arm, rollout, stopped, swinging
 from tests.model.test_meshes import built, text, wedge, write
-
-
-def rollout(run: xr.Dataset, number: int = 0) -> RolloutData:
-    return select_rollout(run, number, "run.zarr")
 
 
 def clock(*time: float) -> Motion:

@@ -25,19 +25,14 @@ from dh2sim.draw.plots import (
     saturated,
     write_plot,
 )
-from dh2sim.draw.rollout_data import RolloutData, select_rollout
 from dh2sim.errors import OutputError, PictureError
-from tests.draw.datasets import stopped, swinging
+from tests.draw.datasets import rollout, stopped, swinging
 
 
 @pytest.fixture(autouse=True)
 def _settings() -> Iterator[None]:
     with plot_style():
         yield
-
-
-def rollout(run: xr.Dataset | None = None, number: int = 0) -> RolloutData:
-    return select_rollout(swinging() if run is None else run, number, "run.zarr")
 
 
 def shown(figure: Figure) -> list[Any]:

@@ -13,7 +13,7 @@ from dh2sim import load_robot
 from dh2sim.cli.common import INTERRUPTED
 from dh2sim.robot.catalog import builtin_robots
 from tests.export.robots import small, write
-from tests.program import contents, dh2sim, environment
+from tests.program import STARTED, contents, dh2sim, environment
 
 FOREVER = """
 import sys
@@ -37,11 +37,6 @@ finally:
 """
 """Export versions of a robot in turn, for ever."""
 
-STARTED = """
-print("started", flush=True)
-from dh2sim.cli.main import main
-main()
-"""
 
 KILLS = 8
 

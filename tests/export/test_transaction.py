@@ -2,14 +2,12 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from tests.export.robots import small, write
-from tests.program import Outcome, contents, dh2sim, environment
+from tests.program import Outcome, contents, dh2sim, shell
 
 
 def test_a_file_where_a_folder_is_needed_is_reported(tmp_path: Path) -> None:
@@ -52,30 +50,18 @@ def test_a_folder_at_a_files_name_is_reported_and_old_files_stay(tmp_path: Path)
     assert contents(out) == before
 
 
-def _shell(script: str, **variables: str) -> Outcome:
-    done = subprocess.run(
-        ["sh", "-c", script],
-        env=environment(PYTHON=sys.executable, **variables),
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
-
-
 def test_a_disk_that_takes_no_more_leaves_old_files_untouched(tmp_path: Path) -> None:
     robot, out = write(tmp_path, small()), tmp_path / "made"
     dh2sim("export", robot, "--out", out)
     before = contents(out)
     write(tmp_path, small(length=0.5))
     script = 'ulimit -f 4 && exec "$PYTHON" -m dh2sim export "$ROBOT" --out "$OUT"'  # files of 2 or 4 KiB at most
-    run = _shell(script, ROBOT=str(robot), OUT=str(out))
+    run = shell(script, ROBOT=str(robot), OUT=str(out))
     assert run == Outcome(
         status=2, out="", err=f"dh2sim: cannot write to '{out}': File too large; nothing was changed\n"
     )
     assert contents(out) == before
-    run = _shell(script, ROBOT=str(robot), OUT=str(tmp_path / "fresh" / "deep"))
+    run = shell(script, ROBOT=str(robot), OUT=str(tmp_path / "fresh" / "deep"))
     assert run.status == 2
     assert not (tmp_path / "fresh").exists()
 
@@ -85,7 +71,7 @@ def own_mounts(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The command that runs another with mounts of its own; skips where that is not allowed."""
     command = "unshare -m" if os.geteuid() == 0 else "unshare -rm"
     probe = f"""{command} sh -c 'mount -t tmpfs -o size=16k none "$OUT"'"""
-    if shutil.which("unshare") is None or _shell(probe, OUT=str(tmp_path_factory.mktemp("probe"))).status != 0:
+    if shutil.which("unshare") is None or shell(probe, OUT=str(tmp_path_factory.mktemp("probe"))).status != 0:
         pytest.skip("needs the right to mount a small file system (unshare and mount)")
     return command
 
@@ -105,7 +91,7 @@ def test_a_full_file_system_leaves_old_files_untouched(tmp_path: Path, own_mount
         cp -r "$OUT" "$AFTER"
         exit $status'"""
     before, after = tmp_path / "before", tmp_path / "after"
-    run = _shell(script, OUT=str(out), FIRST=str(first), SECOND=str(second), BEFORE=str(before), AFTER=str(after))
+    run = shell(script, OUT=str(out), FIRST=str(first), SECOND=str(second), BEFORE=str(before), AFTER=str(after))
     assert run == Outcome(
         status=2, out="", err=f"dh2sim: cannot write to '{out}': No space left on device; nothing was changed\n"
     )
@@ -119,6 +105,6 @@ def test_a_file_system_that_is_only_read_is_reported(tmp_path: Path, own_mounts:
     script = f"""{own_mounts} sh -c '
         mount -t tmpfs -o ro none "$OUT" || exit 99
         exec "$PYTHON" -m dh2sim export "$ROBOT" --out "$OUT"'"""
-    assert _shell(script, OUT=str(out), ROBOT=str(write(tmp_path, small()))) == Outcome(
+    assert shell(script, OUT=str(out), ROBOT=str(write(tmp_path, small()))) == Outcome(
         status=2, out="", err=f"dh2sim: cannot write to '{out}': Read-only file system; nothing was changed\n"
     )

@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 
-from dh2sim.draw.rollout_data import RolloutData, select_rollout
 from dh2sim.errors import ConfigurationError, OutputError, PictureError
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
@@ -30,16 +28,12 @@ from dh2sim.view.page_export import (
 )
 from dh2sim.view.scene.items import Arrow, Label, Placed, Scene, Solid, Triad
 from dh2sim.view.scene.items import Polyline as Line
-from tests.draw.datasets import stopped, swinging
+from tests.draw.datasets import rollout, stopped, swinging
 from tests.sample_robots import NAMES, robot
 from tests.view.test_solids import matrix
 
 RED = (1.0, 0.0, 0.0)
 UNIT = BoundingSphere(centre=(0.0, 0.0, 0.0), radius=1.0)
-
-
-def rollout(run: xr.Dataset, number: int = 0) -> RolloutData:
-    return select_rollout(run, number, "run.zarr")
 
 
 def world_pose(scene: Scene, name: str) -> Array:

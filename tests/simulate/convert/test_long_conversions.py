@@ -11,16 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.program import environment
+from tests.program import STARTED, environment
 from tests.simulate.convert.samples import make_arrays, make_layout, write_run
 
 NAMES = {"parquet": "out.parquet", "hdf5": "out.h5"}
 
-STARTED = """
-print("started", flush=True)
-from dh2sim.cli.main import main
-main()
-"""
 PEAK = """
 import sys
 from pathlib import Path
