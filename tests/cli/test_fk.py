@@ -10,8 +10,8 @@ import pytest
 
 from dh2sim import build_chain, forward_kinematics, frame_poses, load_robot
 from dh2sim.kinematics.forward import frame_names, frame_pose
-from tests.export.robots import ODD, write
 from tests.program import Outcome, dh2sim
+from tests.robot_files import ODD, write
 
 STANFORD = load_robot("stanford")
 CHAIN = build_chain(STANFORD)

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from tests.export.robots import RICH, small, write
 from tests.program import dh2sim
+from tests.robot_files import RICH, small, write
 
 OPTIONS = [
     "--out",

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from dh2sim import build_chain, build_model, forward_kinematics, frame_poses, load_robot
-from tests.export.robots import ODD, RICH, write
 from tests.program import dh2sim
+from tests.robot_files import ODD, RICH, write
 from tests.sample_robots import NAMES
 
 FLIPPED = """\

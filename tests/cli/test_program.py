@@ -15,8 +15,8 @@ import jsonschema
 import pytest
 
 from dh2sim.robot.catalog import builtin_robots
-from tests.export.robots import small, write
 from tests.program import Outcome, dh2sim, dh2sim_process, environment, shell
+from tests.robot_files import small, write
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = (

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from dh2sim.robot.catalog import builtin_robots
-from tests.export.robots import small, write
 from tests.program import Outcome, dh2sim
+from tests.robot_files import small, write
 
 COMMANDS = ("export", "validate", "fk", "info")
 KNOWN = f"Robots that come with dh2sim: {', '.join(builtin_robots())}"

@@ -17,8 +17,8 @@ import xarray as xr
 
 from dh2sim.cli.output import size_text
 from dh2sim.simulate import open_dataset, rollout
-from tests.export.robots import RICH, small, snake, write
 from tests.program import Outcome, contents, dh2sim, dh2sim_process, environment
+from tests.robot_files import RICH, small, snake, write
 
 KNOWN = "qpos, qvel, ctrl, tool_pose, reference, qacc, torque, energy, contacts"
 QUICK = ("--rollouts", "3", "--steps", "10")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.export.robots import small, write
 from tests.program import Outcome, dh2sim, dh2sim_process
+from tests.robot_files import small, write
 from tests.validate.motion.robots import FOLDED, WEAK
 
 QUANTITIES = ["energy order", "momentum", "rest", "tracking", "inverse dynamics", "self-contact"]

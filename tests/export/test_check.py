@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.export.robots import small, write
 from tests.program import Outcome, contents, dh2sim
+from tests.robot_files import small, write
 
 ADVICE = "dh2sim: some files are not what the robot files say; write them with 'dh2sim export'\n"
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.export.robots import ODD, RICH, small, write
 from tests.program import contents, dh2sim, dh2sim_process
+from tests.robot_files import ODD, RICH, small, write
 
 ALL_FILES = ["odd.urdf", "odd.xml", "scene.xml"]
 

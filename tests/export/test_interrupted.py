@@ -12,8 +12,8 @@ import pytest
 from dh2sim import load_robot
 from dh2sim.cli.common import INTERRUPTED
 from dh2sim.robot.catalog import builtin_robots
-from tests.export.robots import small, write
 from tests.program import STARTED, contents, dh2sim, environment
+from tests.robot_files import small, write
 
 FOREVER = """
 import sys

@@ -9,8 +9,8 @@ import trimesh
 from dh2sim import build_model, parse_robot
 from dh2sim.export import ALL_FORMATS, Format, Loss, Lost, losses
 from dh2sim.model.robot_model import RobotModel
-from tests.export.robots import ODD, RICH, small, write
 from tests.program import contents, dh2sim
+from tests.robot_files import ODD, RICH, small, write
 
 PAIRS = "URDF: 2 pairs of links that do not collide ('dh2sim info --srdf' lists them)"
 

@@ -8,8 +8,8 @@ from dh2sim import build_model, parse_robot
 from dh2sim.errors import MismatchError
 from dh2sim.export import export_robot
 from tests.export.broken import shifted_chain
-from tests.export.robots import small, snake, write
 from tests.program import Outcome, contents, dh2sim
+from tests.robot_files import small, snake, write
 
 MISMATCH = (
     "small: the URDF differs from the table by 1e-06 m and {rotation} rad (allowed: 1e-12 m and 1e-12 rad); nothing "

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.export.robots import small, write
 from tests.program import Outcome, contents, dh2sim, shell
+from tests.robot_files import small, write
 
 
 def test_a_file_where_a_folder_is_needed_is_reported(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import Convention, RobotSpec
 from dh2sim.typing import Array
-from tests.export.robots import ODD, RICH
+from tests.robot_files import ODD, RICH
 from tests.strategies import robot_specs
 
 FORMATS: dict[str, Callable[[RobotModel], str]] = {".urdf": to_urdf, ".xml": to_mjcf}

@@ -90,9 +90,7 @@ def test_a_damaged_status_is_an_error(tmp_path: Path) -> None:
     chunk.write_bytes(b"\0" + chunk.read_bytes()[1:])
     with pytest.raises(RunDamagedError) as caught:
         describe(path)
-    assert str(caught.value) == (
-        f"'{path}' is damaged; resume it with the same options to compute the damaged blocks again"
-    )
+    assert str(caught.value).startswith(f"'{path}' is damaged; resume it")
 
 
 def test_what_is_no_run_is_not_described(tmp_path: Path) -> None:

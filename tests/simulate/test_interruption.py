@@ -24,8 +24,8 @@ from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.run import fill
 from dh2sim.simulate.store.reader import open_dataset
 from dh2sim.simulate.store.writer import RunWriter
-from tests.export.robots import small
 from tests.program import Outcome, contents, dh2sim, dh2sim_process, environment
+from tests.robot_files import small
 
 ROLLOUTS, STEPS, BLOCK = 60, 200, 3
 CONTROLLER = "pd"

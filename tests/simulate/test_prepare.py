@@ -25,8 +25,8 @@ from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.block import Job
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.prepare import prepare
-from tests.export.robots import write
 from tests.refusals import refusal
+from tests.robot_files import write
 from tests.sample_robots import ODD_ROBOT, model
 from tests.simulate import robots
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.export.robots import ODD, write
 from tests.program import dh2sim
+from tests.robot_files import ODD, write
 
 
 @pytest.fixture(scope="session")

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.export.robots import small, write
 from tests.program import Outcome, environment
+from tests.robot_files import small, write
 
 WITHOUT = """
 import sys

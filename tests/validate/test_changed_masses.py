@@ -11,8 +11,8 @@ from dh2sim import build_model, load_robot
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.validate.dynamics import check_dynamics
 from dh2sim.validate.report import Quantity
-from tests.export.robots import write
 from tests.program import dh2sim
+from tests.robot_files import write
 from tests.validate.files import Change, change, failures, named, numbers, part, validated
 
 MASSLESS = """\

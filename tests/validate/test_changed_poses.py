@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.export.robots import ODD, write
 from tests.program import dh2sim
+from tests.robot_files import ODD, write
 from tests.validate.files import (
     FILE_ENGINES,
     Change,

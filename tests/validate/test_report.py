@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from dh2sim.validate.report import Check, Quantity, RobotReport, ValidationReport, Worst, failure_text, to_junit
-from tests.export.robots import ODD, small, write
 from tests.program import dh2sim
+from tests.robot_files import ODD, small, write
 from tests.validate.files import change, numbers, part, validated
 
 POSE = {"engine", "quantity", "frames", "max_position_error", "max_rotation_error", "tolerance", "ok"}

@@ -14,7 +14,7 @@ from dh2sim import build_model, parse_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.validate.run import validate_robot
 from tests.export.broken import SHIFT, shifted_chain
-from tests.export.robots import ODD, RICH, small, write
+from tests.robot_files import ODD, RICH, small, write
 from tests.sample_robots import NAMES, ROBOTS_DIR
 from tests.strategies import robot_specs
 from tests.validate.files import failures, validated

@@ -104,8 +104,7 @@ def test_a_damaged_run_is_an_error_and_leaves_nothing(tmp_path: Path, kind: str,
     with pytest.raises(RunDamagedError) as caught:
         CONVERTERS[kind](run, tmp_path / "new" / NAMES[kind])
     if file in ("qvel/c.1.0.0", "status/c.2"):
-        reported = f"'{run}' is damaged; resume it with the same options to compute the damaged blocks again"
-        assert str(caught.value) == reported
+        assert str(caught.value).startswith(f"'{run}' is damaged; resume it")
     else:
         assert f"'{run / file}' is missing or damaged" in str(caught.value)
     assert [path.name for path in tmp_path.iterdir()] == ["run.zarr"]

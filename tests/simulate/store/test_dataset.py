@@ -132,9 +132,7 @@ def test_chunks_that_are_missing_are_not_read_as_blanks(tmp_path: Path, missing:
     (path / missing).unlink()
     with pytest.raises(RunDamagedError) as caught:
         open_dataset(path)
-    assert str(caught.value) == (
-        f"'{path}' is damaged; resume it with the same options to compute the damaged blocks again"
-    )
+    assert str(caught.value).startswith(f"'{path}' is damaged; resume it")
 
 
 @pytest.mark.parametrize("damage", [Path.unlink, lambda file: file.write_bytes(file.read_bytes()[:-1])])

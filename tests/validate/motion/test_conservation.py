@@ -16,7 +16,7 @@ from dh2sim.typing import Array
 from dh2sim.validate.motion.conservation import check_energy, check_momentum
 from dh2sim.validate.motion.free_motion import RECORDS, State, free_model, random_states
 from dh2sim.validate.report import Check
-from tests.export.robots import ODD
+from tests.robot_files import ODD
 from tests.sample_robots import NAMES
 from tests.validate.motion.robots import FRICTION, LIFT, PENDULUM, TURNTABLE, built, heavier
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 from dh2sim.simulate.run import rollout
 from dh2sim.validate.motion.tracking import check_inverse, recorded_rollouts
-from tests.export.robots import ODD, RICH
+from tests.robot_files import ODD, RICH
 from tests.sample_robots import NAMES
 from tests.validate.motion.robots import FRICTION, built
 

@@ -13,7 +13,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_base_mass, without_meshes
 from dh2sim.typing import Array
 from dh2sim.validate.motion.mechanics import BaseMotion, bodies, energy
-from tests.export.robots import ODD, RICH
+from tests.robot_files import ODD, RICH
 from tests.validate.motion.robots import PENDULUM, built
 
 MODELS = pytest.mark.parametrize("robot", ["stanford", "ssrms", "cylindrical", ODD, RICH], ids=lambda text: text[:12])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dh2sim.validate.motion.tracking import check_rest, resting_rollouts
-from tests.export.robots import ODD
+from tests.robot_files import ODD
 from tests.sample_robots import NAMES
 from tests.validate.motion.robots import FRICTION, WEAK, built
 

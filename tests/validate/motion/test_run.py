@@ -15,7 +15,7 @@ from dh2sim.robot.spec import Convention, JointType, Limits, RobotSpec, Row
 from dh2sim.validate.motion import run as physics
 from dh2sim.validate.motion.free_motion import compile_model
 from dh2sim.validate.motion.run import check_motion
-from tests.export.robots import snake
+from tests.robot_files import snake
 from tests.strategies import robot_specs
 from tests.validate.motion.robots import LIFT, built, heavier
 

@@ -13,7 +13,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.validate.motion.free_motion import compile_model
 from dh2sim.validate.motion.self_contact import by_construction, check_self_contact, random_tour
 from dh2sim.validate.report import Check
-from tests.export.robots import ODD, snake
+from tests.robot_files import ODD, snake
 from tests.sample_robots import NAMES
 from tests.validate.motion.robots import FOLDED, built
 

@@ -7,7 +7,7 @@ import pytest
 
 from dh2sim.simulate.run import rollout
 from dh2sim.validate.motion.tracking import check_tracking, tracking_rollouts
-from tests.export.robots import ODD
+from tests.robot_files import ODD
 from tests.sample_robots import NAMES
 from tests.validate.motion.robots import FRICTION, WEAK, built
 

@@ -1,4 +1,4 @@
-"""Robot files that the tests of exports write."""
+"""Robot files that tests of several packages write."""
 
 from __future__ import annotations
 
