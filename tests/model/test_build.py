@@ -4,7 +4,6 @@ import dataclasses
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from dh2sim.model.actuators import ASSUMED_BANDWIDTH, ActuatorModel, seen_inerti
 from dh2sim.model.build import BASE_COLOR, JOINT_COLOR, PALETTE, build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, BaseSpec, Dynamics, JointType, LinkSpec, RobotSpec, Row
+from tests.arrays import arrays_in
 from tests.sample_robots import NAMES, ODD_ROBOT, REVOLUTE, STANDARD, model
 
 ROOT = Path(__file__).parents[2]
@@ -45,23 +45,9 @@ def test_another_process_makes_the_same_model(seed: str) -> None:
     assert done.stdout.decode() == "".join(texts(model("odd")))
 
 
-def arrays(value: object) -> Iterator[np.ndarray]:
-    if isinstance(value, np.ndarray):
-        yield value
-    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
-        for field in dataclasses.fields(value):
-            yield from arrays(getattr(value, field.name))
-    elif isinstance(value, Mapping):
-        for item in value.values():
-            yield from arrays(item)
-    elif isinstance(value, tuple):
-        for item in value:
-            yield from arrays(item)
-
-
 def test_nothing_of_a_model_can_be_changed() -> None:
     built = model("odd")
-    found = list(arrays(built))
+    found = list(arrays_in(built))
     assert len(found) > 50
     assert not any(array.flags.writeable for array in found)
     with pytest.raises(dataclasses.FrozenInstanceError):

@@ -5,10 +5,8 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.robot.spec import ActuatorType, Convention, JointType, RobotSpec
-from dh2sim.typing import Array
+from tests.arrays import arrays_in
 from tests.robot.files import FULL, MINIMAL, robot, with_joint
 
 
@@ -148,25 +146,9 @@ def test_mesh_paths_start_in_the_current_folder_where_there_is_no_file(
     assert mesh.file == tmp_path / "b.stl"
 
 
-def _arrays(value: Any) -> list[Array]:
-    """Return every array in a spec, in the order of its fields."""
-    match value:
-        case np.ndarray():
-            return [value]
-        case Mapping():
-            parts = list(value.values())
-        case tuple():
-            parts = list(value)
-        case _ if dataclasses.is_dataclass(value):
-            parts = [getattr(value, field.name) for field in dataclasses.fields(value)]
-        case _:
-            parts = []
-    return [array for part in parts for array in _arrays(part)]
-
-
 def test_nothing_in_a_spec_can_be_written_to() -> None:
     spec = robot(FULL)
-    arrays = _arrays(spec)
+    arrays = list(arrays_in(spec))
     assert len(arrays) == 8
     assert not any(array.flags.writeable for array in arrays)
     assert isinstance(spec.parameters, MappingProxyType)
@@ -176,7 +158,7 @@ def test_nothing_in_a_spec_can_be_written_to() -> None:
 
 
 def _same(one: RobotSpec, other: RobotSpec) -> None:
-    for left, right in zip(_arrays(one), _arrays(other), strict=True):
+    for left, right in zip(arrays_in(one), arrays_in(other), strict=True):
         np.testing.assert_allclose(left, right, rtol=1e-14, atol=0)
     for a, b in zip(one.rows, other.rows, strict=True):
         assert (a.type, a.flip) == (b.type, b.flip)
