@@ -11,7 +11,7 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 Row = tuple[str, str, str, bool | None]
@@ -32,10 +32,10 @@ class Usage:
     """Of a process: its exit status."""
 
 
-def run_process(command: Sequence[str]) -> Usage:
+def run_process(command: Sequence[str], environment: Mapping[str, str] | None = None) -> Usage:
     """Run a command line whose output is of no interest."""
     started = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     return Usage(
@@ -46,13 +46,13 @@ def run_process(command: Sequence[str]) -> Usage:
     )
 
 
-def run_python(*arguments: str) -> Usage:
+def run_python(*arguments: str, environment: Mapping[str, str] | None = None) -> Usage:
     """Run Python in a process.
 
     Raises:
         RuntimeError: it fails.
     """
-    usage = run_process([sys.executable, *arguments])
+    usage = run_process([sys.executable, *arguments], environment)
     if usage.status:
         raise RuntimeError(f"python {' '.join(arguments)} ended with exit status {usage.status}")
     return usage
