@@ -19,6 +19,14 @@ from dh2sim.errors import Dh2simError, ImportedFileError, MissingExtraError
 if TYPE_CHECKING:
     from dh2sim.importing.result import Imported
 
+ToleranceOption = Annotated[
+    float, typer.Option(metavar="T", help="Largest residual, rad and m; numbers are rounded as far as it allows.")
+]
+OutOption = Annotated[
+    Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="File to write. [default: print it]")
+]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but the robot file and errors.")]
+
 
 def import_robot(
     file: Annotated[
@@ -43,21 +51,15 @@ def import_robot(
     ] = None,
     angle: Annotated[str | None, typer.Option(metavar="deg|rad", help="Unit of a table's angles.")] = None,
     length: Annotated[str | None, typer.Option(metavar="m|mm|cm|in", help="Unit of a table's lengths.")] = None,
-    tolerance: Annotated[
-        float, typer.Option(metavar="T", help="Largest residual, rad and m; numbers are rounded as far as it allows.")
-    ] = 1e-9,
+    tolerance: ToleranceOption = 1e-9,
     package_path: Annotated[
         list[Path] | None,
         typer.Option(metavar="FOLDER", help="Folder to find package:// in; may be repeated."),
     ] = None,
     name: Annotated[str | None, typer.Option(metavar="NAME", help="Name of the robot. [default: the file's]")] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="File to write. [default: print it]")
-    ] = None,
+    out: OutOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but the robot file and errors.")
-    ] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Make a robot file from a URDF, an MJCF, or a table.
 
@@ -156,16 +158,10 @@ def frames(
             help="Picture of the frames: .svg, .png or .pdf. [default with --explain: NAME-frames.svg]",
         ),
     ] = None,
-    tolerance: Annotated[
-        float, typer.Option(metavar="T", help="Largest residual, rad and m; numbers are rounded as far as it allows.")
-    ] = 1e-9,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="File to write. [default: print it]")
-    ] = None,
+    tolerance: ToleranceOption = 1e-9,
+    out: OutOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but the robot file and errors.")
-    ] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Assign DH frames to joint axes, step by step as in a textbook.
 
@@ -224,13 +220,9 @@ def _require_frame_figure(path: Path) -> None:
 def convert(
     robot: RobotArgument,
     to: Annotated[str, typer.Option(metavar="standard|modified", help="Convention to convert to.")],
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="File to write. [default: print it]")
-    ] = None,
+    out: OutOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but the robot file and errors.")
-    ] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Write a robot's table in the other convention.
 
