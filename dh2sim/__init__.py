@@ -31,6 +31,7 @@ _HOMES = {
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
     "convert_robot": "importing.convert",
+    "find_slips": "model.slips",
     "forward_kinematics": "kinematics.forward",
     "frame_poses": "kinematics.forward",
     "geometric_jacobian": "kinematics.forward",
@@ -67,6 +68,7 @@ if TYPE_CHECKING:
     from dh2sim.kinematics.serial_chain import SerialJoint as SerialJoint
     from dh2sim.model.build import build_model as build_model
     from dh2sim.model.robot_model import RobotModel as RobotModel
+    from dh2sim.model.slips import find_slips as find_slips
     from dh2sim.robot.read import load_robot as load_robot
     from dh2sim.robot.read import parse_robot as parse_robot
     from dh2sim.robot.spec import ActuatorSpec as ActuatorSpec

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from dh2sim.importing.sources import ImportOptions
     from dh2sim.kinematics.chain import KinematicChain
     from dh2sim.model.robot_model import RobotModel
+    from dh2sim.model.slips import Slip
     from dh2sim.simulate.options import RolloutKeywords
     from dh2sim.validate.report import RobotReport
     from dh2sim.view.server import Viewer
@@ -347,6 +348,12 @@ class Robot:
         """Lower and upper joint coordinates, rad and m, each of shape (n,); infinite for continuous joints."""
         ranges = [joint.position_range or (-np.inf, np.inf) for joint in self.model.moving_joints]
         return read_only([lower for lower, _ in ranges]), read_only([upper for _, upper in ranges])
+
+    def slips(self) -> tuple[Slip, ...]:
+        """Return numbers that are allowed but rarely meant, such as degrees in a file of radians."""
+        from dh2sim.model.slips import find_slips
+
+        return find_slips(self.model)
 
     def fk(self, q: ArrayLike, frame: str = "tool0") -> Array:
         """Return the pose of a frame in base_link.

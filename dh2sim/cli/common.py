@@ -8,6 +8,7 @@ import os
 import re
 import sys
 import traceback
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from dh2sim.robot.spec import RobotSpec
 
 DONE, FELL_SHORT, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+MOST_ALIKE = 3
+"""Notes of one kind that are printed of one file; reports in JSON list them all."""
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -68,6 +71,9 @@ RobotsArgument = Annotated[
         autocompletion=complete_robot,
     ),
 ]
+
+
+StrictOption = Annotated[bool, typer.Option("--strict", help="Treat notes, which point out likely slips, as errors.")]
 
 
 def choice(
@@ -242,8 +248,12 @@ def other_format(file: str) -> str | None:
     return "a Markdown table" if head.startswith(b"|") else None
 
 
-def build_all(robots: Sequence[str]) -> list[RobotModel]:
+def build_all(robots: Sequence[str], *, strict: bool | None = None) -> list[RobotModel]:
     """Read robot files and build their models, and report the errors of all of them at once.
+
+    Args:
+        robots: Files or names.
+        strict: What becomes of likely slips: errors, notes on standard error, or nothing if this is None.
 
     Raises:
         Dh2simError: A file is wrong, two robots have the same name, or a mesh cannot be used.
@@ -259,7 +269,33 @@ def build_all(robots: Sequence[str]) -> list[RobotModel]:
                 "its own name"
             )
         first[spec.name] = robot
-    return _all(build_model, specs)
+    models = _all(build_model, specs)
+    if strict is not None:
+        report_slips(models, strict=strict)
+    return models
+
+
+def report_slips(models: Sequence[RobotModel], *, strict: bool) -> None:
+    """Print what looks like a slip in robots on standard error.
+
+    Raises:
+        RobotFileError: There is something, and ``strict`` makes it an error.
+    """
+    from dh2sim.model.slips import find_slips
+
+    slips = [slip for model in models for slip in find_slips(model)]
+    if strict and slips:
+        raise RobotFileError(slips)
+    alike = Counter((slip.file, slip.kind) for slip in slips)
+    printed: Counter[tuple[str, str]] = Counter()
+    for slip in slips:
+        which = (slip.file, slip.kind)
+        printed[which] += 1
+        if printed[which] <= MOST_ALIKE:
+            text = f"{slip.path}: {slip.message}" if slip.path else slip.message
+            print(f"{slip.file}:{slip.line}:{slip.column}: note: {text}", file=sys.stderr)
+        elif printed[which] == alike[which]:
+            print(f"{slip.file}: note: and {alike[which] - MOST_ALIKE} more like the last one", file=sys.stderr)
 
 
 def _all(make: Callable[[T], R], items: Sequence[T]) -> list[R]:

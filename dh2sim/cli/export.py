@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, RobotsArgument, build_all, complain
+from dh2sim.cli.common import DONE, FELL_SHORT, RobotsArgument, StrictOption, build_all, complain
 from dh2sim.errors import Dh2simError, OutputError
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ def export(
     no_dh_frames: Annotated[
         bool, typer.Option("--no-dh-frames", help="Leave the links dh_0 … dh_n out of the URDF.")
     ] = False,
+    strict: StrictOption = False,
 ) -> int:
     """Write a robot as URDF and MJCF, and verify them against its table.
 
@@ -53,7 +54,7 @@ def export(
       dh2sim export robots/*.yaml --check       # in CI: are the files up to date?
     """
     chosen = _formats(formats)
-    models = build_all(robots)
+    models = build_all(robots, strict=strict)
     if check:
         return _check(models, out, chosen, dh_frames=not no_dh_frames)
     from dh2sim.export import export_robot

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, build_all
+from dh2sim.cli.common import RobotArgument, StrictOption, build_all
 from dh2sim.cli.output import table_lines
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ def info(
     srdf: Annotated[
         bool, typer.Option("--srdf", help="Also print the pairs of links that do not collide, as in an SRDF.")
     ] = False,
+    strict: StrictOption = False,
 ) -> None:
     """Print a robot's table as in a textbook, its frames at home, mass and reach, and what is estimated.
 
@@ -35,8 +36,9 @@ def info(
       dh2sim info stanford
       dh2sim info my_arm.yaml --json
       dh2sim info my_arm.yaml --srdf
+      dh2sim info my_arm.yaml --strict          # fail where a number looks like a slip
     """
-    [model] = build_all([robot])
+    [model] = build_all([robot], strict=strict)
     if as_json:
         print(json.dumps(as_dict(model), indent=2))
     else:
@@ -46,6 +48,7 @@ def info(
 def as_dict(model: RobotModel) -> dict[str, Any]:
     """Return what ``info`` prints, and the pairs of links that do not collide, in SI units."""
     from dh2sim.kinematics.forward import forward_kinematics, frame_poses
+    from dh2sim.model.slips import find_slips
 
     spec, chain = model.spec, model.chain
     frames = {f"dh_{i}": T.tolist() for i, T in enumerate(frame_poses(chain, model.home))}
@@ -70,6 +73,7 @@ def as_dict(model: RobotModel) -> dict[str, Any]:
         "disabled_collisions": [
             {"link1": pair.link1, "link2": pair.link2, "reason": pair.reason.value} for pair in model.excluded
         ],
+        "notes": [slip.to_json() for slip in find_slips(model)],
     }
 
 

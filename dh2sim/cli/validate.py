@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import FELL_SHORT, RobotsArgument, build_all, complain, tolerance_of
+from dh2sim.cli.common import FELL_SHORT, RobotsArgument, StrictOption, build_all, complain, tolerance_of
 from dh2sim.cli.output import make_console, print_whole, progress_bar
 from dh2sim.errors import Dh2simError, OutputError
 from dh2sim.extras import require_extra
@@ -59,6 +59,7 @@ def validate(
         typer.Option("--json", metavar="FILE|-", help="Write the report as JSON; - prints it alone."),
     ] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the report as JUnit XML.")] = None,
+    strict: StrictOption = False,
 ) -> int:
     """Check every engine against the table: poses, Jacobians and dynamics.
 
@@ -76,7 +77,7 @@ def validate(
     tolerance_of(tolerance)
     if dynamics:
         require_extra("data", "xarray", what="--dynamics")
-    models = build_all(robots)
+    models = build_all(robots, strict=strict)
     if folder is not None:
         _require_folders(robots, models, folder)
     from dh2sim.validate.report import ValidationReport, to_junit

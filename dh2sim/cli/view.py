@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, load_all
+from dh2sim.cli.common import RobotArgument, StrictOption, load_all, report_slips
 from dh2sim.cli.output import require_free
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def view(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Let --export replace an existing file.")] = False,
     rollout: Annotated[int, typer.Option(metavar="N", help="Rollout of the run to export, counted from 0.")] = 0,
+    strict: StrictOption = False,
 ) -> None:
     """Show a robot in the browser: move its joints, edit its table, read its poses.
 
@@ -67,6 +68,7 @@ def view(
 
     [spec] = load_all([robot])
     state = open_state(spec, folder_of(robot))
+    report_slips([state.model], strict=strict)
     if export is None:
         _serve(state, run, host=host, port=port, browser=browser)
     else:

@@ -114,7 +114,8 @@ def check_configurations(
         for place, (value, index, joint) in enumerate(zip(values, moving, called, strict=True)):
             if value is not WRONG and (limits := _outside(value, rows[index])):
                 lower, upper = limits
-                scope.report((*loc, place), f"{value!r} is outside the limits of {joint}: {lower!r} to {upper!r}")
+                outside = f"{value!r} is outside the limits of {joint}: {lower!r} to {upper!r}"
+                scope.report((*loc, place), outside + _whole_turn_hint(value, rows[index], limits, scope))
 
 
 def _outside(value: float, row: Tree) -> tuple[float, float] | None:
@@ -128,6 +129,15 @@ def _outside(value: float, row: Tree) -> tuple[float, float] | None:
     if math.isnan(slack) or not (value < lower - slack or value > upper + slack):
         return None
     return lower, upper
+
+
+def _whole_turn_hint(value: float, row: Tree, limits: tuple[float, float], scope: Scope) -> str:
+    """Return which coordinate within the limits is the same angle, or the empty string."""
+    if row["type"] != "revolute":
+        return ""
+    turn = 360.0 if scope.angle == "deg" else 2 * math.pi
+    same = value - turn * round((value - (limits[0] + limits[1]) / 2) / turn)
+    return f"; {same:.12g} is the same angle" if limits[0] <= same <= limits[1] else ""
 
 
 def check_actuators(robot: Tree, rows: Sequence[Tree], key: str, scope: Scope) -> None:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from dh2sim.model.slips import Slip
+
 
 class Quantity(StrEnum):
     """Quantity that is compared."""
@@ -100,6 +102,8 @@ class RobotReport:
     reach: float
     """m."""
     checks: tuple[Check, ...]
+    slips: tuple[Slip, ...] = ()
+    """What looks like a slip in the robot; it fails nothing."""
 
     @property
     def ok(self) -> bool:
@@ -114,6 +118,7 @@ class RobotReport:
             "samples": self.samples,
             "reach": self.reach,
             "engines": [check.to_json() for check in self.checks],
+            "notes": [slip.to_json() for slip in self.slips],
         }
 
 

@@ -19,6 +19,7 @@ from dh2sim.files import signals_deferred
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.model.slips import find_slips
 from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
 from dh2sim.validate.dynamics import check_dynamics, check_inertias
@@ -114,6 +115,7 @@ def _validate(
         name=model.name,
         samples=samples,
         reach=model.reach,
+        slips=find_slips(model),
         checks=(
             *checks,
             *unread,
