@@ -36,7 +36,7 @@ def info(
       dh2sim info stanford
       dh2sim info my_arm.yaml --json
       dh2sim info my_arm.yaml --srdf
-      dh2sim info my_arm.yaml --strict          # fail where a number looks like a slip
+      dh2sim info my_arm.yaml --strict     # fail at likely slips
     """
     [model] = build_all([robot], strict=strict)
     if as_json:

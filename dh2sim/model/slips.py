@@ -55,8 +55,9 @@ class Slip(Problem):
 
     def to_json(self) -> dict[str, str | int]:
         """Return it as reports list it, without a place that it does not have."""
-        place = {"file": self.file, "line": self.line, "column": self.column} if self.file else {}
-        return {"rule": self.kind.value, "path": self.path, "message": self.message, **place}
+        place: dict[str, str | int] = {"file": self.file, "line": self.line, "column": self.column}
+        found: dict[str, str | int] = {"rule": self.kind.value, "path": self.path, "message": self.message}
+        return {**found, **place} if self.file else found
 
 
 def find_slips(robot: ModelLike) -> tuple[Slip, ...]:
