@@ -1,0 +1,59 @@
+"""Arms that people have, against their makers' own descriptions, which know nothing of a table."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from dh2sim import Robot, build_chain, forward_kinematics
+from dh2sim.typing import Array
+from tests.sample_robots import ROBOTS_DIR, robot
+
+from .makers import ARMS, Described
+from .samples import random_configurations
+
+pin: Any = pytest.importorskip(
+    "pinocchio", reason="the makers' descriptions are computed by pinocchio (pip install pin)"
+)
+
+WEIGHED = [name for name, arm in ARMS.items() if arm.weighed]
+
+
+@cache
+def _described(name: str) -> Described:
+    return Described(ARMS[name], pin)
+
+
+def _configurations(name: str) -> Array:
+    """Anywhere inside the limits, and at the named configurations."""
+    spec = robot(name)
+    return np.vstack([random_configurations(spec, seed=5, count=20), *spec.configurations.values()])
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_tool_is_where_the_maker_has_it(name: str) -> None:
+    q = _configurations(name)
+    expected = np.stack([_described(name).tool_pose(each) for each in q])
+    np.testing.assert_allclose(forward_kinematics(build_chain(robot(name)), q), expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", WEIGHED)
+def test_mass_matrix_and_gravity_torques_are_those_of_the_makers_inertials(name: str) -> None:
+    compiled = Robot.load(ROBOTS_DIR / f"{name}.yaml").mjmodel()
+    data, matrix = mujoco.MjData(compiled), np.zeros((compiled.nv, compiled.nv))
+    for q in _configurations(name):
+        data.qpos[:] = q
+        mujoco.mj_forward(compiled, data)
+        mujoco.mj_fullM(compiled, data, matrix)
+        expected = _described(name).mass_matrix(q)
+        np.testing.assert_allclose(matrix, expected, rtol=0, atol=1e-9 * np.max(expected))
+        np.testing.assert_allclose(data.qfrc_bias, _described(name).gravity_torques(q), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", WEIGHED)
+def test_no_mass_of_a_described_arm_is_estimated(name: str) -> None:
+    assert not Robot.load(ROBOTS_DIR / f"{name}.yaml").model.estimates
