@@ -172,6 +172,14 @@ class Show:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SetOpacity:
+    """Make the robot's shapes more or less translucent."""
+
+    opacity: float
+    """From 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ShowAngles:
     """Show angles in degrees or radians."""
 
@@ -243,6 +251,7 @@ Event: TypeAlias = (
     | Undo
     | SelectRow
     | Show
+    | SetOpacity
     | ShowAngles
     | ChooseFrame
     | MoveTool

@@ -57,7 +57,7 @@ def open_state(spec: RobotSpec, folder: Path | None = None) -> ViewState:
 def open_text(state: ViewState, event: OpenText) -> ViewState:
     """Return the state with the robot of another file at home; with a notice alone if the file is invalid.
 
-    Parts shown, the unit of angles and the ghost are kept; nothing else of the former robot is.
+    Parts shown, opacity, the unit of angles and the ghost are kept; nothing else of the former robot is.
     """
     source = Source(file=event.file, folder=event.folder)
     result = _read(event.text, source)
@@ -67,6 +67,7 @@ def open_text(state: ViewState, event: OpenText) -> ViewState:
     return replace(
         state_of(model, text, source),
         shown=state.shown,
+        opacity=state.opacity,
         angle=state.angle,
         ghost=misread_ghost(model) if state.ghost is not None and state.ghost.misread else state.ghost,
         notice=f"Opened {source.file}: {_summary(model)}.",

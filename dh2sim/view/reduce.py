@@ -118,6 +118,8 @@ def _reduced(state: ViewState, event: events.Event) -> ViewState:
         case events.Show(part=part, on=on):
             goal = None if part is Part.HANDLE else state.goal  # a new handle is at tool0
             return replace(state, shown=state.shown | {part} if on else state.shown - {part}, goal=goal)
+        case events.SetOpacity(opacity=opacity):
+            return replace(state, opacity=min(opacity, 1.0)) if opacity >= 0.0 else state
         case events.ShowAngles(unit=unit):
             return replace(state, angle=unit)
         case events.SelectRow(row=row):

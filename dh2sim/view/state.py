@@ -48,7 +48,7 @@ class Part(StrEnum):
     """That tool0 is dragged by."""
 
 
-INITIALLY: Final = frozenset({Part.SHAPES, Part.FRAMES, Part.FRAME_NAMES, Part.GRID, Part.GHOST, Part.SHADING})
+INITIALLY: Final = frozenset(Part) - {Part.TRACE}
 """Parts that a page shows at first."""
 
 
@@ -144,6 +144,8 @@ class ViewState:
     target: tuple[float, ...] | None = None
     """Targets of a simulation's actuators; None without a simulation."""
     shown: frozenset[Part] = INITIALLY
+    opacity: float = 0.45
+    """Of the robot's shapes, from 0 to 1, so that frames inside them are seen."""
     selected_row: int = 0
     """Row of the table that is edited and explained, from 0."""
     angle: AngleUnit = AngleUnit.DEG

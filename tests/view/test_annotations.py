@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +15,10 @@ from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Row
 from dh2sim.typing import Array
 from dh2sim.view.scene.annotations import COLORS, Quantity, row_annotations
-from dh2sim.view.scene.items import Arrow, Item, Label, Polyline, Scene
+from dh2sim.view.scene.items import Arrow, Item, Label, Polyline, Scene, Triad, Vector, vector
 from tests.sample_robots import HAYATI, MODIFIED, ODD_ROBOT, STANDARD, robot, row
 from tests.strategies import robots_with_joint_vectors
+from tests.view.test_solids import matrix
 
 SIZE = 0.2
 PRODUCTS = {
@@ -27,8 +30,26 @@ ACROSS = {"alpha": (2, 0), "beta": (2, 1), "theta": (0, 2)}
 """The axis that an arc starts from, and the one that it goes about."""
 
 
-def explained(spec: RobotSpec, number: int, q: object, **options: AngleUnit) -> Scene:
-    return row_annotations(spec, build_chain(spec), number, np.asarray(q), SIZE, **options)
+def explained(spec: RobotSpec, number: int, q: object, **options: Any) -> Scene:
+    """The drawing of a row, with all points in base_link."""
+    scene = row_annotations(spec, build_chain(spec), number, np.asarray(q), SIZE, **options)
+    return {name: in_base_link(item) for name, item in scene.items()}
+
+
+def in_base_link(item: Item) -> Item:
+    T = matrix(item)
+
+    def moved(point: Vector) -> Vector:
+        return vector(T[:3, :3] @ point + T[:3, 3])
+
+    at_base: dict[str, Any] = {"position": (0.0, 0.0, 0.0), "orientation": (1.0, 0.0, 0.0, 0.0)}
+    match item:
+        case Polyline():
+            return replace(item, points=tuple(map(moved, item.points)), **at_base)
+        case Arrow():
+            return replace(item, start=moved(item.start), end=moved(item.end), **at_base)
+        case _:
+            return item
 
 
 def label(scene: Scene, name: str) -> str:
@@ -244,7 +265,53 @@ def test_all_lies_below_row_and_everything_is_finite() -> None:
         for name, item in explained(spec, number, np.zeros(6)).items():
             assert name.startswith("/row/")
             assert np.isfinite(item.position).all()
-            assert item.orientation == (1.0, 0.0, 0.0, 0.0)
+            assert np.isfinite(item.orientation).all()
+
+
+def test_while_a_joint_moves_only_poses_and_labels_of_another_row_change() -> None:
+    spec = robot("puma560_standard")
+    chain, q = build_chain(spec), np.radians([10.0, 35.0, 20.0, 40.0, 50.0, 60.0])
+    for moved, number in ((0, 3), (5, 3), (3, 2)):
+        other = q.copy()
+        other[moved] += 0.5
+        before, after = (row_annotations(spec, chain, number, angles, SIZE) for angles in (q, other))
+        assert before.keys() == after.keys()
+        assert (before == after) is (moved > number)
+        for name, item in after.items():
+            old = before[name]
+            assert replace(item, position=old.position, orientation=old.orientation) == old, name
+
+
+@given(robots_with_joint_vectors(max_rows=4), st.data())
+def test_an_animated_row_leads_the_frame_along_the_product_step_by_step(
+    drawn: tuple[RobotSpec, Array], data: st.DataObject
+) -> None:
+    spec, vectors = drawn
+    q = vectors[0]
+    number = data.draw(st.integers(0, len(spec.rows) - 1))
+    product, frames = PRODUCTS[spec.rows[number].convention], table_frame_poses(spec, q)
+    done = data.draw(st.floats(0.0, float(len(product))))
+    scene = explained(spec, number, q, done=done)
+    begun = product[: math.ceil(done)]
+    labels = {name.removeprefix("/row/").removesuffix("_label") for name in scene if name.endswith("_label")}
+    assert labels == {*begun, "axis_before", "axis_after"}
+    frame = scene["/row/moving_frame"]
+    assert isinstance(frame, Triad)
+    scale = 1.0 + np.abs(frames).max()
+    np.testing.assert_allclose(matrix(frame), along(scene, begun, frames[number]), rtol=0, atol=1e-7 * scale)
+    for ends, T in ((0.0, frames[number]), (float(len(product)), frames[number + 1])):
+        at_end = explained(spec, number, q, done=ends)["/row/moving_frame"]
+        np.testing.assert_allclose(matrix(at_end), T, rtol=0, atol=1e-7 * scale)
+
+
+def test_half_of_a_step_is_half_of_its_number_and_its_label_shows_the_whole() -> None:
+    spec = robot("puma560_standard")
+    scene = explained(spec, 1, np.radians([10.0, 36.0, 20.0, 0.0, 0.0, 0.0]), done=0.5)
+    arc, origin = scene["/row/theta"], table_frame_poses(spec, np.radians([10.0, 36.0, 20.0, 0.0, 0.0, 0.0]))[1]
+    assert isinstance(arc, Polyline)
+    assert turned_by(np.array(arc.points), origin[:3, 3], origin[:3, 2]) == pytest.approx(math.radians(18.0))
+    assert label(scene, "theta") == "θ₂* = 36.0°"
+    assert "/row/a" not in scene
 
 
 @pytest.mark.parametrize("number", [-1, 6])

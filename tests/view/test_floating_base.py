@@ -17,23 +17,16 @@ from dh2sim.view.motion.motion_source import Recording, Simulation
 from dh2sim.view.motion.replay import open_replay
 from dh2sim.view.panel.pose import frame_title
 from dh2sim.view.scene.items import Polyline as Line
-from dh2sim.view.scene.items import Scene
 from dh2sim.view.scene.scene import IN_BASE_LINK, scene_of
 from dh2sim.view.state import IDENTITY, Matrix, Mode, Part, ViewState
 from tests.program import dh2sim
 from tests.view.states import STANFORD, after
-from tests.view.test_solids import matrix
+from tests.view.test_solids import pose_in_scene
 
 ELSEWHERE: Matrix = ((0.0, -1.0, 0.0, 0.5), (1.0, 0.0, 0.0, -2.0), (0.0, 0.0, 1.0, 3.0), (0.0, 0.0, 0.0, 1.0))
 """A pose of base_link: a quarter of a turn about z, and away."""
 FOLLOW = Follow(q=STANFORD.q, T_world_base_link=ELSEWHERE)
 EVERYTHING: tuple[Event, ...] = (CompareMisread(), *(Show(part=part, on=True) for part in Part))
-
-
-def in_world(scene: Scene, name: str) -> Array:
-    """The pose of an item, with those of all that carry it, shape (4, 4)."""
-    carrier, T = name.rpartition("/")[0], matrix(scene[name])
-    return T if carrier not in scene else np.asarray(in_world(scene, carrier) @ T)
 
 
 @pytest.fixture(scope="module")
@@ -69,12 +62,13 @@ def test_the_robot_its_frames_and_its_trace_are_where_mujoco_has_them(run: Path)
         scene = scene_of(state)
         for name in ("base_link", *(f"link_{i}" for i in range(1, 7))):
             body = data.body(name)
-            shown = in_world(scene, f"/robot/{name}")
+            shown = pose_in_scene(scene, f"/robot/{name}")
             assert np.allclose(shown[:3, 3], body.xpos, rtol=0, atol=1e-9), (time, name)
             assert np.allclose(shown[:3, :3], body.xmat.reshape(3, 3), rtol=0, atol=1e-9), (time, name)
-        for name in (*(f"dh_{i}" for i in range(7)), "tool0"):
+        carriers = ["base_link", *(f"link_{i}" for i in range(1, 7)), "link_6"]
+        for carrier, name in zip(carriers, [*(f"dh_{i}" for i in range(7)), "tool0"], strict=True):
             site = data.site(name)
-            shown = in_world(scene, f"/frames/{name}")
+            shown = pose_in_scene(scene, f"/robot/{carrier}/{name}")
             assert np.allclose(shown[:3, 3], site.xpos, rtol=0, atol=1e-9), (time, name)
             assert np.allclose(shown[:3, :3], site.xmat.reshape(3, 3), rtol=0, atol=1e-9), (time, name)
         tool.append(data.site("tool0").xpos.copy())
@@ -88,7 +82,7 @@ def test_the_robot_its_frames_and_its_trace_are_where_mujoco_has_them(run: Path)
 
 
 def state_tool(state: ViewState) -> Array:
-    return in_world(scene_of(state), "/frames/tool0")[:3, 3]
+    return pose_in_scene(scene_of(state), "/robot/link_6/tool0")[:3, 3]
 
 
 def test_everything_in_base_link_moves_with_it_and_the_ground_does_not() -> None:
@@ -102,7 +96,9 @@ def test_everything_in_base_link_moves_with_it_and_the_ground_does_not() -> None
         assert inside, root
         moved = np.eye(4) if root == "/grid" else np.array(ELSEWHERE)
         for name in inside:
-            assert np.allclose(in_world(there, name), moved @ in_world(here, name), rtol=0, atol=1e-12), name
+            assert np.allclose(pose_in_scene(there, name), moved @ pose_in_scene(here, name), rtol=0, atol=1e-12), (
+                name
+            )
     unchanged = [name for name in here if here[name] == there[name]]
     assert {*here} - {*unchanged} == {*IN_BASE_LINK}, "only what carries the rest is drawn again"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -114,18 +114,30 @@ def test_what_is_gone_is_removed_with_all_below_it(scene: viser.SceneApi) -> Non
     assert scene.get_handle_by_name("/d") is not None
 
 
-def test_frames_side_by_side_are_one_item_that_is_moved_as_a_whole(scene: viser.SceneApi) -> None:
+def test_what_can_change_is_changed_in_place_and_the_rest_is_added_again(scene: viser.SceneApi) -> None:
     painter = Painter(scene)
-    half = float(np.sqrt(0.5))
-    turned = Triad(length=0.1, position=(0.0, 0.0, 2.0), orientation=(half, 0.0, half, 0.0))
-    painter.draw({"/frames": Placed(), "/frames/a": Triad(length=0.1), "/frames/b": Triad(length=0.1)})
-    axes = scene.get_handle_by_name("/frames/axes_0")
-    assert painter.draw({"/frames": Placed(), "/frames/a": Triad(length=0.1), "/frames/b": turned}) == 1
-    assert scene.get_handle_by_name("/frames/axes_0") is axes
-    assert axes is not None
-    assert axes.batched_positions.tolist() == [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]  # type: ignore[attr-defined]
-    assert np.allclose(axes.batched_wxyzs, [(1.0, 0.0, 0.0, 0.0), turned.orientation])  # type: ignore[attr-defined]
-    assert painter.draw({"/frames": Placed(), "/frames/b": turned}) == 1
-    axes = scene.get_handle_by_name("/frames/axes_0")
-    assert axes is not None
-    assert axes.batched_positions.tolist() == [[0.0, 0.0, 2.0]]  # type: ignore[attr-defined]
+    line = Polyline(points=CORNERS, color=(0.0, 1.0, 0.0))
+    arrow = Arrow(start=CORNERS[0], end=CORNERS[1], color=(0.0, 0.0, 1.0), thickness=0.1)
+    old: dict[str, Item] = {"/a": triangle(), "/b": line, "/c": arrow, "/d": Label(text="x"), "/e": Triad(length=0.2)}
+    painter.draw(old)
+    handles = {name: scene.get_handle_by_name(name) for name in old}
+    changed: dict[str, Item] = {
+        "/a": replace(triangle(), opacity=0.5, scale=(1.0, 2.0, 3.0)),
+        "/b": replace(line, points=CORNERS[1:]),
+        "/c": replace(arrow, end=(0.0, 0.0, 0.1)),
+        "/d": Label(text="y"),
+        "/e": Triad(length=0.2, position=(0.0, 0.0, 1.0)),
+    }
+    assert painter.draw(changed) == 5
+    assert {name: scene.get_handle_by_name(name) for name in old} == handles
+    found: dict[str, Any] = handles
+    assert (found["/a"].opacity, found["/a"].scale) == (0.5, (1.0, 2.0, 3.0))
+    assert found["/b"].points.tolist() == [[list(CORNERS[1]), list(CORNERS[2])]]
+    assert found["/c"].points.tolist() == [[[0.0, 0.0, 0.0], [0.0, 0.0, pytest.approx(0.1)]]]
+    assert found["/c"].head_length == pytest.approx(0.06)
+    assert found["/d"].text == "y"
+    assert found["/e"].position.tolist() == [0.0, 0.0, 1.0]
+    other = {**changed, "/b": replace(line, width=7.0), "/e": Triad(length=0.3)}
+    assert painter.draw(other) == 2
+    replaced = {name for name in old if scene.get_handle_by_name(name) is not handles[name]}
+    assert replaced == {"/b", "/e"}

@@ -11,18 +11,23 @@ from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
-from dh2sim.view.events import CompareMisread, MoveJoint, SelectRow, SetJoints, Show
+from dh2sim.view.events import CompareMisread, MoveJoint, SelectRow, SetJoints, SetOpacity, Show
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.scene.items import Label, Lines, Polyline, Scene, Solid, Triad
 from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import Part, ViewState, within
 from tests.strategies import robots_with_joint_vectors
 from tests.view.states import STANFORD, after
-from tests.view.test_solids import matrix
+from tests.view.test_solids import matrix, pose_in_scene
 
 
 def below(scene: Scene, root: str) -> set[str]:
     return {name for name in scene if name.startswith(f"{root}/")}
+
+
+def frame_path(state: ViewState, number: int) -> str:
+    """The item of a DH frame: each link carries its own."""
+    return f"/robot/{state.model.all_links[number].name}/dh_{number}"
 
 
 @settings(max_examples=40)
@@ -36,15 +41,12 @@ def test_links_and_frames_are_where_the_table_has_them(robot: tuple[RobotSpec, A
     scale = max(1.0, state.model.reach)
     frames = table_frame_poses(state.spec, state.q)
     for i, T in enumerate(frames):
-        assert np.allclose(matrix(scene[f"/frames/dh_{i}"]), T, rtol=0, atol=1e-12 * scale)
-    assert np.allclose(
-        matrix(scene["/frames/tool0"]), table_tool_pose(state.spec, state.q), rtol=0, atol=1e-12 * scale
-    )
+        assert np.allclose(pose_in_scene(scene, frame_path(state, i)), T, rtol=0, atol=1e-12 * scale)
+    tool = f"/robot/link_{len(spec.rows)}/tool0"
+    expected = table_tool_pose(state.spec, state.q)
+    assert np.allclose(pose_in_scene(scene, tool), expected, rtol=0, atol=1e-12 * scale)
     for i, T in enumerate(joint_poses(state.model.chain, state.q), start=1):
         assert np.allclose(matrix(scene[f"/robot/link_{i}"]), T, rtol=0, atol=1e-12 * scale)
-        # link i carries DH frame i
-        carried = matrix(scene[f"/robot/link_{i}"]) @ state.model.chain.joints[i - 1].T_joint_dh
-        assert np.allclose(carried, frames[i], rtol=0, atol=1e-12 * scale)
 
 
 def test_a_move_changes_poses_and_no_solid() -> None:
@@ -52,7 +54,7 @@ def test_a_move_changes_poses_and_no_solid() -> None:
     assert before.keys() == moved.keys()
     changed = {name for name in before if before[name] != moved[name]}
     assert changed >= {f"/robot/link_{i}" for i in range(1, 7)}
-    assert not any(isinstance(before[name], Solid) for name in changed)
+    assert not any(isinstance(before[name], Solid | Triad) for name in changed), "they follow what carries them"
     assert "/robot/base_link" not in changed
 
 
@@ -60,7 +62,8 @@ def test_a_move_changes_poses_and_no_solid() -> None:
     ("part", "kind", "root"),
     [
         (Part.SHAPES, Solid, "/robot"),
-        (Part.FRAMES, Triad, "/frames"),
+        (Part.FRAMES, Triad, "/robot"),
+        (Part.ANNOTATIONS, Polyline, "/row"),
         (Part.FRAME_NAMES, Label, "/names"),
         (Part.GRID, Lines, "/grid"),
     ],
@@ -76,16 +79,37 @@ def test_what_is_hidden_is_not_in_the_scene(part: Part, kind: type, root: str) -
 
 def test_frames_with_one_origin_have_one_label_and_every_frame_is_named_once() -> None:
     scene = scene_of(STANFORD)
-    texts = [item.text for name, item in scene.items() if isinstance(item, Label)]
+    texts = [scene[name].text for name in sorted(below(scene, "/names"))]  # type: ignore[union-attr]
     assert texts == ["{0}", "{1}", "{2}", "{3} {4} {5}", "{6} tool0"]
 
 
-def test_the_row_that_is_chosen_is_explained_inside_a_robot_that_can_be_seen_through() -> None:
-    assert not below(scene_of(STANFORD), "/row")
-    explained = scene_of(after(STANFORD, SelectRow(row=1), Show(part=Part.ANNOTATIONS, on=True)))
+def test_the_first_page_shows_frames_and_an_explained_row_inside_a_robot_that_can_be_seen_through() -> None:
+    scene = scene_of(STANFORD)
+    assert {Part.FRAMES, Part.FRAME_NAMES, Part.ANNOTATIONS, Part.HANDLE} <= STANFORD.shown
+    assert sum(isinstance(item, Triad) for item in scene.values()) == 8
+    assert all(0.0 < item.opacity < 0.5 for item in scene.values() if isinstance(item, Solid))
+
+
+def test_the_row_that_is_chosen_is_explained() -> None:
+    explained = scene_of(after(STANFORD, SelectRow(row=1)))
     labels = {item.text for name in below(explained, "/row") if isinstance(item := explained[name], Label)}
     assert "α₂ = 90°" in labels
-    assert all(item.opacity < 0.5 for item in explained.values() if isinstance(item, Solid))
+    assert "α₁ = -90°" not in labels
+
+
+def test_opacity_is_a_factor_from_0_to_1_and_changes_nothing_but_the_robots_surfaces() -> None:
+    compared = after(STANFORD, CompareMisread())
+    scenes = {opacity: scene_of(after(compared, SetOpacity(opacity=opacity))) for opacity in (1.0, 0.25, 7.0)}
+    changed = {name for name, item in scenes[1.0].items() if item != scenes[0.25][name]}
+    assert changed == {name for name in below(scenes[1.0], "/robot") if isinstance(scenes[1.0][name], Solid)}
+    for name in changed:
+        opaque, faint = scenes[1.0][name], scenes[0.25][name]
+        assert isinstance(opaque, Solid)
+        assert isinstance(faint, Solid)
+        assert faint.opacity == 0.25 * opaque.opacity
+    assert scenes[7.0] == scenes[1.0]
+    for wrong in (-0.1, float("nan")):
+        assert after(compared, SetOpacity(opacity=wrong)) == compared
 
 
 def test_without_soft_shading_surfaces_are_plain_and_nothing_else_changes() -> None:
@@ -135,7 +159,4 @@ def test_the_grid_has_round_cells_whatever_the_robots_size() -> None:
 
 
 def test_the_row_that_is_edited_is_the_one_that_is_explained_from_the_beginning() -> None:
-    explained = scene_of(after(STANFORD, Show(part=Part.ANNOTATIONS, on=True)))
-    chosen = scene_of(after(STANFORD, SelectRow(row=0), Show(part=Part.ANNOTATIONS, on=True)))
-    assert any(name.startswith("/row/") for name in explained)
-    assert explained == chosen
+    assert scene_of(STANFORD) == scene_of(after(STANFORD, SelectRow(row=0)))

@@ -14,7 +14,7 @@ from dh2sim.model.build import build_model
 from dh2sim.model.meshes import MeshAsset
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.read import load_robot
-from dh2sim.view.scene.items import Item, Placed, Solid
+from dh2sim.view.scene.items import Item, Placed, Scene, Solid
 from dh2sim.view.scene.solids import (
     link_solids,
     mesh_triangles,
@@ -128,6 +128,12 @@ def matrix(item: Item) -> np.ndarray:
     T = trimesh.transformations.quaternion_matrix([w, x, y, z])
     T[:3, 3] = item.position
     return np.asarray(T)
+
+
+def pose_in_scene(scene: Scene, name: str) -> np.ndarray:
+    """The pose of an item, with those of all that carry it, shape (4, 4)."""
+    carrier, T = name.rpartition("/")[0], matrix(scene[name])
+    return T if carrier not in scene else np.asarray(pose_in_scene(scene, carrier) @ T)
 
 
 def test_a_pose_becomes_position_and_quaternion_and_back() -> None:

@@ -10,7 +10,7 @@ from dh2sim.errors import Dh2simError
 from dh2sim.export import Format
 from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.yaml_tree import MAX_BYTES
-from dh2sim.view.events import Compare, CompareMisread, Event, Show
+from dh2sim.view.events import Compare, CompareMisread, Event, SetOpacity, Show
 from dh2sim.view.initial_state import file_name
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Send, bind, on_click
@@ -110,6 +110,8 @@ class ShowTab:
             )
             for part, label in _PART_LABELS.items()
         }
+        opacity = gui.add_slider("Robot opacity", min=0.0, max=1.0, step=0.05, initial_value=state.opacity)
+        self._opacity = bind(opacity, send, lambda value: SetOpacity(opacity=value))
         self._always = (_NO_GHOST, _MISREAD, *builtin_robots())
         chooser = gui.add_dropdown("Ghost", self._ghosts(state), initial_value=_chosen(state))
         self._ghost = bind(chooser, send, partial(_compare, files.compare))
@@ -125,6 +127,7 @@ class ShowTab:
         """Show a state."""
         for part, box in self._boxes.items():
             box.show(part in state.shown)
+        self._opacity.show(state.opacity)
         if tuple(self._ghost.handle.options) != self._ghosts(state):
             self._ghost.handle.options = self._ghosts(state)
         self._ghost.show(_chosen(state))

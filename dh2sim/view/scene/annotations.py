@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,8 @@ from dh2sim.kinematics.forward import frame_poses
 from dh2sim.kinematics.transforms import compose, joint_part, link_part, second_twist
 from dh2sim.robot.spec import AngleUnit, Convention, RobotSpec
 from dh2sim.typing import Array, read_only
-from dh2sim.view.scene.items import Arrow, Color, Item, Label, Polyline, Scene, Vector, vector
+from dh2sim.view.scene.items import ORIGIN, Arrow, Color, Item, Label, Polyline, Scene, Triad, vector
+from dh2sim.view.scene.solids import orientation_of, position_of
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
@@ -99,6 +100,11 @@ class Step:
     def is_drawn(self) -> bool:
         """Whether it is more than zero."""
         return abs(self.value) > ZERO
+
+    def begun(self, share: float) -> Step:
+        """Return the step as far as a share of it, from 0 to 1, is done."""
+        value = share * self.value
+        return replace(self, value=value, T_after=compose(self.T_before, _transform(self.quantity, value)))
 
     def text(self, unit: AngleUnit) -> str:
         """Return symbol and value, such as ``a₂ = 0.4318 m``; a star marks the joint variable."""
@@ -195,24 +201,24 @@ def step_marks(step: Step, color: Color, size: float) -> dict[str, Item]:
         size: m.
 
     Returns:
-        An arrow or arc named after the quantity, an arc with its ``…_tip``, ``…_from`` and ``…_to``; in base_link.
+        An arrow or arc named after the quantity, an arc with its ``…_tip``, ``…_from`` and ``…_to``; each with the
+        pose of the frame before, so that only poses change while other joints move.
     """
-    name = step.quantity.value
+    name, axis = step.quantity.value, step.quantity.axis
     if not step.quantity.turns:
-        start, end = vector(step.T_before[:3, 3]), vector(step.T_after[:3, 3])
-        return {name: Arrow(start=start, end=end, color=color, thickness=_THICKNESS * size)}
+        end = vector(step.value * np.eye(3)[axis])
+        return {name: Arrow(start=ORIGIN, end=end, color=color, thickness=_THICKNESS * size, **_pose(step.T_before))}
     angle, radius = _drawn_angle(step.value), ARC_RADIUS * size
     count = max(2, math.ceil(abs(angle) / _ARC_STEP))
-    arc = [_on_arc(step, angle * k / count, radius) for k in range(count + 1)]
-    centre = vector(step.T_before[:3, 3])
-    legs = {
-        f"{name}_{end}": Polyline(points=(centre, vector(_on_arc(step, at, _LEG * size))), color=color, width=1.0)
-        for end, at in (("from", 0.0), ("to", angle))
+    lines = {
+        name: (3.0, [_on_circle(axis, angle * k / count, radius) for k in range(count + 1)]),
+        f"{name}_tip": (3.0, _tip(axis, angle, radius, size)),
+        f"{name}_from": (1.0, [np.zeros(3), _on_circle(axis, 0.0, _LEG * size)]),
+        f"{name}_to": (1.0, [np.zeros(3), _on_circle(axis, angle, _LEG * size)]),
     }
     return {
-        name: Polyline(points=tuple(map(vector, arc)), color=color, width=3.0),
-        f"{name}_tip": Polyline(points=_tip(step, angle, radius, size), color=color, width=3.0),
-        **legs,
+        line: Polyline(points=tuple(map(vector, points)), color=color, width=width, **_pose(step.T_before))
+        for line, (width, points) in lines.items()
     }
 
 
@@ -220,7 +226,8 @@ def label_place(step: Step, size: float) -> Array:
     """Return the best place for the label of a step, m in base_link, shape (3,)."""
     if step.quantity.turns:
         angle = _drawn_angle(step.value) if step.is_drawn else 0.0
-        return _on_arc(step, 0.5 * angle, (ARC_RADIUS + _BESIDE) * size)
+        beside = _on_circle(step.quantity.axis, 0.5 * angle, (ARC_RADIUS + _BESIDE) * size)
+        return np.asarray(step.T_before[:3, :3] @ beside + step.T_before[:3, 3])
     beside = step.T_before[:3, (step.quantity.axis + 1) % 3]
     middle = 0.5 * (step.T_before[:3, 3] + step.T_after[:3, 3])
     return np.asarray(middle + _BESIDE * size * beside)
@@ -231,27 +238,25 @@ def _drawn_angle(angle: float) -> float:
     return angle if abs(angle) <= turn else math.copysign(turn + math.fmod(abs(angle), turn), angle)
 
 
-def _on_arc(step: Step, angle: float, radius: float) -> Array:
-    """Return a point on a step's circle, shape (3,), at ``angle`` from the axis where the arc starts."""
-    axes = step.T_before[:3, :3]
-    match step.quantity.axis:
-        case 0:
-            first, second = axes[:, 2], -axes[:, 1]
-        case 1:
-            first, second = axes[:, 2], axes[:, 0]
-        case _:
-            first, second = axes[:, 0], axes[:, 1]
-    return np.asarray(step.T_before[:3, 3] + radius * (math.cos(angle) * first + math.sin(angle) * second))
+def _on_circle(axis: int, angle: float, radius: float) -> Array:
+    """Return a point on a step's circle in the frame before, shape (3,), at ``angle`` from where the arc starts."""
+    x, y, z = np.eye(3)
+    first, second = {0: (z, -y), 1: (z, x), 2: (x, y)}[axis]
+    return np.asarray(radius * (math.cos(angle) * first + math.sin(angle) * second))
 
 
-def _tip(step: Step, angle: float, radius: float, size: float) -> tuple[Vector, ...]:
+def _tip(axis: int, angle: float, radius: float, size: float) -> list[Array]:
     """Return the two strokes of an arrowhead at the end of an arc."""
-    end = _on_arc(step, angle, radius)
+    end = _on_circle(axis, angle, radius)
     length = min(_TIP * size, 0.5 * abs(angle) * radius)
-    outward = (end - step.T_before[:3, 3]) / radius
-    along = math.copysign(1.0, angle) * (_on_arc(step, angle + 0.5 * math.pi, 1.0) - step.T_before[:3, 3])
+    outward = end / radius
+    along = math.copysign(1.0, angle) * _on_circle(axis, angle + 0.5 * math.pi, 1.0)
     back, aside = -length * math.cos(_TIP_ANGLE) * along, length * math.sin(_TIP_ANGLE) * outward
-    return vector(end + back + aside), vector(end), vector(end + back - aside)
+    return [end + back + aside, end, end + back - aside]
+
+
+def _pose(T: Array) -> dict[str, Any]:
+    return {"position": position_of(T), "orientation": orientation_of(T)}
 
 
 COLORS: Final[Mapping[Quantity, Color]] = MappingProxyType(
@@ -270,6 +275,8 @@ _AXIS = 3.0
 """Length of axes beyond frames and offsets; like the next a share of the ``size`` argument."""
 _NORMAL = 0.6
 """Length of the common normal beyond the axes."""
+_MOVING = 1.25
+"""Length of the axes of the moving frame."""
 
 
 def row_annotations(
@@ -279,6 +286,7 @@ def row_annotations(
     q: ArrayLike,
     size: float,
     angle: AngleUnit = AngleUnit.DEG,
+    done: float | None = None,
 ) -> Scene:
     """Return a drawing that explains a row of the table at a configuration.
 
@@ -293,11 +301,13 @@ def row_annotations(
         q: Joint vector, rad and m, shape (n,).
         size: Length of the axes of frames, m; everything is drawn in proportion.
         angle: Unit of the angles in labels.
+        done: How many of the steps are done: 1.5 is the first one and half of the second. None for all of them.
 
     Returns:
         Items below ``/row/``, in base_link: ``axis_before`` and ``axis_after``, the z axes of frames i - 1 and i;
         ``normal``, the line of a, which is the common normal of those axes unless a Hayati row has a beta; for each
-        quantity its arrow, or its arc with ``_tip``, ``_from`` and ``_to``; and labels, ``…_label``.
+        quantity its arrow, or its arc with ``_tip``, ``_from`` and ``_to``; labels, ``…_label``; and, with ``done``,
+        ``moving_frame``, the frame that the steps done so far lead to. Steps that have not begun are not drawn.
 
     Raises:
         IndexError: There is no such row.
@@ -306,12 +316,19 @@ def row_annotations(
     steps = row_steps(spec, chain, row, q)
     axes, ends = _axes(steps, spec.rows[row].convention, size)
     items: dict[str, Item] = {**axes, "normal": _normal(steps, size)}
-    for step in steps:
-        color = COLORS[step.quantity]
-        if step.is_drawn:
-            items.update(step_marks(step, color, size))
-        position = vector(label_place(step, size))
+    T_moving = steps[0].T_before
+    for number, step in enumerate(steps):
+        share = 1.0 if done is None else min(done - number, 1.0)
+        if share <= 0.0:
+            break
+        color, drawn = COLORS[step.quantity], step if share == 1.0 else step.begun(share)
+        if drawn.is_drawn:
+            items.update(step_marks(drawn, color, size))
+        position = vector(label_place(drawn, size))
         items[f"{step.quantity.value}_label"] = Label(position=position, text=step.text(angle), color=color)
+        T_moving = drawn.T_after
+    if done is not None:
+        items["moving_frame"] = Triad(length=_MOVING * size, **_pose(T_moving))
     for name, number in (("axis_before", row), ("axis_after", row + 1)):
         items[f"{name}_label"] = Label(position=vector(ends[name]), text=f"z{subscript(number)}", color=AXIS_COLOR)
     return {f"/row/{name}": item for name, item in items.items()}
@@ -344,7 +361,6 @@ def _extended(length: float, margin: float) -> tuple[float, float]:
 
 
 def _line(T: Array, axis: int, low: float, high: float) -> Polyline:
-    origin, direction = T[:3, 3], T[:3, axis]
-    return Polyline(
-        points=(vector(origin + low * direction), vector(origin + high * direction)), color=AXIS_COLOR, width=1.0
-    )
+    direction = np.eye(3)[axis]
+    ends = vector(low * direction), vector(high * direction)
+    return Polyline(points=ends, color=AXIS_COLOR, width=1.0, **_pose(T))

@@ -6,7 +6,6 @@ the parent's frame. Numbers are tuples, so that items compare by value.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -47,23 +46,14 @@ class Solid(Placed):
     opacity: float = 1.0
     plain: bool = False
     """Whether it is shaded in a few steps, which is faster without a graphics card."""
+    scale: Vector = (1.0, 1.0, 1.0)
+    """Factors along its axes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Triad(Placed):
     """The axes of a frame: x red, y green, z blue."""
 
-    length: float
-    """m."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Triads(Placed):
-    """The axes of many frames as one item, which a browser draws much faster."""
-
-    positions: tuple[Vector, ...]
-    """m."""
-    orientations: tuple[Quaternion, ...]
     length: float
     """m."""
 
@@ -110,34 +100,6 @@ class Label(Placed):
     color: Color = (0.1, 0.1, 0.1)
 
 
-Item: TypeAlias = Placed | Solid | Triad | Triads | Polyline | Lines | Arrow | Label
+Item: TypeAlias = Placed | Solid | Triad | Polyline | Lines | Arrow | Label
 Scene: TypeAlias = Mapping[str, Item]
 """Items by name."""
-
-
-def batched(scene: Scene) -> Scene:
-    """Return a scene that looks the same, in which all triads of one parent and length are one item.
-
-    Triads that carry other items are left alone. Triads below ``/frames`` become ``/frames/axes_0``, those of another
-    length ``/frames/axes_1``, and so on.
-    """
-    carriers = {_parent(name) for name in scene}
-    rest: dict[str, Item] = {}
-    groups: dict[str, dict[float, list[Triad]]] = defaultdict(lambda: defaultdict(list))
-    for name, item in scene.items():
-        if isinstance(item, Triad) and name not in carriers:
-            groups[_parent(name)][item.length].append(item)
-        else:
-            rest[name] = item
-    for parent, lengths in groups.items():
-        for number, (length, triads) in enumerate(lengths.items()):
-            rest[f"{parent}/axes_{number}"] = Triads(
-                positions=tuple(triad.position for triad in triads),
-                orientations=tuple(triad.orientation for triad in triads),
-                length=length,
-            )
-    return rest
-
-
-def _parent(name: str) -> str:
-    return name.rpartition("/")[0]

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dh2sim.typing import Array
 from dh2sim.view.scene.items import (
     Arrow,
     Color,
@@ -20,15 +19,13 @@ from dh2sim.view.scene.items import (
     Scene,
     Solid,
     Triad,
-    Triads,
     Vector,
-    batched,
 )
 
 if TYPE_CHECKING:
     import viser
 
-_SHAFT: Final = 0.018
+_SHAFT: Final = 0.026
 """Radius of a frame's axes, as a share of their length."""
 
 
@@ -50,7 +47,6 @@ class Painter:
         Returns:
             How many items were added, changed or removed.
         """
-        scene = batched(scene)
         gone = [name for name in self._drawn if name not in scene]
         for name in sorted(gone, reverse=True):  # children before their parents
             self._handles.pop(name).remove()
@@ -67,17 +63,18 @@ class Painter:
 
     def _paint(self, name: str, item: Item) -> None:
         old = self._drawn.get(name)
-        if old is not None and _appearance(old) == _appearance(item):
-            handle = self._handles[name]
-            # assigning an unchanged value costs time: viser compares before it sends nothing
-            if item.position != old.position:
-                handle.position = item.position
-            if item.orientation != old.orientation:
-                handle.wxyz = item.orientation
-            if isinstance(item, Triads):
-                handle.batched_positions, handle.batched_wxyzs = _arrays(item)
-        else:
+        if old is None or _made_of(old) != _made_of(item):
             self._handles[name] = self._added(name, item)
+            return
+        handle = self._handles[name]
+        # assigning an unchanged value costs time: viser compares before it sends nothing
+        if item.position != old.position:
+            handle.position = item.position
+        if item.orientation != old.orientation:
+            handle.wxyz = item.orientation
+        for (key, value), before in zip(_properties(item).items(), _properties(old).values(), strict=True):
+            if value is not before and not np.array_equal(value, before):
+                setattr(handle, key, value)
 
     def _added(self, name: str, item: Item) -> Any:
         """Add an item, in place of one with the same name."""
@@ -88,9 +85,7 @@ class Painter:
                     name,
                     vertices=np.array(item.vertices, dtype=np.float32),
                     faces=np.array(item.faces, dtype=np.uint32),
-                    color=_bytes(item.color),
-                    opacity=None if item.opacity >= 1.0 else item.opacity,
-                    material="toon5" if item.plain else "standard",
+                    **_properties(item),
                     **pose,
                 )
             case Triad():
@@ -102,52 +97,68 @@ class Painter:
                     origin_color=(90, 90, 95),
                     **pose,
                 )
-            case Triads():
-                positions, orientations = _arrays(item)
-                return self._scene.add_batched_axes(
-                    name,
-                    batched_positions=positions,
-                    batched_wxyzs=orientations,
-                    axes_length=item.length,
-                    axes_radius=_SHAFT * item.length,
-                    **pose,
-                )
             case Polyline() | Lines():
                 return self._scene.add_line_segments(
                     name,
-                    points=np.array(_segments(item), dtype=np.float32).reshape(-1, 2, 3),
                     colors=_bytes(item.color),
                     thickness=item.width,
                     thickness_units="screen",
+                    **_properties(item),
                     **pose,
                 )
             case Arrow():
                 return self._scene.add_arrows(
                     name,
-                    points=np.array([[item.start, item.end]], dtype=np.float32),
                     colors=_bytes(item.color),
                     shaft_radius=0.5 * item.thickness,
                     head_radius=1.25 * item.thickness,
-                    head_length=min(3.0 * item.thickness, 0.6 * _length(item)),
+                    **_properties(item),
                     **pose,
                 )
             case Label():
-                return self._scene.add_label(name, item.text, anchor="center-center", **pose)
+                return self._scene.add_label(name, anchor="center-center", **_properties(item), **pose)
             case Placed():
                 return self._scene.add_frame(name, show_axes=False, **pose)
 
 
-def _appearance(item: Item) -> tuple[object, ...]:
-    """Return everything of an item but its pose."""
-    if isinstance(item, Triads):
-        return Triads, item.length, len(item.positions)
-    names = [name for name in type(item).__dataclass_fields__ if name not in ("position", "orientation")]
-    return (type(item), *(getattr(item, name) for name in names))
+def _made_of(item: Item) -> tuple[object, ...]:
+    """Return everything of an item that cannot change without adding it again."""
+    match item:
+        case Solid():
+            return Solid, item.vertices, item.faces
+        case Polyline() | Lines():
+            return type(item), item.color, item.width
+        case Arrow():
+            return Arrow, item.color, item.thickness
+        case Triad():
+            return Triad, item.length
+        case Label():
+            return Label, item.color
+        case Placed():
+            return (Placed,)
 
 
-def _arrays(triads: Triads) -> tuple[Array, Array]:
-    """Return positions and orientations as viser expects them."""
-    return np.array(triads.positions, dtype=np.float32), np.array(triads.orientations, dtype=np.float32)
+def _properties(item: Item) -> dict[str, Any]:
+    """Return what can change of an item that is drawn, besides its pose, by viser's names."""
+    match item:
+        case Solid():
+            return {
+                "color": _bytes(item.color),
+                "opacity": None if item.opacity >= 1.0 else item.opacity,
+                "material": "toon5" if item.plain else "standard",
+                "scale": item.scale,
+            }
+        case Polyline() | Lines():
+            return {"points": np.array(_segments(item), dtype=np.float32).reshape(-1, 2, 3)}
+        case Arrow():
+            return {
+                "points": np.array([[item.start, item.end]], dtype=np.float32),
+                "head_length": min(3.0 * item.thickness, 0.6 * _length(item)),
+            }
+        case Label():
+            return {"text": item.text}
+        case _:
+            return {}
 
 
 def _segments(item: Polyline | Lines) -> Sequence[tuple[Vector, Vector]]:

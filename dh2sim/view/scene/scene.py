@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.kinematics.forward import forward_kinematics
-from dh2sim.kinematics.transforms import pose_errors
+from dh2sim.kinematics.transforms import compose, pose_errors
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.view.scene.annotations import row_annotations
@@ -37,13 +37,12 @@ from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids
 from dh2sim.view.state import Goal, LinkDrag, Part, ViewState
 
 ROBOT: Final = "/robot"
-FRAMES: Final = "/frames"
 NAMES: Final = "/names"
 ROW: Final = "/row"
 GHOST: Final = "/ghost"
 DRAG: Final = "/drag"
 GOAL: Final = "/goal"
-IN_BASE_LINK: Final = (ROBOT, FRAMES, NAMES, ROW, GHOST)
+IN_BASE_LINK: Final = (ROBOT, NAMES, ROW, GHOST)
 """Items below these are given in base_link, all others, such as the trace and the grid, in the world."""
 _TRACE_COLOR: Final[Color] = (0.10, 0.45, 0.85)
 _GRID_COLOR: Final[Color] = (0.82, 0.84, 0.87)
@@ -52,8 +51,6 @@ _GOAL_COLOR: Final[Color] = (0.85, 0.20, 0.10)
 _DRAG_COLOR: Final[Color] = (0.75, 0.10, 0.70)
 _CELLS: Final = 20
 """Cells of the grid along each side."""
-_SEE_THROUGH: Final = 0.35
-"""Opacity of a robot in which a row is explained."""
 _TOGETHER: Final = 0.25
 """Frames nearer to each other than this share of their axes' length share a label."""
 _ABOVE: Final = 0.45
@@ -65,8 +62,8 @@ _THICKNESS: Final = 0.12
 def scene_of(state: ViewState) -> Scene:
     """Return everything that is drawn, by name.
 
-    The pose of ``/robot/link_i`` is that of link i in base_link, that of ``/frames/dh_i`` is that of DH frame i. The
-    roots in ``IN_BASE_LINK`` have the pose of base_link in the world.
+    The pose of ``/robot/link_i`` is that of link i in base_link. DH frame i is ``/robot/link_i/dh_i``, below the link
+    so that it never lags behind it. The roots in ``IN_BASE_LINK`` have the pose of base_link in the world.
     """
     items = dict(_items(state))
     items.update(_spread_labels(state, items))
@@ -75,14 +72,16 @@ def scene_of(state: ViewState) -> Scene:
 
 def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
     shapes = Part.SHAPES in state.shown
-    explained = Part.ANNOTATIONS in state.shown
     base = _base_link(state)
     yield from ((root, base) for root in IN_BASE_LINK)
-    solids = robot_solids(state.model, state.q, ROBOT, opacity=_SEE_THROUGH if explained else None)
+    solids = robot_solids(state.model, state.q, ROBOT, opacity=state.opacity)
     yield from _without(ROBOT, {name: item for name, item in solids.items() if shapes or not isinstance(item, Solid)})
     if Part.FRAMES in state.shown:
-        yield from _frames(state)
-    if explained:
+        yield from _triads(state.model).items()
+        if Part.FRAME_NAMES in state.shown:
+            places = {name: position_of(T) for name, T in frames_of(state).items()}
+            yield from _names(places, triad_length(state.model))
+    if Part.ANNOTATIONS in state.shown:
         size = triad_length(state.model)
         row = row_annotations(state.spec, state.model.chain, state.selected_row, state.q, size, state.angle)
         yield from row.items()
@@ -123,14 +122,18 @@ def _without(root: str, scene: Scene) -> Iterator[tuple[str, Item]]:
     return ((name, item) for name, item in scene.items() if name != root)
 
 
-def _frames(state: ViewState) -> Iterator[tuple[str, Item]]:
-    length = triad_length(state.model)
-    frames = frames_of(state)
-    for name, T_base_frame in frames.items():
-        position, orientation = position_of(T_base_frame), orientation_of(T_base_frame)
-        yield f"{FRAMES}/{name}", Triad(position=position, orientation=orientation, length=length)
-    if Part.FRAME_NAMES in state.shown:
-        yield from _names({name: position_of(T) for name, T in frames.items()}, length)
+@lru_cache(maxsize=8)  # they do not move in their links
+def _triads(model: RobotModel) -> Mapping[str, Item]:
+    """Return DH frames and tool0, each below the link that carries it."""
+    chain, length = model.chain, triad_length(model)
+    T_link_dh = [chain.T_base_link_dh0, *(joint.T_joint_dh for joint in chain.joints)]
+    carried = [(link.name, f"dh_{i}", T) for i, (link, T) in enumerate(zip(model.all_links, T_link_dh, strict=True))]
+    link, _, T_last = carried[-1]
+    carried.append((link, "tool0", compose(T_last, chain.T_dhn_tool0)))
+    return {
+        f"{ROBOT}/{link}/{frame}": Triad(position=position_of(T), orientation=orientation_of(T), length=length)
+        for link, frame, T in carried
+    }
 
 
 def _names(places: Mapping[str, Vector], length: float) -> Iterator[tuple[str, Item]]:

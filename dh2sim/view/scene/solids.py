@@ -40,7 +40,7 @@ _Profile: TypeAlias = list[tuple[float, float]]
 
 
 def link_solids(
-    link: LinkModel, T_link_dh: Array, *, color: Color | None = None, opacity: float | None = None
+    link: LinkModel, T_link_dh: Array, *, color: Color | None = None, opacity: float = 1.0
 ) -> dict[str, Solid]:
     """Return the solids of a link.
 
@@ -49,7 +49,7 @@ def link_solids(
         T_link_dh: Pose of the link's DH frame, which carries its mesh, in the link's frame: a joint's ``T_joint_dh``,
             or ``T_base_link_dh0`` for the base link; shape (4, 4).
         color: Instead of the link's own colours.
-        opacity: Instead of the link's own.
+        opacity: Times the link's own.
 
     Returns:
         ``mesh`` alone, or ``shape_0``, ``shape_1``, …; each placed in the link's frame.
@@ -67,7 +67,7 @@ def link_solids(
 
 
 def robot_solids(
-    model: RobotModel, q: ArrayLike, root: str, *, color: Color | None = None, opacity: float | None = None
+    model: RobotModel, q: ArrayLike, root: str, *, color: Color | None = None, opacity: float = 1.0
 ) -> dict[str, Item]:
     """Return a robot at a configuration.
 
@@ -76,7 +76,7 @@ def robot_solids(
         q: Joint vector, rad and m, shape (n,).
         root: Name of the item that carries it, such as ``/robot``.
         color: Of all links, instead of their own colours.
-        opacity: Likewise.
+        opacity: Times the links' own.
 
     Returns:
         ``root`` in base_link, a frame ``root/link_2`` at every link, and below it the solids of the link. Only the
@@ -92,7 +92,7 @@ def robot_solids(
 
 
 @lru_cache(maxsize=_ROBOTS_CACHED)
-def _fixed_solids(model: RobotModel, root: str, color: Color | None, opacity: float | None) -> Mapping[str, Solid]:
+def _fixed_solids(model: RobotModel, root: str, color: Color | None, opacity: float) -> Mapping[str, Solid]:
     """Return what is below the links' frames, the same at every configuration."""
     dh_frames = [model.chain.T_base_link_dh0, *(joint.T_joint_dh for joint in model.chain.joints)]
     return {
@@ -170,7 +170,7 @@ def _solid(
     T_link_solid: Array,
     own: tuple[float, float, float, float],
     color: Color | None,
-    opacity: float | None,
+    opacity: float,
 ) -> Solid:
     return Solid(
         position=position_of(T_link_solid),
@@ -178,7 +178,7 @@ def _solid(
         vertices=vertices,
         faces=faces,
         color=own[:3] if color is None else color,
-        opacity=own[3] if opacity is None else opacity,
+        opacity=own[3] * opacity,
     )
 
 
