@@ -224,7 +224,7 @@ class Robot:
         tip: str | None = None,
         convention: Convention | str = Convention.STANDARD,
         tolerance: float = 1e-9,
-        package_paths: Iterable[FilePath] = (),
+        package_paths: Iterable[FilePath] | FilePath = (),
         name: str | None = None,
     ) -> Self:
         """Make the DH table of a URDF, whatever way its axes lie, and compare it with the file's own kinematics.
@@ -236,7 +236,7 @@ class Robot:
             convention: Of the table: 'standard' or 'modified'.
             tolerance: Greatest residual, rad, and m for a reach of up to 1 m, then of the reach; numbers within it of
                 a simple one are made simple.
-            package_paths: Folders in which ``package://`` is looked for first.
+            package_paths: Folders, or a folder, in which ``package://`` is looked for first.
             name: Of the robot, instead of the file's.
 
         Raises:
@@ -249,7 +249,7 @@ class Robot:
             tip=tip,
             convention=convention,
             tolerance=tolerance,
-            package_paths=tuple(package_paths),
+            package_paths=[package_paths] if isinstance(package_paths, str | os.PathLike) else tuple(package_paths),
             name=name,
         )
         return cls._imported(path, options)
@@ -276,6 +276,7 @@ class Robot:
         convention: Convention | str | None = None,
         angle: AngleUnit | str | None = None,
         length: LengthUnit | str | None = None,
+        table: int | None = None,
         tolerance: float = 1e-9,
         name: str | None = None,
     ) -> Self:
@@ -286,6 +287,7 @@ class Robot:
             convention: Of the table, where it does not say: 'standard' or 'modified'.
             angle: Unit of its angles, where it does not say: 'deg' or 'rad'.
             length: Unit of its lengths, where it does not say: 'm', 'mm', 'cm' or 'in'.
+            table: Number of the table, from 1, where the file has several; by default the first.
             tolerance: Numbers within it of a simple one are made simple, rad and m, if it is above the default.
             name: Of the robot, instead of the file's.
 
@@ -298,6 +300,7 @@ class Robot:
             convention=convention,
             angle=angle,
             length=length,
+            table=table,
             tolerance=tolerance,
             name=name,
         )

@@ -51,6 +51,12 @@ def import_robot(
     ] = None,
     angle: Annotated[str | None, typer.Option(metavar="deg|rad", help="Unit of a table's angles.")] = None,
     length: Annotated[str | None, typer.Option(metavar="m|mm|cm|in", help="Unit of a table's lengths.")] = None,
+    table: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Table to read, from 1, of a file that has several. [default: the first]"
+        ),
+    ] = None,
     tolerance: ToleranceOption = 1e-9,
     package_path: Annotated[
         list[Path] | None,
@@ -73,6 +79,7 @@ def import_robot(
       dh2sim import panda.urdf --tip panda_link8 -o panda.yaml
       dh2sim import arm.xml --base base_link --tip attachment_site
       dh2sim import table.md --convention modified --angle deg -o arm.yaml
+      dh2sim import README.md --table 2
       dh2sim import - --convention standard < table.csv
     """
     from dh2sim.importing.sources import STDIN, ImportOptions, import_data, read_file
@@ -87,6 +94,7 @@ def import_robot(
         ),
         angle=choice(angle, AngleUnit, "--angle"),
         length=choice(length, LengthUnit, "--length"),
+        table=table,
         tolerance=tolerance_of(tolerance),
         package_paths=tuple(package_path or ()),
         name=name,
@@ -99,7 +107,8 @@ def import_robot(
         raise ImportedFileError(
             replace(problem, message=_with_options(problem.message)) for problem in error.problems
         ) from error
-    hand_over(imported.text, out, summary=summary(imported), notes=imported.notes, quiet=quiet)
+    notes = [_with_options(note) for note in imported.notes]
+    hand_over(imported.text, out, summary=summary(imported), notes=notes, quiet=quiet)
 
 
 def _read_axes_file(file: str) -> bytes:
@@ -121,12 +130,12 @@ def _read_axes_file(file: str) -> bytes:
     return data
 
 
-_ARGUMENT = re.compile(r"\b(tip|convention|angle|length)=('[^']*'|\"[^\"]*\")")
+_ARGUMENT = re.compile(r"\b(tip|convention|angle|length|table)=('[^']*'|\"[^\"]*\"|\d+)")
 
 
 def _with_options(message: str) -> str:
     """Return a message of the library with options for its arguments: ``--tip hand`` for ``tip='hand'``."""
-    return _ARGUMENT.sub(lambda found: f"--{found[1]} {shlex.quote(ast.literal_eval(found[2]))}", message)
+    return _ARGUMENT.sub(lambda found: f"--{found[1]} {shlex.quote(str(ast.literal_eval(found[2])))}", message)
 
 
 def summary(imported: Imported) -> str:

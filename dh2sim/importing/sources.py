@@ -34,9 +34,10 @@ def import_table(
     data: bytes,
     *,
     file: str,
-    convention: Convention | None = None,
-    angle: AngleUnit | None = None,
-    length: LengthUnit | None = None,
+    convention: Convention | str | None = None,
+    angle: AngleUnit | str | None = None,
+    length: LengthUnit | str | None = None,
+    table: int | None = None,
     name: str | None = None,
     tolerance: float = TOLERANCE,
     folder: Path | None = None,
@@ -49,15 +50,17 @@ def import_table(
         convention: Of the table, where it does not say.
         angle: Unit of its angles, where it does not say.
         length: Unit of its lengths, where it does not say.
+        table: Number of the table, from 1, where the file has several; by default the first.
         name: Of the robot.
         tolerance: Where it is greater than the default, numbers within it of a simple one are made simple, rad and m.
         folder: Of the robot file, to which paths of meshes are relative.
 
     Raises:
         ImportedFileError: The table is wrong, or leaves open what has to be known.
+        Dh2simError: There is no table of that number, or no such convention or unit.
     """
     own_name = robot_name(Path(file).stem if name is None else name)
-    read = read_table(data, file=file, name=own_name, convention=convention, angle=angle, length=length)
+    read = read_table(data, file=file, name=own_name, convention=convention, angle=angle, length=length, table=table)
     spec = read.spec
     if not spec.source:
         origin = "standard input" if file == "-" else Path(file).name
@@ -92,7 +95,7 @@ def _simpler(spec: RobotSpec, tolerances: Tolerances) -> RobotSpec:
 def import_axes(
     axes: AxesSpec,
     *,
-    convention: Convention | None = None,
+    convention: Convention | str | None = None,
     tolerance: float = TOLERANCE,
     explain: bool = False,
     folder: Path | None = None,
@@ -113,7 +116,7 @@ def import_axes(
     def made(*header: str) -> Imported:
         return import_serial(
             serial_robot(axes),
-            convention=convention or axes.convention or Convention.STANDARD,
+            convention=_choice(Convention, convention, "convention") or axes.convention or Convention.STANDARD,
             tolerance=tolerance,
             folder=folder,
             header=header,
@@ -170,6 +173,10 @@ _ROOT = re.compile(rb"<\s*([A-Za-z_][\w:.-]*)")
 _HIDDEN = re.compile(rb"<\?.*?\?>|<!--.*?-->|<![^>]*>", re.DOTALL)
 
 
+def _choice(kind: type[Choice], value: Choice | str | None, what: str) -> Choice | None:
+    return None if value is None else member(kind, value, what)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportOptions:
     """Which part of a file to import, and how."""
@@ -184,12 +191,35 @@ class ImportOptions:
     """Unit of a table's angles, where the table does not say."""
     length: LengthUnit | str | None = None
     """Unit of a table's lengths, where the table does not say."""
+    table: int | None = None
+    """Number of the table to read, from 1, where a file has several; by default the first."""
     tolerance: float = TOLERANCE
     """Greatest residual, rad, and m for a reach of up to 1 m, then of the reach."""
     package_paths: Sequence[str | os.PathLike[str]] = ()
-    """Folders in which ``package://`` is looked for first."""
+    """Folders, or the path of one, in which ``package://`` is looked for first."""
     name: str | None = None
     """Of the robot, instead of the file's."""
+
+    def __post_init__(self) -> None:
+        """Take names for members of enumerations, and one folder for several.
+
+        Raises:
+            Dh2simError: An option has a value that is not allowed.
+        """
+        paths = self.package_paths
+        changed: dict[str, object] = {
+            "convention": _choice(Convention, self.convention, "convention"),
+            "angle": _choice(AngleUnit, self.angle, "angle"),
+            "length": _choice(LengthUnit, self.length, "length"),
+            "package_paths": (paths,) if isinstance(paths, str | os.PathLike) else tuple(paths),
+        }
+        for name, value in changed.items():
+            object.__setattr__(self, name, value)
+        if isinstance(self.tolerance, bool) or not isinstance(self.tolerance, int | float):
+            raise Dh2simError(f"tolerance must be a number, got {self.tolerance!r}")
+        for what in ("base", "tip", "name"):
+            if not isinstance(value := getattr(self, what), str | None):
+                raise Dh2simError(f"{what} must be a string, got {value!r}")
 
 
 def import_robot(
@@ -287,6 +317,8 @@ def _read_mjcf(file: str, options: ImportOptions) -> SerialRobot:
 def _refuse_units(file: str, kind: str, options: ImportOptions) -> None:
     if options.angle is not None or options.length is not None:
         raise Dh2simError(f"{file}: angle and length are units of tables; this is {kind}, which has its own units")
+    if options.table is not None:
+        raise Dh2simError(f"{file}: table is the number of a table in a text; this is {kind}")
 
 
 def _serial(robot: SerialRobot, data: bytes, options: ImportOptions, folder: Path | None) -> Imported:
@@ -300,10 +332,6 @@ def _serial(robot: SerialRobot, data: bytes, options: ImportOptions, folder: Pat
     )
 
 
-def _choice(kind: type[Choice], value: Choice | str | None, what: str) -> Choice | None:
-    return None if value is None else member(kind, value, what)
-
-
 def _table(data: bytes, file: str, options: ImportOptions, folder: Path | None) -> Imported:
     if options.base is not None or options.tip is not None:
         raise Dh2simError(
@@ -312,9 +340,10 @@ def _table(data: bytes, file: str, options: ImportOptions, folder: Path | None) 
     return import_table(
         data,
         file=file,
-        convention=_choice(Convention, options.convention, "convention"),
-        angle=_choice(AngleUnit, options.angle, "angle"),
-        length=_choice(LengthUnit, options.length, "length"),
+        convention=options.convention,
+        angle=options.angle,
+        length=options.length,
+        table=options.table,
         name=options.name,
         tolerance=options.tolerance,
         folder=folder,

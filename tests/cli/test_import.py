@@ -139,3 +139,14 @@ def test_a_robot_file_and_axes_are_not_imported(tmp_path: Path) -> None:
         (axes, "this lists joint axes; 'dh2sim frames' makes a robot file of them"),
     ):
         assert dh2sim("import", file) == Outcome(status=2, out="", err=f"dh2sim: {file}: {reason}\n")
+
+
+def test_another_table_of_a_file_is_read_by_its_number(tmp_path: Path) -> None:
+    text = "DH, standard\n\n|θ|d|a|α|\n|-|-|-|-|\n|q1|0|1|0|\n\nDH, modified\n\n|θ|d|a|α|\n|-|-|-|-|\n|q1|0|2|0|\n"
+    path = tmp_path / "two.md"
+    path.write_text(text, encoding="utf-8")
+    first, second = dh2sim("import", str(path)), dh2sim("import", str(path), "--table", "2")
+    assert "The file has 2 tables, of which the first was read; pass --table 2" in first.err
+    assert (first.out.count("a: 1,"), second.out.count("a: 2,")) == (1, 1)
+    third = dh2sim("import", str(path), "--table", "3")
+    assert (third.status, third.out) == (2, "")

@@ -15,7 +15,7 @@ from dh2sim.importing import serial
 from dh2sim.importing.serial import assemble
 from dh2sim.importing.sources import ImportOptions, import_data, import_robot, import_table
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.spec import AngleUnit, Convention, RobotSpec
+from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
 from tests.refusals import refusal
 
 ARM = """\
@@ -210,3 +210,50 @@ def test_the_file_names_the_robot_unless_another_name_is_asked_for() -> None:
     assert import_table(ROUNDED, file="-", convention=Convention.STANDARD).spec.name == "robot"
     named = import_table(ROUNDED, file="-", convention=Convention.STANDARD, name="scara")
     assert named.spec.name == "scara"
+
+
+TWO = "## Standard DH\n\n|θ|d|a|α|\n|-|-|-|-|\n|q1|0|1|0|\n\n## Modified DH\n\n|θ|d|a|α|\n|-|-|-|-|\n|q1|0|2|0|\n"
+
+
+def test_a_table_of_several_is_read_by_its_number() -> None:
+    a = [import_data(TWO.encode(), "t.md", ImportOptions(table=number)).spec.rows[0].a for number in (1, 2)]
+    assert a == [1, 2]
+    listing = "1 on line 3 (θ, d, a, α); 2 on line 9 (θ, d, a, α)"
+    assert import_data(TWO.encode(), "t.md", ImportOptions()).notes[0] == (
+        f"The file has 2 tables, of which the first was read; pass table=2 for the second. They are: {listing}."
+    )
+    assert _refused(TWO, ImportOptions(table=3), "t.md") == (
+        f"t.md: there is no table 3; the file has 2 tables: {listing}"
+    )
+    assert _refused(TWO, ImportOptions(table="2"), "t.md") == (  # type: ignore[arg-type]
+        "table must be the number of a table, from 1, got '2'"
+    )
+    assert _refused(ARM, ImportOptions(table=1)) == "arm.urdf: table is the number of a table in a text; this is URDF"
+
+
+def test_options_may_be_plain_strings() -> None:
+    options = ImportOptions(convention="modified", angle="deg", length="mm", package_paths="meshes")
+    assert (options.convention, options.angle, options.length, options.package_paths) == (
+        Convention.MODIFIED, AngleUnit.DEG, LengthUnit.MM, ("meshes",),
+    )  # fmt: skip
+    text = b"theta,d,a,alpha\nq1,100,0,90\n"
+    for spec in (
+        import_table(text, file="t.csv", convention="modified", angle="deg", length="mm").spec,
+        import_data(text, "t.csv", options).spec,
+    ):
+        assert (spec.convention, spec.rows[0].d, spec.rows[0].alpha) == (Convention.MODIFIED, 0.1, math.pi / 2)
+    craig = b"theta_i,d_i,a_{i-1},alpha_{i-1}\nq1,0,0,90\n"
+    assert import_table(craig, file="t.csv", convention="modified", angle="deg").spec.convention == "modified"
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"convention": "craig"}, "unknown convention 'craig'. Allowed: standard, modified, hayati"),
+        ({"angle": "degree"}, "unknown angle 'degree'. Did you mean 'deg'? Allowed: rad, deg"),
+        ({"tolerance": "1e-4"}, "tolerance must be a number, got '1e-4'"),
+        ({"tip": 3}, "tip must be a string, got 3"),
+    ],
+)
+def test_an_option_of_the_wrong_kind_is_refused_by_its_name(options: dict[str, Any], expected: str) -> None:
+    assert refusal(Dh2simError, ImportOptions, **options) == expected

@@ -17,7 +17,7 @@ from dh2sim.robot.spec import AngleUnit, LengthUnit
 
 Unit: TypeAlias = AngleUnit | LengthUnit
 
-_EMPTY: Final = ("", "-", "--", "---")
+_EMPTY: Final = ("", "-", "--", "---", "n/a", "na", "n.a.", "none", "nil", "null", "not applicable")
 _NAME: Final = r"[A-Za-z_][A-Za-z0-9_]*"
 _TOKEN: Final = re.compile(
     rf"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+(?![A-Za-z0-9]))?)|(?P<name>{_NAME})|(?P<sign>\*\*|\S)"
@@ -88,7 +88,7 @@ def read_cell(
     if len(cell.text) > LONGEST_CELL:
         raise CellError(f"the cell has {len(cell.text)} characters; at most {LONGEST_CELL} are allowed")
     text = plain(cell.text)
-    if text in _EMPTY:
+    if text.casefold() in _EMPTY:
         return Reading(cell=cell, empty=True)
     text, starred = _without_star(text)
     text, unit = _without_unit(text)

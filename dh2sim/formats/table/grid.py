@@ -61,11 +61,16 @@ def pipe_grids(lines: Sequence[str]) -> Iterator[Grid]:
         body = line[_prefix(line) :]
         ruled = _is_rule(body)
         cells = () if ruled else _piped(line, number)
-        if cells:
+        if cells and not _is_pose_row(cells):
             rows.append(cells)
         elif not ruled and rows:
             yield Grid(rows=tuple(rows), separator="|")
             rows = []
+
+
+def _is_pose_row(cells: Cells) -> bool:
+    """Whether a row is not of the table above it, but the base or the tool that a printout has behind it."""
+    return len(cells) <= 2 and cells[0].text.casefold() in ("base", "tool")
 
 
 def separated_grid(lines: Sequence[str], first: int, separator: str) -> Grid:

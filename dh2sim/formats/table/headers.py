@@ -3,23 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from pathlib import PurePath
 from typing import Final
 
-from dh2sim.formats.table.grid import (
-    MAX_COLUMNS,
-    Cell,
-    Cells,
-    Findings,
-    Grid,
-    is_comment,
-    pipe_grids,
-    separated_grid,
-    split,
-)
+from dh2sim.formats.table.grid import Cell, Cells, Findings
 from dh2sim.formats.table.notation import plain
 from dh2sim.messages import closest, listed, shown
 from dh2sim.robot.spec import AngleUnit, LengthUnit
@@ -47,6 +36,9 @@ class Quantity(StrEnum):
     FLIP = "flip"
     SIGN = "sign"
     VARIABLE = "variable"
+    """Which parameter of a row is its joint's coordinate, or the coordinate's name."""
+    ANGLE = "angle"
+    """Theta, where no other column is."""
 
 
 PARAMETERS: Final = (Quantity.THETA, Quantity.D, Quantity.A, Quantity.ALPHA, Quantity.BETA, Quantity.R)
@@ -65,7 +57,7 @@ LENGTH_WORDS: Final = {
 UNIT: Final = "°|" + "|".join(sorted((*ANGLE_WORDS.keys() - {"°"}, *LENGTH_WORDS), key=len, reverse=True))
 
 _NAMES: Final = {
-    Quantity.THETA: "theta|th|joint angle|theta angle",
+    Quantity.THETA: "theta|th|teta|tetha|thetha|thet|vartheta|joint angle|theta angle|angle theta|joint rotation",
     Quantity.D: "d|s|link offset|offset distance",
     Quantity.A: "a|link length|length",
     Quantity.ALPHA: "alpha|alp|twist|twist angle|link twist|link twist angle",
@@ -84,13 +76,18 @@ _NAMES: Final = {
     "range of motion|working range|qlim",
     Quantity.FLIP: "flip|flipped",
     Quantity.SIGN: "sign|direction|dir",
-    Quantity.VARIABLE: "variable|joint variable|joint var|var|q|coordinate|joint coordinate",
+    Quantity.VARIABLE: "variable|variables|joint variable|joint variables|joint var|var|q|coordinate|"
+    "joint coordinate|variable parameter|dh variable",
+    Quantity.ANGLE: "angle|angles|phi|psi|gamma|rotation|rotation angle|angle of rotation|winkel|gelenkwinkel|angulo",
 }
 KNOWN: Final = {name: quantity for quantity, names in _NAMES.items() for name in names.split("|")}
 _PHRASES: Final = ("link twist angle", "twist angle", "link twist", "link length", "link offset", "joint offset")
-_PHRASES_TOO: Final = ("joint angle", "joint variable", "offset distance", "twist", "length", "offset", "angle")
-_BRACKETED: Final = re.compile(rf"\s*[\[(]\s*(?:in\s+)?({UNIT})\s*[\])]")
-_TRAILING: Final = re.compile(rf"\s*[,/;]\s*(?:in\s+)?({UNIT})$|\s+in\s+({UNIT})$|[\s_]({UNIT})$|\s*(°)$")
+_PHRASES_TOO: Final = (
+    "joint angle", "joint rotation", "rotation angle", "joint variable", "offset distance", "twist", "length",
+    "offset", "rotation", "angle",
+)  # fmt: skip
+_BRACKETED: Final = re.compile(rf"\s*[\[({{<]\s*(?:in\s+)?({UNIT})\.?\s*[\])}}>]")
+_TRAILING: Final = re.compile(rf"\s*[,/;:]\s*(?:in\s+)?({UNIT})\.?$|\s+in\s+({UNIT})\.?$|[\s_.]({UNIT})\.?$|\s*(°)$")
 _INDEXED: Final = re.compile(r"(.*?)[\s_]*[\[(]?\s*([ijkn])\s*(-\s*1)?\s*[\])]?")
 
 
@@ -142,12 +139,19 @@ def _quantity(name: str) -> tuple[Quantity | None, int | None]:
         said = KNOWN.get(phrase)
         if said in (other, None) or not rest:
             return other or said, index
+        if said in (Quantity.THETA, Quantity.ANGLE) and other in (*_OF_THETA, Quantity.JOINT):
+            return (Quantity.THETA if Quantity.THETA in (said, other) else said), index
+        if said is Quantity.ANGLE and other in (Quantity.ALPHA, Quantity.BETA):
+            return other, index
         if said is Quantity.OFFSET and other in (Quantity.THETA, Quantity.VARIABLE, Quantity.D):
             return (Quantity.D if other is Quantity.D else Quantity.OFFSET), index
         if said is Quantity.A and other is Quantity.R:
             return Quantity.A, index
         return None, None
     return None, None
+
+
+_OF_THETA: Final = (Quantity.THETA, Quantity.VARIABLE, Quantity.ANGLE)
 
 
 def _symbol(name: str) -> tuple[Quantity | None, int | None]:
@@ -194,9 +198,40 @@ def are_headings(row: Cells) -> bool:
     return parameters_in(row) >= _FEWEST_PARAMETERS
 
 
-def find_columns(row: Cells, findings: Findings) -> Columns:
-    """Return what the columns hold; what is missing, double or ambiguous goes to ``findings``."""
+_VARIABLES: Final = (
+    (Quantity.THETA, re.compile(r"(?:theta|th|teta|phi|psi|angle|joint angle|rotation)[_ ]*(?:\d*|[ijkn])")),
+    (Quantity.D, re.compile(r"(?:d|s|r|link offset|displacement|distance|length)[_ ]*(?:\d*|[ijkn])")),
+    (Quantity.VARIABLE, re.compile(r"[qx]_?(?:\d*|[ijkn])")),
+)
+_NO_VARIABLE: Final = ("", "-", "--", "---", "none", "n/a", "na", "fixed", "0")
+
+
+def variable_in(text: str) -> Quantity | None:
+    """Return what a cell that names a row's variable means.
+
+    Returns:
+        Theta or d where it is one of them, such as ``θ1`` or ``d``; ``VARIABLE`` for a coordinate such as ``q3``,
+        which may be either; None where it is no variable's name.
+    """
+    name = plain(text).casefold().strip(" *()")
+    return next((quantity for quantity, pattern in _VARIABLES if pattern.fullmatch(name)), None)
+
+
+def is_no_variable(text: str) -> bool:
+    """Whether a cell says that a row has no variable: it is empty or a dash."""
+    return plain(text).casefold() in _NO_VARIABLE
+
+
+def find_columns(row: Cells, rows: Sequence[Cells], findings: Findings) -> Columns:
+    """Return what the columns hold; what is missing, double or ambiguous goes to ``findings``.
+
+    Args:
+        row: The headings.
+        rows: The rows below them, which need not be as long.
+        findings: Takes problems and notes.
+    """
     headings = [read_heading(cell) for cell in row]
+    has_theta = any(heading.quantity is Quantity.THETA for heading in headings)
     at: dict[Quantity, int] = {}
     for index, heading in enumerate(headings):
         if heading.quantity is None:
@@ -204,26 +239,73 @@ def find_columns(row: Cells, findings: Findings) -> Columns:
         first = at.setdefault(heading.quantity, index)
         if first == index:
             continue
-        if heading.quantity is Quantity.JOINT:
-            _note_unused(heading, findings)
-        else:
+        if heading.quantity is not Quantity.JOINT and (heading.quantity not in _OF_THETA or not has_theta):
             message = f"two columns hold {heading.quantity}: this one, and the one headed {shown(row[first].text)}"
             findings.wrong(heading.cell, "", message)
     _decide_r(headings, at, findings)
     if Quantity.OFFSET in at and not at.keys() & {Quantity.D, Quantity.BETA}:
         at[Quantity.D] = at.pop(Quantity.OFFSET)
         findings.note(f"column {shown(row[at[Quantity.D]].text)} was read as d, since no other column is d")
-    if Quantity.VARIABLE in at and Quantity.THETA not in at:
-        at[Quantity.THETA] = at.pop(Quantity.VARIABLE)
-        findings.note(
-            f"column {shown(row[at[Quantity.THETA]].text)} was read as theta, since no other column is theta"
-        )
+    for quantity in (Quantity.ANGLE, Quantity.VARIABLE):
+        if quantity in at and Quantity.THETA not in at and not _names_d(_column(rows, at[quantity])):
+            at[Quantity.THETA] = at.pop(quantity)
+            findings.note(
+                f"column {shown(row[at[Quantity.THETA]].text)} was read as theta, since no other column is theta"
+            )
+    at.pop(Quantity.ANGLE, None)
     _check_missing(headings, at, findings)
-    for index, heading in enumerate(headings):
-        unused = heading.quantity in (None, Quantity.VARIABLE) and index not in at.values()
-        if (unused or at.get(Quantity.VARIABLE) == index) and plain(heading.cell.text):
-            _note_unused(heading, findings)
+    unused = [index for index, heading in enumerate(headings) if index not in at.values()]
+    if Quantity.THETA not in at:
+        _check_theta([(headings[index], _column(rows, index)) for index in unused], findings)
+    if Quantity.VARIABLE in at and not _says_variables(_column(rows, at[Quantity.VARIABLE])):
+        unused.append(at.pop(Quantity.VARIABLE))
+    for index in sorted(unused):
+        if plain(headings[index].cell.text):
+            findings.note(f"column {shown(headings[index].cell.text)} was not used")
     return Columns(headings=tuple(headings), at=at)
+
+
+def _column(rows: Sequence[Cells], index: int) -> list[str]:
+    return [row[index].text for row in rows if index < len(row)]
+
+
+def _names_d(cells: Sequence[str]) -> bool:
+    return any(variable_in(text) is Quantity.D for text in cells)
+
+
+def _says_variables(cells: Sequence[str]) -> bool:
+    """Whether a column says which parameter is variable, or that a row has no variable."""
+    found = [variable_in(text) for text in cells if not is_no_variable(text)]
+    told = len(found) < len(cells) or any(quantity is not Quantity.VARIABLE for quantity in found)
+    return bool(found) and None not in found and told
+
+
+_OTHER: Final = re.compile(
+    r"mass|weight|inertia|torque|speed|veloc|accel|effort|force|comment|remark|descr|note|cent(?:er|re)|payload|gear|"
+    r"ratio|encoder|motor|servo|material|\bpin\b|limit|max|min|range|power|current|volt|damping|friction|stiff|kg|n.?m\b|%"
+)
+_ANGLE_OR_COORDINATE: Final = re.compile(r"[-+(]*(?:[\d.*]|pi\b|(?:theta|teta|th|t|q|phi|psi)_?[\dijkn]*\b(?!\w)).*")
+
+
+def _check_theta(unused: Sequence[tuple[Heading, list[str]]], findings: Findings) -> None:
+    """Complain of columns that may be theta, in a table that has no column known as theta."""
+    for heading, texts in unused:
+        cells = [cell for text in texts if not is_no_variable(cell := plain(text).casefold())]
+        counted = cells and all(cell.isdigit() for cell in cells) and _counts([int(cell[:9]) for cell in cells])
+        like = [cell for cell in cells if _ANGLE_OR_COORDINATE.fullmatch(cell)]
+        if counted or 2 * len(like) <= len(cells) or _OTHER.search(plain(heading.cell.text).casefold()):
+            continue
+        message = (
+            f"the column {shown(heading.cell.text)} holds angles or coordinates, and no column is known as theta"
+        )
+        findings.wrong(heading.cell, "", f"{message}: call it theta, or leave it out")
+    findings.note(
+        "no column is theta: joints were read as revolute, without offsets, where nothing else says how they move"
+    )
+
+
+def _counts(numbers: Sequence[int]) -> bool:
+    return list(numbers) == list(range(numbers[0], numbers[0] + len(numbers)))
 
 
 def _decide_r(headings: Sequence[Heading], at: dict[Quantity, int], findings: Findings) -> None:
@@ -258,107 +340,3 @@ def _check_missing(headings: Sequence[Heading], at: Mapping[Quantity, int], find
     found = listed(shown(heading.cell.text) for heading in headings)
     message = f"no column for {' and '.join(missing)}; a DH table has columns for theta, d, a, alpha"
     findings.wrong(headings[0].cell, "", f"{message}. Found headings: {found}")
-
-
-def _note_unused(heading: Heading, findings: Findings) -> None:
-    findings.note(f"column {shown(heading.cell.text)} was not used")
-
-
-_SEPARATED: Final = (".csv", ".tsv", ".tab")
-_MAX_HEADING_LINES: Final = 2000
-"""Lines that are searched for the headings of a table between separators."""
-_DELIMITER: Final = re.compile(r":?-+:?")
-"""A cell of the row that Markdown has under the headings."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Table:
-    """A table of DH parameters."""
-
-    header: Cells
-    rows: tuple[Cells, ...] = field(repr=False)
-    grid: Grid = field(repr=False)
-    pipes: tuple[Grid, ...] = field(repr=False)
-    """All tables between pipes in the file."""
-
-    @property
-    def lines(self) -> range:
-        """Numbers of its lines, from that of its headings to that of its last row."""
-        return range(self.header[0].line, self.grid.lines.stop)
-
-
-def locate(lines: Sequence[str], file: str) -> Table | None:
-    """Return the first table of DH parameters in a text; failing that, the table that is most like one.
-
-    Args:
-        lines: The file's lines.
-        file: Its name, whose ending decides where to look first.
-    """
-    pipes = tuple(pipe_grids(lines))
-    if PurePath(file).suffix.casefold() in _SEPARATED:
-        table = _between_separators(lines, pipes) or _between_pipes(pipes)
-    else:
-        table = _between_pipes(pipes) or _between_separators(lines, pipes)
-    return table or _most_alike(lines, pipes)
-
-
-def others(table: Table) -> Iterator[int]:
-    """Yield the lines on which further tables of DH parameters start, which are not read."""
-    for grid in table.pipes:
-        if (
-            grid.lines.start > table.lines.start
-            and grid is not table.grid
-            and any(are_headings(row) for row in grid.rows[:3])
-        ):
-            yield grid.lines.start
-
-
-def _between_pipes(pipes: Sequence[Grid]) -> Table | None:
-    for grid in pipes:
-        for index, row in enumerate(grid.rows[:5]):
-            if are_headings(row[:MAX_COLUMNS]):
-                rows = grid.rows[index + 1 :]
-                if rows and all(_DELIMITER.fullmatch(cell.text) for cell in rows[0]):
-                    rows = rows[1:]
-                return Table(header=row, rows=rows, grid=grid, pipes=tuple(pipes))
-    return None
-
-
-def _between_separators(lines: Sequence[str], pipes: Sequence[Grid]) -> Table | None:
-    """Return the table under the first line that has headings; one in a comment only where no other has."""
-    for comments in (False, True):
-        for index, line in enumerate(lines[:_MAX_HEADING_LINES]):
-            if is_comment(line) is not comments or not line.strip():
-                continue
-            grids = [
-                separated_grid(lines, index, separator)
-                for separator in "\t;, "
-                if separator in line and _has_headings(line, separator)
-            ]
-            if grids:
-                even = (grid for grid in grids if len({len(row) for row in grid.rows[:2]}) == 1)
-                grid = next(even, grids[0])
-                return Table(header=grid.rows[0], rows=grid.rows[1:], grid=grid, pipes=tuple(pipes))
-    return None
-
-
-def _has_headings(line: str, separator: str) -> bool:
-    try:
-        cells = split(line[:2000], 1, separator)
-    except ValueError:
-        return False
-    return len(cells) <= MAX_COLUMNS and are_headings(cells)
-
-
-def _most_alike(lines: Sequence[str], pipes: Sequence[Grid]) -> Table | None:
-    candidates = [(parameters_in(grid.rows[0][:MAX_COLUMNS]), -i, grid) for i, grid in enumerate(pipes[:100])]
-    for index, line in enumerate(lines[:_MAX_HEADING_LINES]):
-        for separator in "\t;,":
-            if separator in line[:2000] and not is_comment(line):
-                grid = separated_grid(lines[: index + 1], index, separator)
-                if grid.rows:
-                    candidates.append((parameters_in(grid.rows[0][:MAX_COLUMNS]), -index, grid))
-    best = max(candidates, key=lambda candidate: candidate[:2], default=None)
-    if best is None or best[0] < 1:
-        return None
-    return Table(header=best[2].rows[0], rows=best[2].rows[1:], grid=best[2], pipes=tuple(pipes))

@@ -118,7 +118,7 @@ class LimitReader:
 
 
 COORDINATES: Final = {
-    Quantity.THETA: re.compile(r"(?:theta|th|t|q|phi)[0-9]*[ijkn]?"),
+    Quantity.THETA: re.compile(r"(?:theta|th|teta|tetha|thetha|t|q|phi|psi|gamma)[0-9]*[ijkn]?"),
     Quantity.D: re.compile(r"(?:d|s|r|q)[0-9]*[ijkn]?"),
 }
 """Names of a joint's coordinate in the columns that may hold one, in lower case."""
@@ -136,6 +136,8 @@ class TableRow:
     """Of the cells that could be read."""
     type: JointType | None = None
     """As the table gives it, until ``decide_motion`` has decided."""
+    no_type: bool = False
+    """The table has a column for types or variables, and the row's cell there is empty."""
     sign: int = 1
 
     def path(self, quantity: Quantity) -> str:
@@ -161,20 +163,23 @@ def decide_motion(
         comma: Whether numbers have a decimal comma.
         findings: Takes problems and notes.
     """
-    typed = any(row.type for row in rows)
+    typed = any(row.type or row.no_type for row in rows)
     moving = {row.number: row for row in rows if row.strength(Quantity.THETA) or row.strength(Quantity.D)}
     no_theta = all(row.readings[Quantity.THETA].empty for row in rows if Quantity.THETA in row.readings)
+    still, unsaid = [], False
     for row in rows:
         if row.number in moving or row.type is not None:
             _check_ambiguous(row, constants, no_theta=no_theta, findings=findings)
             _decide_moving_row(row, constants, comma, findings)
+        elif row.no_type or (moving and not no_theta and not typed):
+            row.type = JointType.FIXED
+            still.append(str(row.number))
         else:
-            row.type = JointType.REVOLUTE if no_theta or not moving else JointType.FIXED
-    if not moving and not typed and not no_theta:
+            row.type, unsaid = JointType.REVOLUTE, True
+    if unsaid and not no_theta:
         findings.note(
             f"no cell is marked as variable: every joint was read as revolute, its theta as an offset; {_MARK}"
         )
-    still = [str(row.number) for row in rows if row.type is JointType.FIXED and not typed]
     if len(still) == 1:
         findings.note(f"row {still[0]} has no variable: it was read as fixed")
     elif still:

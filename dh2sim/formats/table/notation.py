@@ -25,6 +25,9 @@ _AFTER: Final = str.maketrans(
         "−": "-", "–": "-", "‒": "-", "—": "-", "―": "-", "‐": "-", "‑": "-",
         "×": "*", "·": "*", "∙": "*", "⋅": "*", "∗": "*", "⋆": "*", "★": "*", "÷": "/", "∕": "/", "⁄": "/",
         "π": "pi", "ϖ": "pi", "θ": "theta", "ϑ": "theta", "Θ": "theta", "α": "alpha", "⍺": "alpha", "ɑ": "alpha",
+        "Ɵ": "theta", "ɵ": "theta", "Ө": "theta", "ө": "theta", "Ѳ": "theta", "ѳ": "theta",
+        "φ": "phi", "Φ": "phi", "ψ": "psi", "Ψ": "psi", "γ": "gamma", "Γ": "gamma", "δ": "delta", "Δ": "delta",
+        "ε": "epsilon", "λ": "lambda", "ω": "omega", "μ": "mu", "ρ": "rho", "τ": "tau",
         "β": "beta", "σ": "sigma", "ς": "sigma", "√": "sqrt",
     }
 )  # fmt: skip
@@ -46,8 +49,13 @@ _LATEX: Final[tuple[_Change, ...]] = (
     (re.compile(r"\\(?:cdot|times)(?![A-Za-z])"), "*"),
     (re.compile(r"\\pm(?![A-Za-z])"), "±"),
     (re.compile(r"\\l?dots(?![A-Za-z])"), "..."),
-    (re.compile(r"\\var(theta)"), r"\\\1"),
-    (re.compile(r"\\(theta|alpha|beta|sigma|pi)(?![A-Za-z])"), r"\1"),
+    (re.compile(r"\\var(theta|phi|epsilon)"), r"\\\1"),
+    (
+        re.compile(
+            r"\\(theta|alpha|beta|sigma|pi|phi|psi|gamma|delta|epsilon|lambda|omega|mu|rho|tau)(?![A-Za-z])", re.I
+        ),
+        r"\1",
+    ),
     (re.compile(r"\\sqrt\s*\{([^{}]*)\}"), r"sqrt(\1)"),
 )
 _FRACTION: Final = re.compile(r"\\[dt]?frac\s*(?:\{([^{}]*)\}|(pi|\d))\s*(?:\{([^{}]*)\}|(\d))")

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from dh2sim.formats.table.grid import Findings, Grid
+from dh2sim.formats.table.grid import PIPES, Findings, Grid
 from dh2sim.formats.table.notation import plain
 from dh2sim.kinematics.transforms import rpy_from_rotation
 from dh2sim.messages import shown
@@ -20,18 +20,24 @@ _ABOVE: Final = 8
 """Lines above a table that may be the printout's first."""
 _STARTS: Final = (
     re.compile(
-        r"DHRobot:\s*(?P<name>.*?)(?:\s*\(by .*?\))?,\s*\d+ joints? \((?P<types>[RP]+)\).*?(?P<dh>std|sta|mod)\w* DH"
+        r"[%#\s>]*[^\s:]+:\s*(?P<name>.*?)(?:\s*\(by .*?\))?,\s*\d+ joints? \((?P<types>[RP]+)\)"
+        r".*?(?P<dh>std|sta|mod)\w* DH"
     ),
     re.compile(r"[%#\s>]*(?P<name>.*?)(?:\s*\[.*\])?\s*::\s*\d+ axis,\s*(?P<types>[RP]+),\s*(?P<dh>std|mod)DH"),
     re.compile(r"[%#\s>]*(?P<name>.*?)\s*\(\d+ axis,\s*(?P<types>[RP]+),\s*(?P<dh>std|mod)DH"),
 )
 _NUMBER: Final = r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 _POSE: Final = re.compile(
-    rf"(base|tool)\b[\s:│┃|]*t\s*=\s*\(?{_NUMBER},{_NUMBER},{_NUMBER}\)?\s*[;,]\s*"
-    rf"rpy/(xyz|zyx|yxz)\s*=\s*\(?{_NUMBER}°?\s*,{_NUMBER}°?\s*,{_NUMBER}°?\s*\)?",
+    rf"\b(base|tool)\b[\s:=│┃║|]*t\s*=\s*\(?{_NUMBER},{_NUMBER},{_NUMBER}\)?\s*[;,]\s*"
+    rf"rpy(?:/(xyz|zyx|yxz|arm|vehicle|camera))?\s*=\s*\(?{_NUMBER}°?\s*,{_NUMBER}°?\s*,{_NUMBER}°?\s*\)?\s*(rad\b)?",
     re.IGNORECASE,
 )
-_NO_POSE: Final = re.compile(r"\W*(base|tool)\W*")
+_ORDERS: Final = {"vehicle": "zyx", "arm": "xyz", "camera": "yxz"}
+_NO_POSE: Final = re.compile(r"\W*(base|tool)\W*", re.IGNORECASE)
+_MENTIONED: Final = re.compile(r"\b(base|tool|tcp|flange|end[ _-]?effector|gripper)\b", re.IGNORECASE)
+_POSE_WORDS: Final = re.compile(
+    r"\b(?:xyz|rpy|t)\b\s*[=:/]|\b(?:SE3|transl|trot[xyz]|Tx|Ty|Tz)\b|(?:[-+\d.]+\s*[,;]\s*){2}[-+\d.]"
+)
 _MATRIX: Final = re.compile(rf"base =((?:{_NUMBER}\s){{4}})\s*tool =(.*)")
 _IDENTITY: Final = tuple(float(i == k) for i in range(4) for k in range(4))
 
@@ -60,20 +66,36 @@ def find_printout(lines: Sequence[str], table: range) -> Printout | None:
     return None
 
 
-def find_poses(lines: Sequence[str], table: range, length: LengthUnit | None, findings: Findings) -> dict[str, Pose]:
-    """Return the poses of base and tool that a printout shows behind its table, by ``base`` and ``tool``."""
+def find_poses(
+    lines: Sequence[str], table: range, around: range, length: LengthUnit | None, findings: Findings
+) -> dict[str, Pose]:
+    """Return the poses of base and tool that are printed beside a table, by ``base`` and ``tool``.
+
+    Args:
+        lines: All lines of the file.
+        table: Numbers of the table's lines, counted from 1.
+        around: Numbers of the lines that may belong to the table.
+        length: The unit of lengths; None for metres.
+        findings: Takes notes: on poses, which are rounded, and on lines that may hold one and were not read.
+    """
     units = Units(length=length or LengthUnit.M)
     poses: dict[str, Pose] = {}
-    for index in range(table.stop - 1, len(lines)):
-        line = lines[index][:1000]
-        if any(pattern.match(line.strip()) for pattern in _STARTS):
-            break
+    for number in around:
+        line = lines[number - 1][:1000]
+        if number in table or not _MENTIONED.search(line):
+            continue
+        line = plain(line)
         if found := _POSE.search(line):
             poses[found[1].casefold()] = _pose(found, units)
         elif found := _MATRIX.search(line):
-            poses |= _from_matrices(lines[index : index + 4], units, findings)
+            poses |= _from_matrices(lines[number - 1 : number + 3], units, findings)
         elif found := _NO_POSE.fullmatch(line):
-            findings.note(f"the printout names a {found[1]} without its pose: it was left out")
+            if number > table.start and any(pipe in line for pipe in PIPES):
+                findings.note(f"the printout names a {found[1].casefold()} without its pose: it was left out")
+        elif (found := _MENTIONED.search(line)) and _POSE_WORDS.search(line):
+            findings.note(
+                f"line {number} may give the pose of the {found[1].casefold()} and was not read: {shown(line)}"
+            )
     for name in poses:
         findings.note(
             f"the pose of the {name} is as printed, rounded: give it in the robot file if you know it better"
@@ -81,14 +103,16 @@ def find_poses(lines: Sequence[str], table: range, length: LengthUnit | None, fi
     return poses
 
 
-def find_configurations(
-    grids: Sequence[Grid], table: Grid, rows: Sequence[Row], findings: Findings
-) -> Mapping[str, Array]:
-    """Return the named joint vectors of a printout, rad and m, as printed."""
+def is_first_line(line: str) -> bool:
+    """Whether a line is the first of a printout."""
+    return any(pattern.match(line[:1000].strip()) for pattern in _STARTS)
+
+
+def find_configurations(grids: Sequence[Grid], rows: Sequence[Row], findings: Findings) -> Mapping[str, Array]:
+    """Return the named joint vectors that a printout has in one of the tables around it, rad and m, as printed."""
     moving = [row for row in rows if row.type.moves]
     expected = ["name", *(f"q{index}" for index in range(len(moving)))]
-    following = (grid for grid in grids if grid.lines.start > table.lines.start)
-    grid = next((g for g in following if [plain(c.text) for c in g.rows[0]] == expected), None)
+    grid = next((g for g in grids if [plain(c.text) for c in g.rows[0]] == expected), None)
     configurations: dict[str, Array] = {}
     for name, *cells in ([cell.text for cell in row] for row in grid.rows[1:]) if grid else ():
         try:
@@ -120,11 +144,14 @@ def _coordinate(text: str, row: Row) -> float:
 def _pose(found: re.Match[str], units: Units) -> Pose:
     """Return the pose on a printed line; ``rpy/xyz`` is R = Rx(yaw) Ry(pitch) Rz(roll), printed roll first."""
     xyz = [units.metres(float(found[group])) for group in (2, 3, 4)]
-    roll, pitch, yaw = (math.radians(float(found[group])) for group in (6, 7, 8))
-    if found[5].casefold() == "zyx":
+    angles = [float(found[group]) for group in (6, 7, 8)]
+    roll, pitch, yaw = angles if found[9] else map(math.radians, angles)
+    order = (found[5] or "zyx").casefold()
+    order = _ORDERS.get(order, order)
+    if order == "zyx":
         return Pose(xyz=read_only(xyz), rpy=read_only([roll, pitch, yaw]))
     R = read_only(_about("z", roll))
-    for axis, angle in (("y", pitch), ("x", yaw)) if found[5].casefold() == "xyz" else (("x", pitch), ("y", yaw)):
+    for axis, angle in (("y", pitch), ("x", yaw)) if order == "xyz" else (("x", pitch), ("y", yaw)):
         R = read_only(_about(axis, angle)) @ R
     return Pose(xyz=read_only(xyz), rpy=rpy_from_rotation(R))
 

@@ -20,15 +20,13 @@ from dh2sim.formats.table.headers import (
     UNIT,
     Columns,
     Quantity,
-    Table,
     find_columns,
-    locate,
-    others,
 )
+from dh2sim.formats.table.locate import Located, Table, locate
 from dh2sim.formats.table.notation import plain
-from dh2sim.formats.table.printout import find_configurations, find_poses, find_printout
+from dh2sim.formats.table.printout import find_configurations, find_poses, find_printout, is_first_line
 from dh2sim.formats.table.rows import Body, ResolvedUnits, is_hayati, read_body, to_row
-from dh2sim.messages import shown
+from dh2sim.messages import member, shown
 from dh2sim.robot.expressions import FUNCTIONS, ExpressionError, evaluate
 from dh2sim.robot.fields import name_problem
 from dh2sim.robot.spec import AngleUnit, BaseSpec, Convention, JointType, LengthUnit, Pose, RobotSpec, Row, Units
@@ -134,6 +132,7 @@ def _constant(match: re.Match[str], line: int) -> Constant | None:
     return Constant(value=value, unit=None, line=line)
 
 
+_MAX_LISTED: Final = 20
 _NO_TABLE: Final = (
     "no table of Denavit-Hartenberg parameters found: none has headings such as theta, d, a and alpha. "
     "Allowed: a Markdown table, CSV, TSV, or a printout of the Robotics Toolbox for Python or MATLAB"
@@ -156,15 +155,16 @@ def read_table(
     *,
     file: str,
     name: str,
-    convention: Convention | None = None,
-    angle: AngleUnit | None = None,
-    length: LengthUnit | None = None,
+    convention: Convention | str | None = None,
+    angle: AngleUnit | str | None = None,
+    length: LengthUnit | str | None = None,
+    table: int | None = None,
 ) -> TableImport:
     """Return the robot that a table of Denavit-Hartenberg parameters describes.
 
-    The table is the first one in the text that has at least three of the headings theta, d, a, alpha and beta: a
-    Markdown table, values separated by commas, semicolons, tabs or spaces, or what Corke's Robotics Toolbox for
-    Python or MATLAB prints for a robot.
+    The table is, unless ``table`` says otherwise, the first one in the text that has at least three of the headings
+    theta, d, a, alpha and beta: a Markdown table, values separated by commas, semicolons, tabs or spaces, or what
+    Corke's Robotics Toolbox for Python or MATLAB prints for a robot.
 
     Args:
         data: The file's content, UTF-8.
@@ -173,11 +173,12 @@ def read_table(
         convention: The convention, where the text does not give it.
         angle: The unit of angles that have none of their own; goes before headings.
         length: The unit of lengths that have none of their own; goes before headings.
+        table: Number of the table, from 1, where a text has several; by default the first.
 
     Raises:
         ImportedFileError: There is no table, or it is wrong, or it leaves open what has to be known; the error holds
             everything that is wrong.
-        Dh2simError: ``name`` is not allowed as the name of a robot.
+        Dh2simError: ``name`` is not allowed as the name of a robot, or there is no table of that number.
     """
     if problem := name_problem(name, "the name of a robot"):
         raise Dh2simError(problem)
@@ -186,28 +187,61 @@ def read_table(
         lines = decode(data, Report(file)).split("\n")
     except RobotFileError as error:
         raise ImportedFileError(error.problems) from None
-    table = locate(lines, file)
-    if table is None:
+    located = locate(lines, file)
+    if not located.tables:
         findings.wrong_at(1, 1, "", _NO_TABLE)
         raise findings.error()
-    reader = _Reader(lines, table, findings)
-    return reader.read(name, convention, angle, length)
+    reader = _Reader(lines, located, _chosen(located.tables, table, findings), findings)
+    return reader.read(
+        name,
+        None if convention is None else member(Convention, convention, "convention"),
+        None if angle is None else member(AngleUnit, angle, "angle"),
+        None if length is None else member(LengthUnit, length, "length"),
+    )
+
+
+def _chosen(tables: Sequence[Table], number: int | None, findings: Findings) -> Table:
+    """Return the table of a number, from 1, or the first."""
+    if number is not None and (isinstance(number, bool) or not isinstance(number, int)):
+        raise Dh2simError(f"table must be the number of a table, from 1, got {number!r}")
+    if number is None:
+        if len(tables) > 1:
+            findings.note(
+                f"the file has {len(tables)} tables, of which the first was read; pass table=2 for the second. "
+                f"They are: {_listing(tables)}"
+            )
+        return tables[0]
+    if not 1 <= number <= len(tables):
+        has = "the file has only one table" if len(tables) == 1 else f"the file has {len(tables)} tables"
+        raise Dh2simError(f"{findings.file}: there is no table {number}; {has}: {_listing(tables)}")
+    return tables[number - 1]
+
+
+def _listing(tables: Sequence[Table]) -> str:
+    """Return number, line and headings of every table."""
+    shown_of = [
+        f"{number} on line {table.lines.start} ({', '.join(cell.text or '-' for cell in table.header[:8])})"
+        for number, table in enumerate(tables[:_MAX_LISTED], start=1)
+    ]
+    rest = len(tables) - len(shown_of)
+    return "; ".join([*shown_of, *([f"and {rest} more"] if rest > 0 else [])])
 
 
 class _Reader:
     """Reads one table."""
 
-    def __init__(self, lines: Sequence[str], table: Table, findings: Findings) -> None:
+    def __init__(self, lines: Sequence[str], located: Located, table: Table, findings: Findings) -> None:
         """Find out what the columns hold.
 
         Raises:
             ImportedFileError: The columns are ambiguous, or the rows are not all as long as the heading.
         """
         self._lines = lines
+        self._located = located
         self._table = table
         self._findings = findings
         self._printout = find_printout(lines, table.lines)
-        self._columns = find_columns(table.header[:MAX_COLUMNS], findings)
+        self._columns = find_columns(table.header[:MAX_COLUMNS], table.rows[:MAX_ROWS], findings)
         check_shape(table, findings)
         findings.check()
 
@@ -277,28 +311,38 @@ class _Reader:
             )
 
     def _spec(self, name: str, rows: tuple[Row, ...], convention: Convention, length: LengthUnit) -> RobotSpec:
-        table, printout = self._table, self._printout
-        poses: dict[str, Pose] = {}
-        configurations = {}
-        if printout is not None:
-            poses = find_poses(self._lines, table.lines, length, self._findings)
-            configurations = dict(find_configurations(table.pipes, table.grid, rows, self._findings))
+        table, printout, findings = self._table, self._printout, self._findings
+        around = self._around()
+        poses = find_poses(self._lines, table.lines, around, length, findings)
+        following = [grid for grid in self._located.pipes if grid.lines.start in around and grid is not table.grid]
+        configurations = dict(find_configurations(following, rows, findings))
         return RobotSpec(
             name=name,
             rows=rows,
             description=printout.name if printout else "",
-            source=f"{PurePath(self._findings.file).name}, line {table.header[0].line}",
+            source=f"{PurePath(findings.file).name}, line {table.header[0].line}",
             convention=convention,
             base=BaseSpec(pose=poses.get("base", Pose())),
             tool=poses.get("tool", Pose()),
             configurations=MappingProxyType(configurations),
         )
 
+    def _around(self) -> range:
+        """Return the numbers of the lines that may belong to the table: up to other tables and other printouts."""
+        around, table = self._located.around(self._table), self._table.lines
+        start = around.start
+        if start > 1:  # what is behind another table belongs to that one
+            start = next((n for n in range(table.start - 1, start - 1, -1) if self._is_first(n)), table.start)
+        stop = min(around.stop, len(self._lines) + 1)
+        stop = next((number for number in range(table.stop, stop) if self._is_first(number)), stop)
+        return range(start, stop)
+
+    def _is_first(self, number: int) -> bool:
+        return is_first_line(self._lines[number - 1])
+
     def _note_unread(self) -> None:
         table = self._table
-        for line in others(table):
-            self._findings.note(f"the table on line {line} was not read: only the first of a file is")
-        behind = range(table.lines.stop, len(self._lines) + 1)
+        behind = range(table.lines.stop, self._around().stop)
         texts = [self._lines[number - 1] for number in behind]
         if (
             table.grid.separator != "|"

@@ -9,7 +9,8 @@ from typing import Final
 
 from dh2sim.formats.table.cells import CellError, Constant, Unit, read_cell
 from dh2sim.formats.table.grid import Cell, Cells, Findings
-from dh2sim.formats.table.headers import Columns, Quantity, Table
+from dh2sim.formats.table.headers import Columns, Quantity, is_no_variable, variable_in
+from dh2sim.formats.table.locate import Table
 from dh2sim.formats.table.motion import COORDINATES, LimitReader, TableRow, decide_motion
 from dh2sim.formats.table.notation import plain
 from dh2sim.formats.table.units import ANGLES, LENGTHS, Kind, Number, to_si
@@ -171,32 +172,55 @@ def _limits(
 
 
 TYPES: Final[Mapping[str, JointType]] = {
-    **dict.fromkeys(("r", "rev", "revolute", "rotary", "rotational", "rotation", "hinge", "0"), JointType.REVOLUTE),
-    **dict.fromkeys(("p", "pris", "prismatic", "sliding", "slider", "linear", "translational", "translation", "1"),
+    **dict.fromkeys(("r", "rev", "revol", "revolute", "rot", "rotary", "rotational", "rotation", "rotating", "hinge",
+                     "turn", "0", "rotatorisch", "drehgelenk", "rotacional", "revoluta", "rotoide"),
+                    JointType.REVOLUTE),
+    **dict.fromkeys(("p", "pri", "pris", "prism", "prismatic", "sliding", "slide", "slider", "linear", "trans",
+                     "translational", "translation", "1", "translatorisch", "schubgelenk", "prismatica",
+                     "prismatique"),
                     JointType.PRISMATIC),
     **dict.fromkeys(("c", "continuous"), JointType.CONTINUOUS),
-    **dict.fromkeys(("f", "fixed", "2"), JointType.FIXED),
+    **dict.fromkeys(("f", "fix", "fixed", "2"), JointType.FIXED),
 }  # fmt: skip
 """Words for the type of a joint; the digits are Corke's and Khalil's sigma."""
 _ALLOWED: Final = "Allowed: revolute (R, 0), prismatic (P, 1), continuous, fixed"
 _ORDINAL: Final = re.compile(r"(?:joint|link|axis|frame|row|j|l|a)?[ _]*#?\d+", re.IGNORECASE)
+_BY_VARIABLE: Final = {Quantity.THETA: JointType.REVOLUTE, Quantity.D: JointType.PRISMATIC}
 
 
-def read_types(rows: Sequence[Cells], columns: Columns, findings: Findings) -> list[JointType | None]:
-    """Return the types that a table gives its rows; None where it gives none."""
-    cells = [columns.cell(row, Quantity.TYPE) for row in rows]
-    if cells and cells[0] is None:
-        cells = [columns.cell(row, Quantity.JOINT) for row in rows]
-        words = [plain(cell.text).casefold() for cell in cells if cell]
-        if not all(word in TYPES and not word.isdigit() for word in words):
-            return [None] * len(rows)
-    types: list[JointType | None] = []
-    for number, cell in enumerate(cells, start=1):
-        word = plain(cell.text).casefold() if cell else ""
-        types.append(TYPES.get(word))
-        if cell and word not in TYPES and word not in ("", "-"):
-            findings.wrong(cell, f"row {number}, type", f"found {shown(cell.text)}. {_ALLOWED}")
-    return types
+def read_types(rows: Sequence[TableRow], cells: Sequence[Cells], columns: Columns, findings: Findings) -> None:
+    """Give the rows the types that a column for types or for variables says; a row without one has ``no_type``."""
+    given = [columns.cell(row, Quantity.TYPE) for row in cells]
+    if not given or given[0] is None:
+        given = [columns.cell(row, Quantity.JOINT) for row in cells]
+        words = [_type_word(cell) for cell in given if cell]
+        if not words or not all(word in TYPES and not word.isdigit() for word in words):
+            given = []
+    variables = [columns.cell(row, Quantity.VARIABLE) for row in cells]
+    some = any(not is_no_variable(cell.text) or cell.text == "0" for cell in given if cell)
+    for row, cell in zip(rows, given if some else (), strict=False):
+        if cell is None:
+            continue
+        word = _type_word(cell)
+        row.type = TYPES.get(word) or _BY_VARIABLE.get(variable_in(cell.text) or Quantity.JOINT)
+        row.no_type = row.type is None and is_no_variable(cell.text)
+        if row.type is None and not row.no_type:
+            findings.wrong(cell, f"row {row.number}, type", f"found {shown(cell.text)}. {_ALLOWED}")
+    for row, cell in zip(rows, variables, strict=True):
+        if cell is None:
+            continue
+        kind = _BY_VARIABLE.get(variable_in(cell.text) or Quantity.JOINT)
+        if row.type is None:
+            row.type, row.no_type = kind, is_no_variable(cell.text)
+        elif kind is not None and kind.turns is not row.type.turns:
+            findings.wrong(
+                cell, f"row {row.number}, variable", f"{shown(cell.text)} is no variable of a {row.type} joint"
+            )
+
+
+def _type_word(cell: Cell) -> str:
+    word = plain(cell.text).casefold().strip(" *.()")
+    return word.removesuffix("joint").strip() or word
 
 
 def check_numbers(rows: Sequence[Cells], columns: Columns, findings: Findings) -> None:
@@ -285,8 +309,7 @@ def read_body(
     """
     cells = table.rows
     rows = read_rows(cells, columns, constants, comma=comma, findings=findings)
-    for row, kind in zip(rows, read_types(cells, columns, findings), strict=True):
-        row.type = kind
+    read_types(rows, cells, columns, findings)
     check_numbers(cells, columns, findings)
     decide_motion(rows, constants, comma, findings)
     read_flips(rows, cells, columns, findings)

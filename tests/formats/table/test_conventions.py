@@ -53,7 +53,11 @@ def test_the_heading_of_the_next_section_does_not_speak_of_this_table() -> None:
     text = f"## Standard DH parameters\n\n{PLAIN}\n## Modified DH parameters\n\n{PLAIN}"
     found = imported(text)
     assert found.spec.convention is Convention.STANDARD
-    assert "the table on line 9 was not read: only the first of a file is" in found.notes
+    assert found.notes[0] == (
+        "the file has 2 tables, of which the first was read; pass table=2 for the second. They are: 1 on line 3 "
+        "(θ, d, a, α); 2 on line 9 (θ, d, a, α)"
+    )
+    assert imported(text, table=2).spec.convention is Convention.MODIFIED
 
 
 def test_headings_of_index_i_minus_1_say_modified() -> None:

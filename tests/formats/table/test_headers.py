@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from dh2sim.formats.table.grid import Cell
@@ -39,7 +41,11 @@ Q = Quantity
         ("q⁻", Q.LOWER, None), ("q⁺", Q.UPPER, None), ("q_max", Q.UPPER, None), ("Lower limit", Q.LOWER, None),
         ("min", Q.LOWER, None), ("limits", Q.LIMITS, None), ("Joint limits", Q.LIMITS, None),
         ("**θ**", Q.THETA, None),
-        ("mass", None, None), ("alhpa", None, None), ("Rated torque", None, None), ("angle", None, None),
+        ("mass", None, None), ("alhpa", None, None), ("Rated torque", None, None), ("angle", Q.ANGLE, None),
+        ("φ_i", Q.ANGLE, 0), ("ϕ", Q.ANGLE, None), ("$\\varphi_i$", Q.ANGLE, 0), ("Ɵ", Q.THETA, None),
+        ("Ө_i", Q.THETA, 0), ("Ѳ", Q.THETA, None), ("teta", Q.THETA, None), ("Joint angle q", Q.THETA, None),
+        ("Joint angle $q_i$", Q.THETA, 0), ("rotation angle", Q.ANGLE, None), ("Angle θ", Q.THETA, None),
+        ("twist angle α", Q.ALPHA, None), ("Joint variable", Q.VARIABLE, None), ("phi (joint angle)", Q.THETA, None),
     ],
 )  # fmt: skip
 def test_a_heading_is_known(text: str, quantity: Quantity | None, index: int | None) -> None:
@@ -113,3 +119,40 @@ def test_offset_is_d_where_nothing_else_is() -> None:
 def test_columns_that_are_not_used_are_named() -> None:
     notes = imported("i,theta,d,a,alpha,mass,q\n1,q1,1,2,0,7,home\n", "t.csv", **STANDARD).notes
     assert notes[:2] == ("column 'mass' was not used", "column 'q' was not used")
+
+
+@pytest.mark.parametrize("heading", ["φ (deg)", "ϕ [deg]", "Ɵ (deg)", "Ө, deg", "angle (deg)", "Joint angle q (°)"])
+def test_a_column_of_joint_angles_is_theta_whatever_it_is_called(heading: str) -> None:
+    text = f"| i | {heading} | d | a | α (deg) |\n|---|---|---|---|---|\n| 1 | q1 + 180 | 1 | 2 | 90 |\n"
+    spec = imported(text, **STANDARD).spec
+    assert (spec.rows[0].theta, spec.rows[0].d, spec.rows[0].a) == (math.pi, 1, 2)
+
+
+@pytest.mark.parametrize("cells", [("q1", "q2 + 90"), ("0", "-90"), ("θ1*", "θ2*"), ("pi/2", "0"), ("*", "*")])
+def test_a_column_of_angles_that_nobody_knows_is_refused(cells: tuple[str, str]) -> None:
+    text = (
+        f"| d | a | α (deg) | Ugol |\n|---|---|---|---|\n| 1 | 2 | 90 | {cells[0]} |\n| 1 | 2 | 90 | {cells[1]} |\n"
+    )
+    assert complaints(text, **STANDARD) == [
+        "t.md:1:21: the column 'Ugol' holds angles or coordinates, and no column is known as theta: call it theta, "
+        "or leave it out"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells"),
+    [("Mass [kg]", ("3.7", "8.4")), ("Gelenk", ("A1", "A2")), ("Nr", ("1", "2")), ("Von", ("0", "1"))],
+)
+def test_columns_of_something_else_are_not_taken_for_theta(heading: str, cells: tuple[str, str]) -> None:
+    text = (
+        f"| {heading} | d | a | α |\n|---|---|---|---|\n| {cells[0]} | 1 | 2 | 90° |\n| {cells[1]} | 1 | 2 | 90° |\n"
+    )
+    found = imported(text, **STANDARD)
+    assert len(found.spec.rows) == 2
+    assert any(note.startswith("no column is theta: ") for note in found.notes)
+
+
+def test_a_unit_may_end_with_a_point_or_be_in_braces() -> None:
+    text = "| i | theta | d (mm.) | a {mm} | alpha (deg.) |\n|---|---|---|---|---|\n| 1 | q1 | 100 | N/A | 90 |\n"
+    spec = imported(text, **STANDARD).spec
+    assert (spec.rows[0].d, spec.rows[0].a, spec.rows[0].alpha) == (0.1, 0, math.pi / 2)

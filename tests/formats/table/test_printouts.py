@@ -229,3 +229,109 @@ def test_an_option_against_the_printout_is_refused() -> None:
         "t.md:6:3: convention='modified' says modified, but the printout's first line says standard; correct the one "
         "that is wrong"
     ]
+
+
+SUBCLASS = """\
+DHRobot.Elbow3: Elbow3 (by me), 3 joints (RRR), standard DH parameters
+┌───────────┬─────┬──────┬───────┬─────────┬────────┐
+│    θⱼ     │ dⱼ  │  aⱼ  │  ⍺ⱼ   │   q⁻    │   q⁺   │
+├───────────┼─────┼──────┼───────┼─────────┼────────┤
+│  q1       │ 0.3 │    0 │ 90.0° │ -114.6° │ 114.6° │
+│  q2       │   0 │  0.4 │  0.0° │ -114.6° │ 114.6° │
+│  q3 + 30° │   0 │ 0.25 │  0.0° │ -114.6° │ 114.6° │
+└───────────┴─────┴──────┴───────┴─────────┴────────┘
+
+┌──────┬──────────────────────────────────────────┐
+│ tool │ t = 0.05, 0, 0.12; rpy/xyz = 0°, 90°, 0° │
+└──────┴──────────────────────────────────────────┘
+
+┌──────┬─────┬──────┬─────┐
+│ name │ q0  │ q1   │ q2  │
+├──────┼─────┼──────┼─────┤
+│   qr │  0° │  30° │  0° │
+└──────┴─────┴──────┴─────┘
+"""
+"""What Robotics Toolbox for Python 1.5 prints for a user's own class."""
+ADJACENT = """\
+DHRobot: twolink, 2 joints (RR), standard DH parameters
+┏━━━━━┳━━━━━┳━━━━━┳━━━━━━━┓
+┃ θⱼ  ┃ dⱼ  ┃ aⱼ  ┃  ⍺ⱼ   ┃
+┣━━━━━╋━━━━━╋━━━━━╋━━━━━━━┫
+┃ q1  ┃ 0.1 ┃ 0   ┃ 90.0° ┃
+┃ q2  ┃ 0   ┃ 0.3 ┃ 0.0°  ┃
+┗━━━━━┻━━━━━┻━━━━━┻━━━━━━━┛
+│base │ t = 0, 0, 0.5; rpy/xyz = 0°, 90°, 0°  │
+│tool │ t = 0, -0.005, 0; rpy/xyz = 0°, 0°, 0° │
+"""
+TITLES = [
+    "DHRobot.Elbow3: Elbow3 (by me), 3 joints (RRR), standard DH parameters",
+    "Elbow3: Elbow3, 3 joints (RRR), geometry, standard DH parameters",
+    "my.package.Elbow3: , 3 joints (RRR), dynamics, geometry, standard DH parameters",
+    "# DHRobot: Elbow3, 3 joints (RRR), standard DH parameters",
+    "My arm, in standard DH",
+    "Standard DH parameters\nof an arm that nobody named",
+]
+
+
+def _subclass_pose(q: tuple[float, float, float]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    tool = _about_y(math.pi / 2)
+    tool[:3, 3] = (0.05, 0, 0.12)
+    h = math.pi / 2
+    return standard(q[0], 0.3, 0, h) @ standard(q[1], 0, 0.4, 0) @ standard(q[2] + math.pi / 6, 0, 0.25, 0) @ tool
+
+
+@pytest.mark.parametrize("title", TITLES)
+def test_a_tool_and_configurations_are_read_whatever_the_title_above_the_table(title: str) -> None:
+    found = imported(SUBCLASS.replace(SUBCLASS.partition("\n")[0], title))
+    q = (0.3, -0.5, 0.7)
+    np.testing.assert_allclose(tool_poses(found.spec, [q])[0], _subclass_pose(q), atol=1e-14)
+    assert found.spec.configurations["qr"].tolist() == [0, math.radians(30), 0]
+    assert (
+        "the pose of the tool is as printed, rounded: give it in the robot file if you know it better" in found.notes
+    )
+
+
+def test_a_printout_of_a_subclass_keeps_its_name() -> None:
+    assert imported(SUBCLASS).spec.description == "Elbow3"
+
+
+def test_a_tool_above_the_table_is_read_and_that_of_the_next_printout_is_not() -> None:
+    tool = "tool: t = 0.05, 0, 0.12; rpy/xyz = 0°, 90°, 0°"
+    bare = SUBCLASS.partition("\n\n")[0]
+    other = bare.replace("0.4", "0.6") + "\ntool: t = 1, 2, 3; rpy/xyz = 0°, 0°, 0°\n"
+    q = (0.3, -0.5, 0.7)
+    for text in (f"{tool}\n\n{bare}\n\n{other}", f"{bare}\n{tool}\n\n{other}"):
+        np.testing.assert_allclose(tool_poses(imported(text).spec, [q])[0], _subclass_pose(q), atol=1e-14)
+
+
+def test_base_and_tool_directly_under_a_table_are_not_rows() -> None:
+    found = imported(ADJACENT)
+    q = (0.3, -0.5)
+    base, tool = _about_y(math.pi / 2), np.eye(4)
+    base[2, 3], tool[1, 3] = 0.5, -0.005
+    expected = base @ standard(q[0], 0.1, 0, math.pi / 2) @ standard(q[1], 0, 0.3, 0) @ tool
+    np.testing.assert_allclose(tool_poses(found.spec, [q])[0], expected, atol=1e-15)
+    ascii_only = ADJACENT.translate(str.maketrans("┏┳┓┣╋┫┗┻┛━┃│", "+++++++++-||"))
+    np.testing.assert_allclose(tool_poses(imported(ascii_only).spec, [q])[0], expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "tool: xyz = 0, 0, 0.1, rpy = 0, 0, 0",
+        "robot.tool = SE3(0, 0, 0.1)",
+        "base = transl(0, 0, 0.5)",
+        "The flange is at (0, 0, 0.107) from frame 7.",
+        "| tool | 0, 0, 0.1 |",
+    ],
+)
+def test_a_line_that_may_hold_a_pose_and_cannot_be_read_is_noted(line: str) -> None:
+    word = next(word for word in ("tool", "base", "flange") if word in line)
+    text = f"Standard DH\n\n| θ | d | a | α |\n|---|---|---|---|\n| q1 | 0.1 | 0 | 90° |\n\n{line}\n"
+    note = next(note for note in imported(text).notes if "was not read" in note)
+    assert note.startswith(f"line 7 may give the pose of the {word} and was not read: ")
+
+
+def test_prose_about_tools_is_not_noted() -> None:
+    text = "Standard DH\n\n| θ | d | a | α |\n|---|---|---|---|\n| q1 | 0.1 | 0 | 90° |\n\nThe tool has 2 fingers.\n"
+    assert imported(text).notes == ("no unit of lengths is given: they were read in m",)

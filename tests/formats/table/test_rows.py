@@ -251,3 +251,50 @@ def _x(length: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     T = np.eye(4)
     T[0, 3] = length
     return T
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells", "expected"),
+    [
+        ("Variable", ("θ", "θ", "d"), "rrp"), ("Joint variable", ("θ1", "$\\theta_2$", "d3"), "rrp"),
+        ("q", ("theta_1", "theta_2", "d_3"), "rrp"), ("var", ("θ1*", "d2*", "-"), "rpf"),
+        ("Variable", ("q1", "q2", "-"), "rrf"), ("Variable", ("d1", "", "θ3"), "pfr"),
+    ],
+)  # fmt: skip
+def test_a_column_that_names_the_variable_says_how_rows_move(
+    heading: str, cells: tuple[str, str, str], expected: str
+) -> None:
+    head = f"| a [m] | α [rad] | d [m] | θ [rad] | {heading} |\n|---|---|---|---|---|\n"
+    rows = ("0 | -π/2 | 0.4 | 0.1", "0 | π/2 | 0.15 | 0", "0 | 0 | 0.2 | -π/2")
+    text = head + "".join(f"| {row} | {cell} |\n" for row, cell in zip(rows, cells, strict=True))
+    found = imported(text, **STANDARD)
+    assert types(found.spec) == expected
+    assert numbers(found.spec) == [(0.1, 0.4, 0, -math.pi / 2), (0, 0.15, 0, math.pi / 2), (-math.pi / 2, 0.2, 0, 0)]
+
+
+def test_a_column_that_names_the_variable_may_stand_for_theta_too() -> None:
+    text = "i,a,alpha,d,Variable\n1,0,pi/2,0.4,θ1\n2,0,0,0.2,d2\n"
+    assert types(imported(text, "t.csv", **STANDARD).spec) == "rp"
+
+
+def test_a_variable_that_is_not_of_the_rows_type_is_refused() -> None:
+    text = "type,theta,d,a,alpha,variable\nR,0,0.1,0,0,d1\nP,0,0.1,0,0,d2\n"
+    assert complaints(text, "t.csv", **STANDARD) == [
+        "t.csv:2:13: row 1, variable: 'd1' is no variable of a revolute joint"
+    ]
+
+
+@pytest.mark.parametrize("empty", ["", "-", "—", "none", "N/A"])
+@pytest.mark.parametrize("theta", ["0", "q1"])
+def test_a_row_without_type_in_a_column_of_types_is_fixed(empty: str, theta: str) -> None:
+    text = _rows(f"1,R,0,90,0.1,{theta}", "2,P,0.3,0,0,0", f"tool,{empty},0,0,0.12,45",
+                 head="joint,type,a,alpha (deg),d,theta (deg)")  # fmt: skip
+    found = imported(text, "t.csv", **STANDARD)
+    assert types(found.spec) == "rpf"
+    assert found.spec.rows[2].theta == math.pi / 4
+    assert "row 3 has no variable: it was read as fixed" in found.notes
+
+
+def test_a_column_of_types_that_is_empty_throughout_says_nothing() -> None:
+    text = "type,theta,d,a,alpha\n,q1,0.1,0,0\n,q2,0.1,0,0\n"
+    assert types(imported(text, "t.csv", **STANDARD).spec) == "rr"
