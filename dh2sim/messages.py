@@ -71,11 +71,17 @@ def listed(names: Iterable[str], between: str = ", ") -> str:
     return between.join(first) or "none"
 
 
-def closest(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that ``name`` may be a slip of the pen for, or None."""
+def closest(name: str, known: Iterable[str], *, likeness: float = 0.6) -> str | None:
+    """Return the known name that ``name`` may be a slip of the pen for, or None.
+
+    Args:
+        name: What was found.
+        known: What could be meant.
+        likeness: Least ratio of ``difflib.SequenceMatcher``, 1 for equal names.
+    """
     if len(name) > _LONGEST_GUESSED:
         return None
-    return _closest(name.casefold(), tuple(itertools.islice(known, _MOST_GUESSED)))
+    return _closest(name.casefold(), tuple(itertools.islice(known, _MOST_GUESSED)), likeness)
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
@@ -85,9 +91,9 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 @functools.lru_cache(maxsize=100_000)
-def _closest(name: str, known: tuple[str, ...]) -> str | None:
+def _closest(name: str, known: tuple[str, ...], likeness: float) -> str | None:
     folded = {candidate.casefold(): candidate for candidate in known}
-    matches = difflib.get_close_matches(name, folded, n=1, cutoff=0.6)
+    matches = difflib.get_close_matches(name, folded, n=1, cutoff=likeness)
     return folded[matches[0]] if matches else None
 
 

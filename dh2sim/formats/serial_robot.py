@@ -10,7 +10,7 @@ from typing import Final
 
 from dh2sim.kinematics.serial_chain import SerialChain
 from dh2sim.messages import Notes, listed
-from dh2sim.model.mass import MassProperties, is_possible
+from dh2sim.model.mass import MassProperties, thickened
 from dh2sim.model.robot_model import Color
 from dh2sim.robot.fields import MESH_SUFFIXES
 from dh2sim.robot.spec import ActuatorSpec, Dynamics, Limits
@@ -123,10 +123,12 @@ class SerialRobot:
 
 def possible_inertial(whole: MassProperties, name: str, notes: Notes) -> Inertial:
     """Return the mass properties of a link; an inertia that no body can have is noted and left out."""
-    if is_possible(whole.inertia):
-        return Inertial(mass=whole.mass, com=whole.com, inertia=whole.inertia)
-    notes.group("Impossible inertias are left out, of links {}.", name)
-    return Inertial(mass=whole.mass, com=whole.com)
+    inertia = thickened(whole.inertia)
+    if inertia is None:
+        notes.group("Impossible inertias are left out, of links {}.", name)
+    elif inertia is not whole.inertia:
+        notes.group("Inertias of thin rods, zero about the rod, are made greater by 1e-9 of them, of links {}.", name)
+    return Inertial(mass=whole.mass, com=whole.com, inertia=inertia)
 
 
 def can_show(suffix: str, scale: Sequence[float], name: str, notes: Notes) -> bool:

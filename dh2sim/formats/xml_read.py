@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import dataclasses
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -32,6 +33,10 @@ MAX_PROBLEMS: Final = 100
 ENCODINGS: Final = ("utf-8", "us-ascii", "iso-8859-1", "utf-16", "utf-16le", "utf-16be", "windows-1252")
 
 _PIECE: Final = 65_536
+_BEFORE_DECLARATION: Final = re.compile(r"((?:[ \t\r\n]|<!--.*?-->)+)(<\?xml[ \t\r\n].*?\?>)", re.DOTALL)
+_LATER_MARK: Final = re.compile("^([ \t\r\n]*)\xef\xbb\xbf")
+"""A byte order mark of UTF-8 behind blanks, read as Latin-1."""
+_COMMENT: Final = re.compile(r"<!--(.*?)-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -116,16 +121,55 @@ def parse_xml(data: bytes, *, file: str) -> Element:
     """
     if len(data) > MAX_BYTES:
         raise _error(file, 1, 1, f"the file has {len(data)} bytes; at most {MAX_BYTES} are read")
-    data = data.removeprefix(codecs.BOM_UTF8)  # expat would count it as a column
+    data = _tolerated(data)
     builder = _Builder()
     try:
         _feed(builder, data)
     except _RefusedError as error:
         raise _error(file, error.line, error.column, error.message) from None
     except expat.ExpatError as error:
-        message = _not_utf_8(builder, data) or f"not well-formed XML: {expat.ErrorString(error.code)}"
+        message = _not_utf_8(builder, data) or _of_comment(builder, data)
+        message = message or f"not well-formed XML: {expat.ErrorString(error.code)}"
         raise _error(file, error.lineno, error.offset + 1, message) from None
     return builder.root()
+
+
+def _tolerated(data: bytes) -> bytes:
+    """Return a file with what expat alone refuses made right, every element at its place.
+
+    MuJoCo, urdfdom and other readers of robots accept blanks and comments before the declaration, and ``--`` in
+    comments. A byte order mark would count as a column.
+    """
+    data = data.removeprefix(codecs.BOM_UTF8)
+    is_utf_16 = data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    if not is_utf_16 and data[:1] not in b" \t\r\n\xef" and b"<!--" not in data:
+        return data
+    encoding = "utf-16" if is_utf_16 else "latin-1"  # which keeps every byte
+    try:
+        text = data.decode(encoding)
+    except UnicodeDecodeError:
+        return data
+    if not is_utf_16:
+        text = _LATER_MARK.sub(r"\1", text)
+    return _COMMENT.sub(_without_dashes, _declared_first(text)).encode(encoding)
+
+
+def _declared_first(text: str) -> str:
+    """Return a text with its declaration moved to the front, and blanks in its place."""
+    found = _BEFORE_DECLARATION.match(text)
+    if found is None:
+        return text
+    before, declaration = found.groups()
+    on_line_1 = not any(end in before + declaration for end in "\r\n")
+    blanks = "" if on_line_1 else re.sub(r"[^\r\n]", " ", declaration)
+    return re.sub(r"\s", " ", declaration) + before + blanks + text[found.end() :]
+
+
+def _without_dashes(comment: re.Match[str]) -> str:
+    inside = comment.group(1)
+    if inside is None or not ("--" in inside or inside.endswith("-")):
+        return comment.group()
+    return f"<!--{inside.replace('-', ' ')}-->"
 
 
 def _feed(builder: _Builder, data: bytes) -> None:
@@ -233,6 +277,20 @@ def _not_utf_8(builder: _Builder, data: bytes) -> str | None:
         if error.start == at:
             declaration = '<?xml version="1.0" encoding="iso-8859-1"?>'
             return f"not UTF-8: byte 0x{data[at]:02x}; name the file's encoding: {declaration}"
+    return None
+
+
+def _of_comment(builder: _Builder, data: bytes) -> str | None:
+    """Return the message where a comment is what is wrong, else None."""
+    at = builder.parser.ErrorByteIndex
+    start = data.rfind(b"<!--", 0, at + 4)
+    if start >= 0 and b"-->" not in data[start + 4 :]:
+        line = data.count(b"\n", 0, start) + 1
+        return f"not well-formed XML: the comment that begins on line {line} has no end '-->'"
+    if data.startswith(b"<!--", at):
+        return "not well-formed XML: a comment cannot stand inside a tag"
+    if re.search(rb"<!(?!--)[ \t]*-", data[max(at - 3, 0) : at + 3]):
+        return "not well-formed XML: a comment begins with '<!--'"
     return None
 
 

@@ -9,6 +9,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from dh2sim.kinematics.chain import Joint
 from dh2sim.kinematics.transforms import move_point, rotate_tensor
 from dh2sim.model.shapes import Shape, ShapeKind
@@ -20,6 +22,10 @@ ROUNDING = (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """Shares of its trace by which an inertia may be mended: numbers in robot files are rounded."""
 ASSUMED_DENSITY = 1000.0
 """kg/m³: a hollow arm with its motors is closer to water than to aluminium."""
+THIN = 1e-12
+"""Share of its trace below which a moment of inertia is zero but for rounding."""
+THICKNESS = 1e-9
+"""Share of its trace by which the inertia of a thin rod is made greater."""
 MIN_MASS = 1e-9
 """kg: estimates are no smaller."""
 MIN_INERTIA = 1e-14
@@ -108,6 +114,26 @@ def made_possible(inertia: Array) -> Array:
                 [[float(inertia[i, j]) + (extra if i == j else 0.0) for j in range(3)] for i in range(3)]
             )
     return inertia
+
+
+def thickened(inertia: Array) -> Array | None:
+    """Return the inertia, shape (3, 3), of a thin rod with a moment about the rod that survives being turned.
+
+    That of an ideal rod is 0; rounding leaves it a little above or below, where turning the axes may make it the
+    other. Every moment is greater by 1e-9 of the trace then. Other inertias are returned as they are.
+
+    Returns:
+        None where no body has such an inertia.
+    """
+    scale = float(np.abs(inertia).max())
+    if not 0.0 < scale < math.inf:
+        return None
+    trace = float(inertia[0, 0]) + float(inertia[1, 1]) + float(inertia[2, 2])
+    least = float(np.linalg.eigvalsh(inertia / scale)[0]) * scale
+    if abs(least) <= THIN * trace:
+        extra = THICKNESS * trace
+        inertia = read_only([[float(inertia[i, j]) + (extra if i == j else 0.0) for j in range(3)] for i in range(3)])
+    return inertia if is_possible(inertia) else None
 
 
 def at_least(inertia: Array, least: float) -> Array:

@@ -158,4 +158,6 @@ def _check_gains(actuator: Any, loc: Loc, inherited: Any, scope: Scope) -> Any:
         if gain in actuator and isinstance(kind, str) and kind not in kinds:
             message = f"an actuator of type '{kind}' takes no {gain}; {gain} is for {' and '.join(kinds)}"
             scope.report((*loc, gain), message, at_key=True)
+    if kind == "velocity" and actuator.get("kv") == 0.0:
+        scope.report((*loc, "kv"), "must be greater than 0 for an actuator of type 'velocity', found 0")
     return kind

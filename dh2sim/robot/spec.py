@@ -257,9 +257,10 @@ class ActuatorSpec:
         ActuatorType, Choice("What the control signal is; default position.", ActuatorType, inherited=True)
     ] = ActuatorType.POSITION
     kp: Annotated[float | None, Number("Position gain, N·m/rad or N/m; for position.", above=0)] = None
-    kv: Annotated[float | None, Number("Velocity gain, N·m·s/rad or N·s/m; for position and velocity.", above=0)] = (
-        None
-    )
+    kv: Annotated[
+        float | None,
+        Number("Velocity gain, N·m·s/rad or N·s/m; for position (0: no damping) and velocity (not 0).", least=0),
+    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -59,6 +59,47 @@ def test_a_byte_order_mark_is_no_column() -> None:
     assert parse("\ufeff<a/>").column == 1
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "iso-8859-1"])
+@pytest.mark.parametrize(
+    ("before", "between", "place"),
+    [
+        ("\n", "\n", (3, 2)),
+        ("\r\n\t\n", "\n\n", (5, 2)),
+        ("<!-- of -- me -->\n", "\n", (3, 2)),
+        ("\n", " <!-- -->\n", (3, 2)),
+        ("  ", "\n", (2, 2)),
+    ],
+)
+def test_blanks_and_comments_before_the_declaration_move_no_element(
+    encoding: str, before: str, between: str, place: tuple[int, int]
+) -> None:
+    root = parse(f'{before}<?xml version="1.0" encoding="{encoding}"?>{between} <a name="é"/>'.encode(encoding))
+    assert (root.attributes["name"], root.line, root.column) == ("é", *place)
+
+
+@pytest.mark.parametrize(
+    ("text", "column"),
+    [
+        (' <?xml version="1.0"?><a/>', 23),
+        ('\n<?xml version="1.0"?><a/>', 22),
+        ("\n\ufeff<?xml version='1.0'?>\n<a/>", 1),
+    ],
+)
+def test_a_declaration_behind_blanks_keeps_the_columns_of_its_line(text: str, column: int) -> None:
+    assert parse(text).column == column
+
+
+@pytest.mark.parametrize(
+    "comment", ["<!-- ---- links ---- -->", "<!----->", "<!-- a --->", "<!-- <!-- -->", "<!------ é\n -- ------>"]
+)
+def test_dashes_in_a_comment_hide_no_element_and_move_none(comment: str) -> None:
+    root = parse(f"<a>{comment}<b/>\n<![CDATA[<!-- -- ]]><c/></a>")
+    last = comment.rpartition("\n")[2]
+    b, c = root.children
+    assert (b.tag, b.line, c.tag, c.column) == ("b", 1 + comment.count("\n"), "c", 21)
+    assert b.column == len(last.encode("utf-8")) + (4 if last == comment else 1)
+
+
 def test_a_file_of_another_encoding_than_it_says_is_refused_with_a_way_out() -> None:
     hint = 'name the file\'s encoding: <?xml version="1.0" encoding="iso-8859-1"?>'
     assert refused('<a>\n <b c="é"/></a>'.encode("latin-1")) == f"a.xml:2:8: not UTF-8: byte 0xe9; {hint}"
@@ -87,7 +128,15 @@ def test_an_encoding_that_is_not_read_is_named() -> None:
         ("<a>\n &x;</a>", "2:2: not well-formed XML: undefined entity"),
         ('<a b="&x;"/>', "1:1: not well-formed XML: undefined entity"),
         ("<a>&#27;</a>", "1:4: not well-formed XML: reference to invalid character number"),
-        ('\n<?xml version="1.0"?><a/>', "2:1: not well-formed XML: XML or text declaration not at start of entity"),
+        (
+            "<a>\n<?xml version='1.0'?></a>",
+            "2:1: not well-formed XML: XML or text declaration not at start of entity",
+        ),
+        ("<a>\n<!-- x <b/></a>", "2:1: not well-formed XML: the comment that begins on line 2 has no end '-->'"),
+        ("<a>\n<!--\n-- > <b/></a>", "3:3: not well-formed XML: the comment that begins on line 2 has no end '-->'"),
+        ("<a>\n<b <!-- x --> c='d'/></a>", "2:4: not well-formed XML: a comment cannot stand inside a tag"),
+        ("<a>\n<! -- x --></a>", "2:3: not well-formed XML: a comment begins with '<!--'"),
+        ("<a>\n<!- x --></a>", "2:4: not well-formed XML: a comment begins with '<!--'"),
         ("name: arm\njoints: []", "1:1: not well-formed XML: syntax error"),
     ],
 )

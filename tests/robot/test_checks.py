@@ -165,6 +165,16 @@ def test_an_actuator_takes_only_the_gains_of_its_type() -> None:
     ]
 
 
+def test_a_position_servo_may_have_no_damping_and_a_velocity_servo_must_have_a_gain() -> None:
+    assert _complaints("{type: revolute, actuator: {kp: 5, kv: 0}}") == []
+    assert _complaints("{type: revolute, actuator: {type: velocity, kv: 0}}") == [
+        "r.yaml:4:51: joints[0].actuator.kv: must be greater than 0 for an actuator of type 'velocity', found 0"
+    ]
+    assert _complaints("{type: revolute, actuator: {kv: 0}}", more="actuators: {type: velocity}\n") == [
+        "r.yaml:4:35: joints[0].actuator.kv: must be greater than 0 for an actuator of type 'velocity', found 0"
+    ]
+
+
 def test_a_joint_without_an_actuator_type_has_that_of_the_file() -> None:
     assert _complaints("{type: revolute, actuator: {kv: 1}}", more="actuators: {type: none}\n") == [
         "r.yaml:4:31: joints[0].actuator.kv: an actuator of type 'none' takes no kv; kv is for position and velocity"

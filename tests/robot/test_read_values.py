@@ -180,7 +180,7 @@ def test_the_error_of_a_file_without_a_mapping_says_what_belongs_there(text: str
             "4:33: joints[0].link.inertia: no body has the principal moments 1, 1, 2.1: two make less than the third",
         ),
         ("{type: revolute, actuator: {kp: 0}}", "4:35: joints[0].actuator.kp: must be greater than 0, found 0"),
-        ("{type: revolute, actuator: {kv: -1}}", "4:35: joints[0].actuator.kv: must be greater than 0, found -1"),
+        ("{type: revolute, actuator: {kv: -1}}", "4:35: joints[0].actuator.kv: must not be negative, found -1"),
         (
             "{type: revolute, actuator: {type: pid}}",
             "4:37: joints[0].actuator.type: found 'pid'. Allowed: position, velocity, motor, none",

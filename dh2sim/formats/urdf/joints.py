@@ -25,17 +25,15 @@ from dh2sim.robot.spec import Dynamics, JointType, Limits
 from dh2sim.typing import read_only
 
 _LIMITS: Final = ("lower", "upper", "effort", "velocity")
-_ELEMENTS: Final = (
-    "origin",
-    "parent",
-    "child",
-    "axis",
-    "limit",
-    "dynamics",
-    "mimic",
-    "calibration",
-    "safety_controller",
-)
+_ATTRIBUTES: Final = {"origin": ("xyz", "rpy"), "axis": ("xyz",), "limit": _LIMITS, "dynamics": DYNAMICS}
+"""Of the elements that are read."""
+_NEEDED: Final = ("origin", "axis", "limit", "dynamics", "mimic")
+"""Elements without which a joint that moves would be another one; of a fixed joint it is the first."""
+_ELEMENTS: Final = (*_NEEDED, "parent", "child", "calibration", "safety_controller")
+_SLIP: Final = 0.75
+"""Likeness of a name to a missing one from which it is taken for a slip of the pen."""
+_SLIP_OF_OPTIONAL: Final = 0.85
+"""Likewise, where what is missing need not be given."""
 _UNIT: Final = 1e-3
 """By which an axis may miss length 1 without a note: files print a few digits."""
 
@@ -46,6 +44,7 @@ def read_joints(selection: Selection, report: XmlReport, notes: Notes) -> ChainJ
     joints, limits, dynamics = [], [], []
     for joint in selection.joints:
         _check_elements(joint, report)
+        _note_foreign(joint, notes)
         T = compose(T, read_pose(joint.element, joint.path, report))
         if not joint.moves:
             continue
@@ -64,20 +63,32 @@ def read_joints(selection: Selection, report: XmlReport, notes: Notes) -> ChainJ
 
 def _check_elements(joint: UrdfJoint, report: XmlReport) -> None:
     """Complain of a misspelt element, without which the joint would silently be another one."""
+    missing = [tag for tag in (_NEEDED if joint.moves else _NEEDED[:1]) if joint.element.first(tag) is None]
     for element in joint.element.children:
-        if (meant := _misspelt(element.tag, _ELEMENTS)) is not None:
+        meant = None if element.tag in _ELEMENTS else closest(element.tag, missing, likeness=_SLIP)
+        if meant is not None:
             report.add(element, joint.path, f"unknown element <{element.tag[:60]}>. Did you mean <{meant}>?")
 
 
-def _check_attributes(element: Element, known: Sequence[str], path: str, report: XmlReport) -> None:
-    """Complain of a misspelt attribute; others are meant for other programs."""
+def _check_attributes(
+    element: Element, known: Sequence[str], path: str, report: XmlReport, *, likeness: float = _SLIP
+) -> None:
+    """Complain of an attribute that is misspelt, so that one is missing; others are meant for other programs."""
+    missing = [name for name in known if name not in element.attributes]
     for name in element.attributes:
-        if (meant := _misspelt(name, known)) is not None:
+        meant = None if name in _ATTRIBUTES[element.tag] else closest(name, missing, likeness=likeness)
+        if meant is not None:
             report.add(element, path, f"unknown attribute {shown(name)}. Did you mean '{meant}'?")
 
 
-def _misspelt(name: str, known: Sequence[str]) -> str | None:
-    return None if name in known else closest(name, known)
+def _note_foreign(joint: UrdfJoint, notes: Notes) -> None:
+    """Note attributes of other programs; elements are noted for the whole file."""
+    for element in joint.element.children:
+        known = _ATTRIBUTES.get(element.tag, ())
+        foreign = [name for name in element.attributes if known and name not in known]
+        if foreign:
+            names = f"<{element.tag} {' '.join(name[:60] for name in foreign)}>"
+            notes.group("Attributes that URDF does not have are ignored, of joints {}.", joint.name, names)
 
 
 def _type(joint: UrdfJoint, report: XmlReport) -> JointType:
@@ -101,7 +112,8 @@ def _limits(joint: UrdfJoint, kind: JointType, report: XmlReport, notes: Notes) 
         if kind is not JointType.CONTINUOUS:
             notes.group("No position limits are given for joints {}.", joint.name)
         return Limits()
-    _check_attributes(element, _LIMITS, path, report)
+    needed = _LIMITS[2:] if kind is JointType.CONTINUOUS else _LIMITS
+    _check_attributes(element, needed, path, report)
     return Limits(
         position=_position(element, joint.name, kind, path, report, notes),
         velocity=_positive(element, "velocity", joint.name, path, report, notes),
@@ -148,7 +160,7 @@ def _dynamics(joint: UrdfJoint, report: XmlReport, notes: Notes) -> Dynamics:
     element = read_only_child(joint.element, "dynamics", joint.path, report)
     if element is None:
         return Dynamics()
-    _check_attributes(element, DYNAMICS, f"{joint.path}.dynamics", report)
+    _check_attributes(element, DYNAMICS, f"{joint.path}.dynamics", report, likeness=_SLIP_OF_OPTIONAL)
     values = {}
     for attribute in DYNAMICS:
         value = 0.0

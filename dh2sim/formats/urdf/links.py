@@ -17,7 +17,7 @@ from dh2sim.formats.urdf.tree import UrdfJoint, UrdfTree, read_number, read_numb
 from dh2sim.formats.xml_read import Element, XmlReport, place
 from dh2sim.kinematics.transforms import compose, identity, move_point, rotate_tensor
 from dh2sim.messages import Notes, shown
-from dh2sim.model.mass import MassProperties, combine, is_possible
+from dh2sim.model.mass import MassProperties, combine, thickened
 from dh2sim.model.robot_model import Color
 from dh2sim.typing import Array, read_only
 
@@ -161,7 +161,7 @@ def _read_part(part: Part, report: XmlReport, notes: Notes) -> tuple[MassPropert
     if mass <= 0.0:
         return None
     com = read_only(move_point(T, read_only([0, 0, 0])))
-    if tensor is not None and not is_possible(tensor):
+    if tensor is not None and thickened(tensor) is None:
         notes.group("Impossible inertias are left out, of links {}.", part.name)
         tensor = None
     elif tensor is None:

@@ -15,6 +15,7 @@ from dh2sim.formats.urdf.chain import Selection, select_chain
 from dh2sim.formats.urdf.joints import read_joints
 from dh2sim.formats.urdf.links import Body, read_bodies, read_inertial, read_look, read_materials, weight_of
 from dh2sim.formats.urdf.tree import UrdfJoint, UrdfTree, read_pose, read_tree
+from dh2sim.formats.xacro import is_definition
 from dh2sim.formats.xml_read import XmlReport, parse_xml
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.messages import Notes, listed, shown
@@ -61,7 +62,12 @@ def _kind(joint: UrdfJoint) -> str:
 def _note_elements(tree: UrdfTree, notes: Notes) -> None:
     counts: Counter[str] = Counter()
     for owner in (tree.robot, *tree.robot.all("link"), *tree.robot.all("joint")):
-        counts.update(element.tag for element in owner.children if element.tag not in _CARRIED[owner.tag])
+        for element in owner.children:
+            if is_definition(element, tree.robot):
+                name = element.attributes.get("name", "")
+                notes.group("Definitions for xacro that nothing needs are left out: {}.", name, element.tag[:60])
+            elif element.tag not in _CARRIED[owner.tag]:
+                counts[element.tag] += 1
     if loops := counts.pop("loop_joint", 0):
         notes.add(f"The file closes loops with {loops} <loop_joint>; the arm is read as if it were open.")
     if counts:

@@ -14,9 +14,10 @@ from typing import Final
 
 from dh2sim.formats.arm import LinkTree
 from dh2sim.formats.serial_robot import GREATEST
+from dh2sim.formats.xacro import unexpanded
 from dh2sim.formats.xml_read import Element, XmlReport, place
 from dh2sim.kinematics.transforms import identity, pose_from_rpy
-from dh2sim.messages import listed, shown
+from dh2sim.messages import closest, listed, shown
 from dh2sim.typing import Array, read_only
 
 _BLANK: Final = re.compile(r"[ \t\r\n]+")
@@ -66,7 +67,7 @@ def read_numbers(
 def read_pose(owner: Element, path: str, report: XmlReport) -> Array:
     """Return the pose that an element's ``<origin>`` gives, shape (4, 4); the identity where there is none.
 
-    An unknown attribute is a problem, because the pose would silently be another one.
+    An unknown attribute that may hold a part of the pose is a problem: it would silently be another one.
     """
     origin = read_only_child(owner, "origin", path, report)
     if origin is None:
@@ -110,10 +111,16 @@ def read_only_child(owner: Element, tag: str, path: str, report: XmlReport) -> E
 
 
 def check_attributes(element: Element, allowed: tuple[str, ...], path: str, report: XmlReport) -> None:
-    """Complain of every attribute that is not known."""
-    for name in element.attributes:
-        if name not in allowed:
-            hint = report.guess(name, allowed)
+    """Complain of an unknown attribute in place of a missing one: a slip of the pen, or numbers in another form.
+
+    Others are meant for other programs, and ignored by every reader.
+    """
+    missing = tuple(name for name in allowed if name not in element.attributes)
+    for name, text in element.attributes.items():
+        if name in allowed or not missing:
+            continue
+        if closest(name, missing) or len(text.split()) >= 3:
+            hint = report.guess(name, missing)
             report.add(element, path, f"unknown attribute {shown(name)}.{hint} Allowed: {listed(allowed)}")
 
 
@@ -138,9 +145,6 @@ def _plain(word: str) -> float:
 DYNAMICS: Final = ("damping", "friction")
 """What a URDF holds of a joint's dynamics, by the names of a robot file."""
 JOINT_TYPES: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-
-_EXPANDED: Final = ("link", "joint", "material")
-"""Elements of a robot whose attributes xacro has filled in; others may keep ``$(...)`` for other programs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -231,22 +235,9 @@ def _check_root(robot: Element, report: XmlReport) -> None:
 
 def _check_expanded(robot: Element, report: XmlReport) -> None:
     """Complain of the first thing that xacro has not replaced."""
-    prefixes = [
-        name.partition(":")[2] for name, uri in robot.attributes.items() if name[:6] == "xmlns:" and "xacro" in uri
-    ]
-    starts = tuple(f"{prefix}:" for prefix in ["xacro", *prefixes])
-    for child in (robot, *robot.children):
-        for element in [robot] if child is robot else child.walk():
-            found = None
-            if element.tag.startswith(starts):
-                found = f"<{element.tag[:60]}>"
-            elif child.tag in _EXPANDED:
-                found = next(
-                    (shown(text) for text in element.attributes.values() if "${" in text or "$(" in text), None
-                )
-            if found is not None:
-                report.add(element, "", f"found {found}: this is xacro. Expand it first: xacro FILE > out.urdf")
-                return
+    found = unexpanded(robot)
+    if found is not None:
+        report.add(found.element, "", f"found {found.what}: this is xacro. Expand it first: xacro FILE > out.urdf")
 
 
 def _links(robot: Element, report: XmlReport) -> dict[str, Element]:

@@ -199,11 +199,31 @@ def test_light_parts_of_unknown_inertia_are_points_and_heavy_ones_make_the_whole
     ]
 
 
-def test_an_inertia_that_is_lost_in_rounding_when_parts_are_combined_is_left_out() -> None:
+def test_two_points_of_which_rounding_has_lost_the_extent_make_a_thin_rod() -> None:
     point = '<mass value="1e20"/><inertia ixx="1" iyy="1" izz="1"/>'
     found = weighed(f'<origin xyz="1 0.3 -0.7"/>{point}', f'<origin xyz="0 1.1 0.9"/>{point}')
-    assert (found.links[0].mass, found.links[0].inertia) == (2e20, None)
-    assert mass_notes(found) == ["Impossible inertias are left out, of links 'link_0'."]
+    inertia = np.asarray(found.links[0].inertia)
+    assert found.links[0].mass == 2e20
+    assert np.linalg.eigvalsh(inertia / np.trace(inertia)) == pytest.approx([0.0, 0.5, 0.5], abs=2e-9)
+    assert mass_notes(found) == [
+        "Inertias of thin rods, zero about the rod, are made greater by 1e-9 of them, of links 'link_0'."
+    ]
+
+
+@pytest.mark.parametrize(
+    ("inertia", "note"),
+    [
+        ('ixx="0" iyy="1e-3" izz="1e-3"', "Inertias of thin rods"),
+        ('ixx="-1e-20" iyy="1e-3" izz="1e-3"', "Inertias of thin rods"),
+        ('ixx="-1e-8" iyy="1e-3" izz="1e-3"', "Impossible inertias are left out"),
+        ('ixx="0" iyy="1e-3" izz="2e-3"', "Impossible inertias are left out"),
+        ('ixx="0" iyy="0" izz="0"', "Impossible inertias are left out"),
+    ],
+)
+def test_a_rod_without_thickness_is_a_body_and_less_than_that_is_none(inertia: str, note: str) -> None:
+    found = weighed(f'<origin rpy="0.3 0.4 0.5"/><mass value="1"/><inertia {inertia}/>')
+    assert any(sentence.startswith(note) for sentence in mass_notes(found))
+    assert (found.links[0].inertia is None) == note.startswith("Impossible")
 
 
 def test_a_mass_that_cannot_be_read_is_an_error_on_the_arm() -> None:

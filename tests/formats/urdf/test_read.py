@@ -215,11 +215,67 @@ def test_a_misspelt_element_or_attribute_of_a_joint_is_refused() -> None:
     assert problems(robot(links("a", "b"), joint("j", "a", "b", inside=inside))) == [
         "arm.urdf:3:68: joint[j]: unknown element <orgin>. Did you mean <origin>?",
         "arm.urdf:3:88: joint[j]: unknown element <axes>. Did you mean <axis>?",
-        "arm.urdf:3:107: joint[j]: unknown element <Limit>. Did you mean <limit>?",
         "arm.urdf:3:115: joint[j].limit: unknown attribute 'lowr'. Did you mean 'lower'?",
         "arm.urdf:3:115: joint[j].limit: unknown attribute 'uper'. Did you mean 'upper'?",
         "arm.urdf:3:142: joint[j].dynamics: unknown attribute 'dampening'. Did you mean 'damping'?",
     ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "inside"),
+    [
+        ("revolute", '<limit lower="-1" upper="1" velocity="2" effort="3" k_velocity="4" lower_soft="1"/>'),
+        ("revolute", '<limit lower="-1" upper="1" velocity="2" effort="3"/><Limit/><limits/><joint_limits/>'),
+        ("revolute", '<limit lower="-1" upper="1" velocity="2" effort="3"/><traits/><controller_gains kp="1"/>'),
+        ("revolute", '<limit lower="-1" upper="1" velocity="2" effort="3"/><dynamics frictionloss="1" damping="0"/>'),
+        ("continuous", '<limit effort="3" velocity="2" lower_bound="1" uper="2"/>'),
+        ("continuous", '<origin xyz="0 0 0" rpy="0 0 0" rpyy="1 2 3" name="place"/>'),
+        ("continuous", '<origin name="place" unit="m"/><axis xyz="1 0 0" rpy="1 2 3" name="x"/>'),
+        ("fixed", "<axes/><Limit/><dynamic/>"),
+    ],
+)
+def test_names_of_other_programs_are_no_slips_where_nothing_is_missing(kind: str, inside: str) -> None:
+    arm = robot(links("a", "b", "c"), joint("j", "a", "b", kind, inside), joint("k", "b", "c"))
+    plain = robot(links("a", "b", "c"), joint("j", "a", "b", kind), joint("k", "b", "c"))
+    found, expected = read(arm, tip="c"), read(plain, tip="c")
+    q = np.full(found.chain.n, 0.3)
+    assert np.array_equal(serial_link_poses(found.chain, q), serial_link_poses(expected.chain, q))
+    assert any("are ignored" in note or "not carried over" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("kind", "inside", "problem"),
+    [
+        ("revolute", '<limit lower="-1" upper="1" k_velocity="4" effort="3"/>', "Did you mean 'velocity'?"),
+        ("continuous", '<limit efort="3" velocity="2"/>', "Did you mean 'effort'?"),
+        ("continuous", '<axis rpy="1 2 3"/>', "unknown attribute 'rpy'. Allowed: xyz"),
+        (
+            "continuous",
+            '<origin xyz="1 2 3" quat_xyzw="0 0 0 1"/>',
+            "unknown attribute 'quat_xyzw'. Allowed: xyz, rpy",
+        ),
+        ("continuous", '<limits effort="1"/>', "Did you mean <limit>?"),
+        ("fixed", '<orign xyz="1 2 3"/>', "Did you mean <origin>?"),
+    ],
+)
+def test_a_name_in_place_of_a_missing_one_is_a_slip(kind: str, inside: str, problem: str) -> None:
+    [found] = problems(robot(links("a", "b", "c"), joint("j", "a", "b", kind, inside), joint("k", "b", "c")))
+    assert problem in found
+
+
+def test_definitions_that_xacro_left_behind_are_noted() -> None:
+    xacro = 'r" xmlns:xacro="http://www.ros.org/wiki/xacro'
+    left = '<xacro:property name="w" value="${2*pi}"/><xacro:arg name="p" default=""/>'
+    macro = '<xacro:macro name="m" params="a"><link name="${a}"/><xacro:n/></xacro:macro>'
+    inside = '<xacro:property name="x" value="1"/><limit lower="-1" upper="1" velocity="2" effort="3"/>'
+    found = read(robot(left, macro, links("a", "b"), joint("j", "a", "b", inside=inside), name=xacro))
+    assert found.chain.n == 1
+    assert (
+        "Definitions for xacro that nothing needs are left out: 'w' (xacro:property), 'p' (xacro:arg), "
+        "'m' (xacro:macro), 'x' (xacro:property)." in found.notes
+    )
+    [problem] = problems(robot(macro, links("a", "b"), joint("j", "a", "b"), '<m a="c"/>', name=xacro))
+    assert "found <m>: this is xacro" in problem
 
 
 def test_xacro_that_is_not_expanded_is_refused_with_what_to_do() -> None:
