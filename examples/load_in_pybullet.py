@@ -1,4 +1,4 @@
-"""Load an exported URDF in PyBullet, and compare its poses and its inertia with MuJoCo and the table.
+"""Load an exported URDF in PyBullet, and compare its poses, torques and inertia with the table and MuJoCo.
 
 Needs PyBullet: pip install pybullet
 """
@@ -22,8 +22,10 @@ bullet.connect(bullet.DIRECT)
 body = bullet.loadURDF(
     f"build/{robot.name}/{robot.name}.urdf",
     useFixedBase=True,
-    flags=bullet.URDF_USE_INERTIA_FROM_FILE,  # or else PyBullet estimates the inertia from the collision shapes
+    # or else PyBullet estimates the inertia from the collision shapes; URDF_MERGE_FIXED_LINKS would misplace masses
+    flags=bullet.URDF_USE_INERTIA_FROM_FILE,
 )
+bullet.setGravity(*robot.spec.gravity)
 joints: dict[str, int] = {}
 links: dict[str, int] = {}
 for index in range(bullet.getNumJoints(body)):
@@ -31,25 +33,25 @@ for index in range(bullet.getNumJoints(body)):
     joints[info[1].decode()] = index
     links[info[12].decode()] = index  # PyBullet numbers a link like the joint that carries it
 
-# PyBullet gives 1 kg to every link without mass: to the frames dh_0 … dh_n, base, flange and tool0
-for name, index in links.items():
-    if not name.startswith("link_"):
-        bullet.changeDynamics(body, index, mass=0.0, localInertiaDiagonal=(0.0, 0.0, 0.0))
-
 model = robot.mjmodel()
 data = mujoco.MjData(model)
-distance = inertia_error = 0.0
+rest = [0.0] * robot.n
+distance = torque_error = inertia_error = 0.0
 for q in robot.random_configurations(100, seed=2):
     for row, value in zip(robot.spec.moving_rows, q, strict=True):
         bullet.resetJointState(body, joints[row.name], value)
     state = bullet.getLinkState(body, links["tool0"], computeForwardKinematics=True)
-    distance = max(distance, float(np.linalg.norm(state[4] - robot.fk(q)[:3, 3])))
+    # the centre of mass, which is tool0 itself, in double precision; state[4], the link's frame, is rounded to single
+    distance = max(distance, float(np.linalg.norm(state[0] - robot.fk(q)[:3, 3])))
     data.qpos[:] = q
     mujoco.mj_forward(model, data)
     mass_matrix = np.zeros((robot.n, robot.n))
     mujoco.mj_fullM(model, data, mass_matrix)
+    holding = np.asarray(bullet.calculateInverseDynamics(body, q.tolist(), rest, rest))
+    torque_error = max(torque_error, float(np.abs(holding - data.qfrc_bias).max()))
     difference = np.asarray(bullet.calculateMassMatrix(body, q.tolist())) - mass_matrix
     inertia_error = max(inertia_error, float(np.abs(difference).max()))
 bullet.disconnect()
-print(f"tool0 in PyBullet and by the table: at most {distance:.1e} m apart (PyBullet's poses are single precision)")
+print(f"tool0 in PyBullet and by the table: at most {distance:.1e} m apart")
+print(f"torques that hold the arm in PyBullet and MuJoCo: at most {torque_error:.1e} N·m apart")
 print(f"mass matrices of PyBullet and MuJoCo: at most {inertia_error:.1e} kg·m² apart")

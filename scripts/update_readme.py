@@ -2,7 +2,7 @@
 """Update the pages that show what commands print, and the accuracy table of docs/validation.md.
 
 Every block of README.md and docs/importing.md that begins with ``$ dh2sim …`` is run, all of a page in one folder and
-80 columns wide, without the optional engine pinocchio, which README's first line does not install. The accuracy table
+80 columns wide, without the optional engines that README's first line does not install. The accuracy table
 shows the worst pose error of every engine on every robot at 1000 configurations; its last digits vary by machine.
 """
 
@@ -30,7 +30,8 @@ MARKDOWN = re.compile(r"^```markdown\n(.*?)^```", flags=re.MULTILINE | re.DOTALL
 ROBOT_FILE = re.compile(r"^```yaml\n(name: my_arm\n.*?)^```", flags=re.MULTILINE | re.DOTALL)
 MISTAKES = (("alpha: 90,", "alfa: 90,"), ("[0.1, 1.2]", "[1.2, 0.1]"))
 """What is wrong in the robot file whose errors README.md shows."""
-NO_PINOCCHIO = """raise ModuleNotFoundError("No module named 'pinocchio'", name="pinocchio")\n"""
+ABSENT = ("pinocchio", "pybullet")
+NO_MODULE = """raise ModuleNotFoundError("No module named '{0}'", name="{0}")\n"""
 
 
 def wrong_robot() -> str:
@@ -57,11 +58,12 @@ def files() -> dict[str, str]:
 
 
 def run(command: str, folder: Path) -> str:
-    """Run a command as if pinocchio were not installed, and return what it prints, its errors behind its results."""
+    """Run a command without the engines in ``ABSENT``, and return what it prints, its errors behind its results."""
     program, *arguments = command.split()
     assert program == "dh2sim"
     with TemporaryDirectory() as hiding:
-        Path(hiding, "pinocchio.py").write_text(NO_PINOCCHIO, encoding="utf-8")
+        for module in ABSENT:
+            Path(hiding, f"{module}.py").write_text(NO_MODULE.format(module), encoding="utf-8")
         path = os.pathsep.join(filter(None, [hiding, str(ROOT), os.environ.get("PYTHONPATH")]))
         done = subprocess.run(
             [sys.executable, "-m", "dh2sim", *arguments],

@@ -23,7 +23,11 @@ ERRORS: dict[str, dict[str, float]] = {
     "export_to_mujoco": {r"by the table: (\S+) m apart": 1e-14},
     "import_urdf": {r"axis: at most (\S+) m apart": 1e-12},
     "inverse_kinematics_with_mink": {r"off the goal by (\S+) m": 1e-6},
-    "load_in_pybullet": {r"by the table: at most (\S+) m": 1e-6, r"MuJoCo: at most (\S+) kg": 1e-12},
+    "load_in_pybullet": {
+        r"by the table: at most (\S+) m": 1e-14,
+        r"MuJoCo: at most (\S+) N·m": 1e-12,
+        r"MuJoCo: at most (\S+) kg": 1e-12,
+    },
     "own_controller": {},
     "robot_in_code": {r"urdf: off the table by at most (\S+) m": 1e-14, r"mjcf: .* at most (\S+) m": 1e-14},
     "rollouts_to_xarray": {r"joint_1 follows its reference to within (\S+)": 0.01},

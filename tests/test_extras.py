@@ -28,6 +28,7 @@ MODULES = {
 """What is imported of each extra's libraries."""
 BROUGHT = {
     "pinocchio",
+    "pybullet",
     "pandas",
     "scipy",
     "qpsolvers",
@@ -39,7 +40,7 @@ BROUGHT = {
     "shapely",
     "embreex",
 }
-"""Some of what they bring along, and an engine that comes with none of them."""
+"""Some of what they bring along, and engines that come with none of them."""
 OPTIONAL = {*BROUGHT, *(module for modules in MODULES.values() for module in modules)}
 AXES = """\
 name: two_joints

@@ -19,7 +19,7 @@ URDF = Path(__file__).resolve().parent.parent / "generated" / "rpr" / "rpr.urdf"
 RUNS = {"zarr", "numcodecs", "google_crc32c"}
 TABLES = {"xarray", "pandas", "pyarrow", "h5netcdf", "h5py"}
 PICTURES = {"matplotlib", "PIL", "imageio_ffmpeg"}
-MODELS = {"trimesh", "yourdfpy", "pinocchio", "scipy", "lxml"}
+MODELS = {"trimesh", "yourdfpy", "pinocchio", "pybullet", "scipy", "lxml"}
 VIEWER = {"viser", "mink", "websockets", "requests"}
 HEAVY = {"numpy", "mujoco", "pydantic", "ruamel", "rich", *RUNS, *TABLES, *PICTURES, *MODELS, *VIEWER}
 
@@ -125,7 +125,7 @@ def test_light_work_imports_nothing_heavy(code: str, allowed: set[str]) -> None:
 @pytest.mark.slow
 def test_an_export_imports_neither_mesh_library_nor_other_engines(tmp_path: Path) -> None:
     arguments = ["export", "stanford", "--out", str(tmp_path)]
-    assert not _imported(RUN.format(arguments=arguments)) & {"trimesh", "yourdfpy", "pinocchio", "scipy", "rich"}
+    assert not _imported(RUN.format(arguments=arguments)) & {*MODELS, "rich"}
     assert "mujoco" in _imported(RUN.format(arguments=arguments))
     for options in (["--no-verify"], ["--check"]):
         assert "mujoco" not in _imported(RUN.format(arguments=[*arguments, *options]))

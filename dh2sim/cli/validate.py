@@ -63,8 +63,8 @@ def validate(
 ) -> int:
     """Check every engine against the table: poses, Jacobians and dynamics.
 
-    The engines are dh2sim itself, MuJoCo on the MJCF and on the URDF, and yourdfpy and pinocchio where they are
-    installed. With --dynamics the robot is also simulated, and its motion is checked against the laws of physics.
+    The engines are dh2sim itself, MuJoCo on the MJCF and on the URDF, and yourdfpy, pinocchio and PyBullet where they
+    are installed. With --dynamics the robot is also simulated, and its motion is checked against the laws of physics.
     The exit status is 1 if anything differs by more than the tolerance.
 
     \b
@@ -156,7 +156,7 @@ def _print(report: ValidationReport) -> None:
         verdict = ("matches its table", "bold green") if robot.ok else ("DOES NOT match its table", "bold red")
         console.print(Text.assemble((robot.name, "bold"), " ", verdict))
         print_whole(_table(robot))
-        for remark, style in _remarks(robot):
+        for remark, style in dict.fromkeys(_remarks(robot)):
             wrapped = textwrap.wrap(
                 remark,
                 console.width,

@@ -38,6 +38,9 @@ class PoseEngine(Protocol):
 class DynamicsEngine(PoseEngine, Protocol):
     """Computes velocities and dynamics, too."""
 
+    inertia_rounding: float
+    """How far it may round the inertias that it reads, as a share of the joint's own."""
+
     def jacobian(self, q: Array) -> Array:
         """Return the Jacobian of tool0 in base_link, linear rows first, shape (N, 6, n); q of shape (N, n)."""
         ...

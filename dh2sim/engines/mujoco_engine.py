@@ -21,6 +21,8 @@ BLOCK_BYTES = 2**22
 class MujocoEngine:
     """One compiled model file; DH frames are sites in an MJCF and bodies in a URDF."""
 
+    inertia_rounding = 0.0
+
     def __init__(self, path: Path, joints: Sequence[str], rows: int) -> None:
         """Compile a file.
 

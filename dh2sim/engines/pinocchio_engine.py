@@ -20,6 +20,7 @@ class PinocchioEngine:
     """One URDF file, read by pinocchio."""
 
     name = "pinocchio"
+    inertia_rounding = 0.0
 
     def __init__(self, path: Path, joints: Sequence[str], rows: int) -> None:
         """Read a file.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dh2sim.engines.engine import DynamicTerms
+from dh2sim.engines.engine import DynamicsEngine, DynamicTerms
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.errors import EngineError
 from dh2sim.model.robot_model import RobotModel
@@ -56,16 +56,16 @@ def check_inertias(engine: MujocoEngine, model: RobotModel) -> Check:
 
 
 def check_dynamics(
-    engine: str, terms: DynamicTerms, reference: DynamicTerms, model: RobotModel, q: Array
+    engine: DynamicsEngine, reference: DynamicTerms, model: RobotModel, q: Array, velocity: Array
 ) -> list[Check]:
     """Compare an engine's dynamic terms with those of MuJoCo on the MJCF.
 
     Args:
-        engine: The engine's name.
-        terms: What it computed for the N states.
-        reference: What MuJoCo computed from the MJCF.
+        engine: The engine.
+        reference: What MuJoCo computed from the MJCF for the N states.
         model: The robot.
         q: Joint vectors of the states, shape (N, n).
+        velocity: Joint velocities of the states, shape (N, n).
 
     Returns:
         A check for each of the three terms. Entries of the mass matrix are relative to sqrt(M_ii M_jj), forces to the
@@ -73,6 +73,7 @@ def check_dynamics(
         Inertias and forces that are tiny beside those of the robot's mass and weight at its reach are only rounding:
         they have the lower bounds ``LEAST_INERTIA`` and ``LEAST_FORCE``.
     """
+    terms = engine.dynamic_terms(q, velocity, model.spec.gravity)
     lever = max(model.reach, LEAST_LEVER)
     diagonal = np.sqrt(np.einsum("kii->ki", reference.mass_matrix))
     diagonal = np.maximum(diagonal, np.sqrt(LEAST_INERTIA * model.mass) * lever)
@@ -80,24 +81,26 @@ def check_dynamics(
     weight = model.mass * (1.0 + float(np.linalg.norm(model.spec.gravity)))  # 1 m/s^2 for what the motion makes
     force = np.maximum(np.abs(reference.bias).max(axis=0), LEAST_FORCE * weight * lever)
     names = [joint.name for joint in model.moving_joints]
+    bias, gravity = np.abs(terms.bias - reference.bias) / force, np.abs(terms.gravity - reference.gravity) / force
+    tolerance = max(TOLERANCE, engine.inertia_rounding)
     return [
-        _check(engine, Quantity.MASS_MATRIX, mass.max(axis=2), names, q),
-        _check(engine, Quantity.BIAS, np.abs(terms.bias - reference.bias) / force, names, q),
-        _check(engine, Quantity.GRAVITY, np.abs(terms.gravity - reference.gravity) / force, names, q),
+        _check(engine.name, Quantity.MASS_MATRIX, mass.max(axis=2), names, q, tolerance),
+        _check(engine.name, Quantity.BIAS, bias, names, q, tolerance),
+        _check(engine.name, Quantity.GRAVITY, gravity, names, q, TOLERANCE),
     ]
 
 
-def _check(engine: str, quantity: Quantity, error: Array, names: Sequence[str], q: Array) -> Check:
+def _check(engine: str, quantity: Quantity, error: Array, names: Sequence[str], q: Array, tolerance: float) -> Check:
     """Return a check of errors by state and joint, shape (N, n)."""
     sample, joint = divmod(int(np.argmax(error)), error.shape[1])
     largest = float(error[sample, joint])
     return Check(
         engine=engine,
         quantity=quantity,
-        ok=bool(largest <= TOLERANCE),
+        ok=bool(largest <= tolerance),
         reference="mujoco-mjcf",
         samples=len(q),
         max_error=largest,
-        tolerance=TOLERANCE,
+        tolerance=tolerance,
         worst=Worst(where=names[joint], q=tuple(q[sample].tolist()), sample=sample),
     )

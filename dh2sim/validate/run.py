@@ -12,6 +12,7 @@ import numpy as np
 
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
+from dh2sim.engines.pybullet_engine import PybulletEngine
 from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
 from dh2sim.errors import Dh2simError, EngineCapacityError, EngineError
 from dh2sim.export import export_robot
@@ -39,9 +40,9 @@ JACOBIAN_SAMPLES = 200
 DYNAMICS_SAMPLES = 20
 
 Advance = Callable[[int], None]
-Mover = MujocoEngine | PinocchioEngine
+Mover = MujocoEngine | PinocchioEngine | PybulletEngine
 """An engine with Jacobians and dynamics."""
-Engine = TypeVar("Engine", bound=MujocoEngine | PinocchioEngine | YourdfpyEngine)
+Engine = TypeVar("Engine", bound=Mover | YourdfpyEngine)
 
 
 def slow_samples(samples: int, rows: int) -> int:
@@ -51,7 +52,7 @@ def slow_samples(samples: int, rows: int) -> int:
 
 def engine_samples(samples: int, rows: int) -> int:
     """Return the number of configurations of all engines together, for a progress bar."""
-    return 3 * samples + 2 * slow_samples(samples, rows)
+    return 3 * samples + 3 * slow_samples(samples, rows)
 
 
 def validate_robot(
@@ -135,6 +136,7 @@ def _read(model: RobotModel, mjcf: Path, urdf: Path) -> tuple[list[Mover | Yourd
         ("mujoco-urdf", urdf, MujocoEngine, "mujoco"),
         ("yourdfpy", urdf, YourdfpyEngine, "'dh2sim[engines]'"),
         ("pinocchio", urdf, PinocchioEngine, "pin"),
+        ("pybullet", urdf, PybulletEngine, "pybullet"),
     ):
         if not path.is_file():
             reason = f"{path}: no such file; write it with 'dh2sim export'"
@@ -184,15 +186,12 @@ def _dynamics(model: RobotModel, engines: list[Mover], q: Array, seed: int) -> l
     if q.shape[1] == 0 or not engines or engines[0].name != "mujoco-mjcf":
         return checks
     velocity = np.random.default_rng(seed).uniform(-1.0, 1.0, q.shape)
-    gravity = model.spec.gravity
-    reference = engines[0].dynamic_terms(q, velocity, gravity)
+    reference = engines[0].dynamic_terms(q, velocity, model.spec.gravity)
     for engine in engines[1:]:
         checks += _checks_of(
             engine,
             Quantity.MASS_MATRIX,
-            lambda engine: check_dynamics(
-                engine.name, engine.dynamic_terms(q, velocity, gravity), reference, model, q
-            ),
+            lambda engine: check_dynamics(engine, reference, model, q, velocity),
         )
     return checks
 
@@ -204,6 +203,8 @@ def _checks_of(engine: Engine, quantity: Quantity, check: Callable[[Engine], lis
             return check(engine)
     except MemoryError:
         raise
+    except EngineCapacityError as error:
+        return [Check(engine=engine.name, quantity=quantity, ok=None, reason=str(error))]
     except Exception as error:
         reason = f"{engine.name} failed: {type(error).__name__}: {' '.join(str(error).split())}"
         return [Check(engine=engine.name, quantity=quantity, ok=False, reason=reason)]

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 from dh2sim.engines.engine import DynamicsEngine, PoseEngine
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
+from dh2sim.engines.pybullet_engine import PybulletEngine
 from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.robot_model import RobotModel
 
-ENGINES = ["mujoco-mjcf", "mujoco-urdf", "pinocchio", "yourdfpy"]
-DYNAMIC = ENGINES[:3]
+PYBULLET = find_spec("pybullet") is not None
+"""Whether it is installed: it has wheels for few versions of Python."""
+DYNAMIC = ["mujoco-mjcf", "mujoco-urdf", "pinocchio", *(["pybullet"] if PYBULLET else [])]
+ENGINES = [*DYNAMIC, "yourdfpy"]
 
 
 def write(built: RobotModel, folder: Path) -> None:
@@ -38,6 +42,8 @@ def dynamics_engine(name: str, path: Path, joints: list[str], rows: int) -> Dyna
     """One that also knows velocities and masses."""
     if name == "pinocchio":
         return PinocchioEngine(path, joints, rows)
+    if name == "pybullet":
+        return PybulletEngine(path, joints, rows)
     return MujocoEngine(path, joints, rows)
 
 

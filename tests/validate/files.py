@@ -8,13 +8,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from tests.engines.files import PYBULLET
 from tests.program import dh2sim
 
 Change = Callable[[ET.Element], None]
 Failures = dict[tuple[str, str], dict[str, Any]]
 """What failed, by engine and quantity."""
 
-FILE_ENGINES = {"odd.urdf": ("mujoco-urdf", "yourdfpy", "pinocchio"), "odd.xml": ("mujoco-mjcf",)}
+FILE_ENGINES = {
+    "odd.urdf": ("mujoco-urdf", "yourdfpy", "pinocchio", *(["pybullet"] if PYBULLET else [])),
+    "odd.xml": ("mujoco-mjcf",),
+}
 """Which engines read a file."""
 
 

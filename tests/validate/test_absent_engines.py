@@ -33,7 +33,9 @@ def _without(package: str, *arguments: str | Path) -> Outcome:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("engine", "package"), [("pinocchio", "pin"), ("yourdfpy", "'dh2sim[engines]'")])
+@pytest.mark.parametrize(
+    ("engine", "package"), [("pinocchio", "pin"), ("pybullet", "pybullet"), ("yourdfpy", "'dh2sim[engines]'")]
+)
 def test_an_engine_that_is_not_installed_is_null_with_the_reason(tmp_path: Path, engine: str, package: str) -> None:
     run = _without(engine, "validate", write(tmp_path, small()), "--samples", "3", "--json", "-")
     report = json.loads(run.out)

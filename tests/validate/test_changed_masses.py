@@ -87,9 +87,8 @@ def test_mass_given_to_a_link_that_has_none_is_found(tmp_path: Path, file: str, 
 
     def weigh(root: ET.Element) -> None:
         if file.endswith("urdf"):
-            inertial = ET.SubElement(named(root, "link", "link_2"), "inertial")
-            ET.SubElement(inertial, "mass", value="0.5")
-            ET.SubElement(inertial, "inertia", ixx="1", iyy="1", izz="1", ixy="0", ixz="0", iyz="0")
+            part(root, "link", "link_2", "inertial/mass").set("value", "0.5")
+            part(root, "link", "link_2", "inertial/inertia").attrib.update(ixx="1", iyy="1", izz="1")
         else:
             [inertial] = named(root, "body", "link_2").findall("inertial")
             inertial.attrib.update(mass="0.5", diaginertia="1 1 1")
@@ -109,9 +108,9 @@ def test_the_comparison_of_dynamics_notices_a_changed_mass(exported: Path) -> No
     wrong = MujocoEngine(path, names, len(model.joints))
     q, velocity = model.home[None], model.home[None] + 1.0
     reference = right.dynamic_terms(q, velocity, model.spec.gravity)
-    same = check_dynamics("same", reference, reference, model, q)
+    same = check_dynamics(right, reference, model, q, velocity)
     assert [(check.ok, check.max_error) for check in same] == [(True, 0.0)] * 3
-    checks = check_dynamics("other", wrong.dynamic_terms(q, velocity, model.spec.gravity), reference, model, q)
+    checks = check_dynamics(wrong, reference, model, q, velocity)
     assert [check.quantity for check in checks] == [Quantity.MASS_MATRIX, Quantity.BIAS, Quantity.GRAVITY]
     assert [check.ok for check in checks] == [False] * 3
     for check in checks:

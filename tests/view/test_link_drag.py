@@ -28,12 +28,12 @@ def in_base_link(link: str, point: tuple[float, float, float]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("link", ["link_1", "link_3", "link_6"])
-def test_a_grabbed_point_is_given_in_the_frame_of_its_link(link: str) -> None:
+def test_a_point_in_link_is_given_in_the_frame_of_its_link(link: str) -> None:
     point = (0.02, -0.1, 0.3)
     assert point_in_link(STANFORD.model, Q, link, in_base_link(link, point)) == pytest.approx(point, abs=1e-12)
 
 
-def test_an_arrow_leads_from_the_grabbed_point_to_the_mouse() -> None:
+def test_an_arrow_leads_from_the_point_in_link_to_the_mouse() -> None:
     drag = LinkDrag(link="link_3", point_in_link=(0.0, 0.05, 0.1), target=(1.0, 2.0, 3.0))
     pulled = replace(STANFORD, q=Q, mode=Mode.PHYSICS, drag=drag)
     arrow = scene_of(pulled)["/drag"]

@@ -15,6 +15,9 @@ from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.spec import JointType
 from dh2sim.typing import Array, read_only
 
+MASSLESS = MassProperties(mass=0.0, com=read_only([0.0, 0.0, 0.0]), inertia=read_only([[0.0] * 3] * 3))
+"""Written for links without mass: PyBullet would take 1 kg and 1 kg·m² for a link without an ``inertial``."""
+
 T_FLANGE_DHN = pose_from_rpy([0, 0, 0], [0, math.pi / 2, 0])
 """REP-199: x of the flange points out of it, as z of tool0 does; pose of the last DH frame in the flange."""
 T_DHN_FLANGE = invert(T_FLANGE_DHN)
@@ -29,7 +32,8 @@ def to_urdf(model: ModelLike, *, dh_frames: bool = True) -> str:
 
     Returns:
         The text of the file. Mesh file names are relative to it: ``meshes/link_1.stl``. The ``mujoco`` element, which
-        other readers ignore, makes MuJoCo keep the fixed links as bodies and give no mass to the base.
+        other readers ignore, makes MuJoCo keep the fixed links as bodies and give no mass to the base. Massless links
+        have an ``inertial`` of zeros, but for the root, where KDL warns of any.
     """
     model = model_of(model)
     robot = ET.Element("robot", name=model.name)
@@ -37,14 +41,14 @@ def to_urdf(model: ModelLike, *, dh_frames: bool = True) -> str:
     materials = _materials(model)
     for color, name in materials.items():
         child(child(robot, "material", name=name), "color", rgba=numbers(color))
-    _link(robot, model.base, model.chain.T_base_link_dh0, materials)
+    _link(robot, model.base, model.chain.T_base_link_dh0, materials, model.base.inertial)
     _frame(robot, "base", "base_link", identity())
     if dh_frames:
         _frame(robot, "dh_0", "base_link", model.chain.T_base_link_dh0)
     parent = model.base.name
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
         _joint(robot, joint, parent, link.name)
-        _link(robot, link, joint.T_joint_dh, materials)
+        _link(robot, link, joint.T_joint_dh, materials, link.inertial or MASSLESS)
         if dh_frames:
             _frame(robot, f"dh_{i}", link.name, joint.T_joint_dh)
         parent = link.name
@@ -63,7 +67,7 @@ def _materials(model: RobotModel) -> dict[Color, str]:
 
 
 def _frame(robot: ET.Element, name: str, parent: str, T_parent_frame: Array) -> None:
-    child(robot, "link", name=name)
+    _inertial(child(robot, "link", name=name), MASSLESS)
     joint = child(robot, "joint", name=f"{parent}-{name}", type="fixed")
     _ends(joint, parent, name, T_parent_frame)
 
@@ -78,10 +82,16 @@ def _origin(element: ET.Element, T: Array) -> None:
     child(element, "origin", xyz=numbers(T[:3, 3]), rpy=numbers(rpy_from_rotation(T[:3, :3])))
 
 
-def _link(robot: ET.Element, link: LinkModel, T_link_dh: Array, materials: dict[Color, str]) -> None:
+def _link(
+    robot: ET.Element,
+    link: LinkModel,
+    T_link_dh: Array,
+    materials: dict[Color, str],
+    inertial: MassProperties | None,
+) -> None:
     element = child(robot, "link", name=link.name)
-    if link.inertial is not None:
-        _inertial(element, link.inertial)
+    if inertial is not None:
+        _inertial(element, inertial)
     if link.mesh is not None:
         visual = child(element, "visual")
         _origin(visual, compose(T_link_dh, link.mesh.T_dh_mesh))
