@@ -170,6 +170,7 @@ def _shift(offset: Array) -> Array:
 STDIN = "-"
 MAX_BYTES = 50_000_000
 _ROOT = re.compile(rb"<\s*([A-Za-z_][\w:.-]*)")
+_XML_NAMES = (".xml", ".urdf", ".xacro", ".sdf", ".mjcf", ".dae")
 _HIDDEN = re.compile(rb"<\?.*?\?>|<!--.*?-->|<![^>]*>", re.DOTALL)
 
 
@@ -259,7 +260,7 @@ def read_file(path: Path) -> bytes:
 
 def import_data(data: bytes, file: str, options: ImportOptions, *, folder: Path | None = None) -> Imported:
     """Import content that was read already, as ``import_robot``; ``file`` is its path, or '-' for standard input."""
-    root = _root_element(data)
+    root = _root_element(data, file)
     if root is None and file.lower().endswith((".yaml", ".yml")):
         _refuse_yaml(data, file)
     match root:
@@ -284,15 +285,18 @@ def _refuse_yaml(data: bytes, file: str) -> None:
         raise Dh2simError(f"{file}: this lists joint axes; 'dh2sim frames' makes a robot file of them")
 
 
-def _root_element(data: bytes) -> str | None:
-    """Return the name of an XML file's outermost element; None for what is no XML."""
+def _root_element(data: bytes, file: str) -> str | None:
+    """Return the name of an XML file's outermost element; None for what is no XML, such as Markdown after HTML."""
     text = data.removeprefix(b"\xef\xbb\xbf").lstrip()
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = data.decode("utf-16", "replace").encode().lstrip(b"\xef\xbb\xbf \t\r\n")
     if not text.startswith(b"<"):
         return None
-    found = _ROOT.search(_HIDDEN.sub(b"", text[:1_000_000]))
-    return found.group(1).decode("ascii", "replace") if found else "robot"
+    xml = text.startswith(b"<?xml") or file.lower().endswith(_XML_NAMES)
+    found = _ROOT.match(_HIDDEN.sub(b"", text[:1_000_000]).lstrip())
+    root = found.group(1).decode("ascii", "replace") if found else "robot"
+    known = found is not None and root in ("robot", "mujoco", "mujocoinclude", "sdf")
+    return root if known or xml else None
 
 
 def _read_urdf(data: bytes, file: str, options: ImportOptions) -> SerialRobot:

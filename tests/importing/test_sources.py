@@ -257,3 +257,38 @@ def test_options_may_be_plain_strings() -> None:
 )
 def test_an_option_of_the_wrong_kind_is_refused_by_its_name(options: dict[str, Any], expected: str) -> None:
     assert refusal(Dh2simError, ImportOptions, **options) == expected
+
+
+README = """\
+{first}
+
+# Arm
+
+Modified DH
+
+| i | alpha_{{i-1}} (deg) | a_{{i-1}} (mm) | d_i (mm) | theta_i |
+|---|---|---|---|---|
+| 1 | 0 | 0 | 100 | θ1 |
+| 2 | 90 | 20 | 0 | θ2 |
+
+The model is `<robot name="arm">`.
+"""
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        '<p align="center"><img src="arm.png"></p>', "<!-- a logo -->", "<!-- a\nlogo -->\n<div>\n</div>",
+        "<h1>Arm</h1>", "<!DOCTYPE html>\n<center>", "<https://example.org>", "<Badge kind='x' />", "< 3 joints",
+        "<picture>",
+    ],
+)  # fmt: skip
+def test_a_text_that_begins_with_html_is_searched_for_a_table(first: str) -> None:
+    spec = import_data(README.format(first=first).encode(), "README.md", ImportOptions()).spec
+    assert [(row.a, row.alpha, row.d) for row in spec.rows] == [(0, 0, 0.1), (0.02, math.pi / 2, 0)]
+
+
+def test_an_element_that_nobody_knows_is_refused_by_its_name_where_the_file_is_xml() -> None:
+    assert _refused("<part/>", file="part.xml").startswith("part.xml: a file of <part> cannot be imported.")
+    assert _refused("<?xml version='1.0'?><part/>", file="part").startswith("part: a file of <part> cannot be ")
+    assert _refused("<part/>", file="part").startswith("part:1:1: no table of Denavit-Hartenberg parameters found")

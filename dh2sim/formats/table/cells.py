@@ -26,6 +26,11 @@ _MARKED_UNIT: Final = re.compile(rf"(?<=[\d.)i])\s*({UNIT})(?![A-Za-z0-9_(])", r
 _STARRED_NAME: Final = re.compile(rf"(?<![A-Za-z0-9_])(?!pi\b)({_NAME})\s*\*(?!\*)(?=\s*(?:[-+)]|$))", re.IGNORECASE)
 _TIMES_MINUS_ONE: Final = re.compile(rf"({_NAME})\s*\*\s*-\s*1")
 _VARIABLE_WORD: Final = re.compile(r"\(?\b(?:joint )?(?:variable|var)\b\.?\)?", re.IGNORECASE)
+_INVERSE: Final = re.compile(r"\ba(?:sin|cos|tan2?)\b")
+_TURNED: Final = re.compile(r"\b(?:sin|cos|tan)\s*\([^()]*\)")
+"""A function of an angle, whose value is none."""
+_DEGREES_INSIDE: Final = re.compile(r"\b(sin|cos|tan)\s*\(\s*([-+]?[\d.]+)\s*(?:°|deg(?:rees?)?\b)\s*\)")
+_NUMBER_INSIDE: Final = re.compile(r"\b(sin|cos|tan)\s*\(\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*\)")
 _DECIMAL_COMMA: Final = re.compile(r"(?<=\d),(?=\d)")
 
 
@@ -54,7 +59,9 @@ class Reading:
     value: float = 0.0
     """The number, or what is added to the coordinate; in ``unit``, else in the unit of the table."""
     unit: Unit | None = None
-    """The cell's own; rad where the number is written with pi."""
+    """The cell's own, or that of the symbols in it; rad where the number is written with pi."""
+    borrowed: bool = False
+    """The unit is that of the symbols in the cell."""
     symbol: str | None = None
     """The coordinate's name, such as ``theta3``; None where the cell has none, or only a star."""
     sign: int = 1
@@ -91,9 +98,12 @@ def read_cell(
     if text.casefold() in _EMPTY:
         return Reading(cell=cell, empty=True)
     text, starred = _without_star(text)
-    text, unit = _without_unit(text)
     if comma:
         text = _DECIMAL_COMMA.sub(".", text)
+    text = _DEGREES_INSIDE.sub(r"\1(((\2)*pi/180))", text)
+    if found := next((f for f in _NUMBER_INSIDE.finditer(text) if abs(float(f[2])) > 2 * math.pi), None):
+        raise CellError(f"{shown(found.group())} is of radians; write {found[1]}({found[2]}°) if degrees are meant")
+    text, unit = _without_unit(text)
     if not text:
         return Reading(cell=cell, starred=starred, empty=not starred)
     text, names = _expression(text)
@@ -104,12 +114,16 @@ def read_cell(
     _check_names(names, {*symbols, *known}, symbols)
     if problem := next((constant.problem for constant in known.values() if constant.problem), None):
         raise CellError(problem)
-    unit = _unit(cell, unit, known, names)
-    symbol = symbols[0] if symbols else None
-    value, sign = _linear(cell, text, symbol, known)
+    own, symbol = unit, symbols[0] if symbols else None
+    pi = "pi" in names and "pi" in _TURNED.sub("", text)
+    inverse = _INVERSE.search(text) is not None
+    unit = None if inverse else _unit(cell, unit, known, pi=pi)
+    value, sign, unitless = _linear(cell, text, symbol, known)
+    if inverse:
+        unit = _unit(cell, own, {} if unitless else known, pi=pi or unitless)
     return Reading(
         cell=cell, value=value, unit=unit, symbol=symbol, sign=sign, starred=starred,
-        constants=tuple(known),
+        constants=tuple(known), borrowed=own is None and bool(known),
     )  # fmt: skip
 
 
@@ -157,10 +171,14 @@ def _expression(text: str) -> tuple[str, list[str]]:
             token = "pi" if token.casefold() == "pi" else token if token in FUNCTIONS else canonical(token)
             if token not in FUNCTIONS and token not in CONSTANTS:
                 names[token] = None
-        if (before == "number" and (kind == "name" or token == "(")) or (before == ")" and kind != "sign"):
+        if (
+            (before == "name" and token in FUNCTIONS)
+            or (before == "number" and (kind == "name" or token == "("))
+            or (before == ")" and kind != "sign")
+        ):
             tokens.append("*")
         tokens.append(token)
-        before = token if token == ")" else kind or ""
+        before = token if token == ")" else "" if token in FUNCTIONS else kind or ""
     return " ".join(tokens), [*names, *(["pi"] if "pi" in tokens else [])]
 
 
@@ -174,21 +192,21 @@ def _check_names(names: Iterable[str], known: set[str], symbols: list[str]) -> N
         raise CellError(f"{message}, and joints that move together have no DH table")
 
 
-def _unit(cell: Cell, unit: Unit | None, known: Mapping[str, Constant], names: Iterable[str]) -> Unit | None:
+def _unit(cell: Cell, unit: Unit | None, known: Mapping[str, Constant], *, pi: bool) -> Unit | None:
     units = {constant.unit for constant in known.values() if constant.unit is not None}
     if unit is not None:
         units.add(unit)
-    if "pi" in names and unit is AngleUnit.DEG:
+    if pi and unit is AngleUnit.DEG:
         raise CellError(f"{shown(cell.text)} is written with pi and in degrees; write one of them")
-    if "pi" in names and not units & set(LengthUnit):
+    if pi and not units & set(LengthUnit):
         units.add(AngleUnit.RAD)
     if len(units) > 1:
         raise CellError(f"two units in one cell: {' and '.join(sorted(units))}; write one")
     return next(iter(units), None)
 
 
-def _linear(cell: Cell, text: str, symbol: str | None, known: Mapping[str, Constant]) -> tuple[float, int]:
-    """Return the value at coordinate zero and the coordinate's sign."""
+def _linear(cell: Cell, text: str, symbol: str | None, known: Mapping[str, Constant]) -> tuple[float, int, bool]:
+    """Return the value at coordinate zero, the coordinate's sign, and whether the value does not depend on units."""
 
     def at(coordinate: float, factor: float = 1.0) -> float:
         names = {name: c.value * (factor if c.unit else 1.0) for name, c in known.items()}
@@ -198,10 +216,12 @@ def _linear(cell: Cell, text: str, symbol: str | None, known: Mapping[str, Const
             raise CellError(f"{shown(cell.text)} cannot be read: {error}") from None
 
     value = at(0.0)
-    if any(constant.unit for constant in known.values()) and not math.isclose(at(0.0, 2.0), 2.0 * value):
+    scaled = any(constant.unit for constant in known.values())
+    unitless = not scaled or (bool(_INVERSE.search(text)) and math.isclose(at(0.0, 2.0), value))
+    if not unitless and not math.isclose(at(0.0, 2.0), 2.0 * value):
         raise CellError("a number without a unit beside a symbol that has one; write the unit behind the number too")
     if symbol is None:
-        return value, 1
+        return value, 1, unitless
     step = max(1.0, abs(value))
     slopes = [(at(factor * step) - value) / (factor * step) for factor in (1.0, -2.0, 3.0)]
     sign = 1 if slopes[0] > 0 else -1
@@ -210,4 +230,4 @@ def _linear(cell: Cell, text: str, symbol: str | None, known: Mapping[str, Const
         raise CellError(
             f"the coordinate {shown(symbol)} may only be added or subtracted, {allowed}; found {shown(cell.text)}"
         )
-    return value, sign
+    return value, sign, unitless

@@ -65,12 +65,13 @@ def decide_convention(
         table: Numbers of the table's lines, counted from 1.
         findings: Takes problems and notes.
     """
+    wrong_before = len(findings.problems)
     first = columns.headings[0].cell
     said = [] if printed is None else [Evidence(printed, "the printout's first line")]
-    said += _by_headings(columns, findings)
+    asked = option if option in (Convention.STANDARD, Convention.MODIFIED) else None
+    said += _by_headings(columns, asked, findings)
     said += [] if printed is not None else _by_words(lines, table)
-    asked = option in (Convention.STANDARD, Convention.MODIFIED)
-    wanted = [Evidence(option, f"convention='{option}'")] if option is not None and asked else []
+    wanted = [Evidence(asked, f"convention='{asked}'")] if asked is not None else []
     for one, other in itertools.pairwise([*wanted, *said]):
         if one.convention is not other.convention:
             message = f"{one.by} says {one.convention}, but {other.by} says {other.convention}"
@@ -78,6 +79,8 @@ def decide_convention(
             return None
     if wanted or said:
         return (wanted or said)[0].convention
+    if len(findings.problems) > wrong_before:
+        return None
     if _indexed_throughout(columns):
         findings.note(
             "nothing but the headings' index i says the convention: it was read as standard; a table after Craig is "
@@ -93,21 +96,26 @@ def caption(lines: Sequence[str], table: range) -> list[str]:
     return [lines[number - 1] for number in (*_above(lines, table), *_below(lines, table))]
 
 
-def _by_headings(columns: Columns, findings: Findings) -> list[Evidence]:
+def _by_headings(columns: Columns, asked: Convention | None, findings: Findings) -> list[Evidence]:
     indices = {
         quantity: heading.index
         for quantity in (Quantity.A, Quantity.ALPHA, Quantity.D, Quantity.THETA)
         if (heading := columns.heading(quantity)) and heading.index is not None
     }
-    link = [quantity for quantity in (Quantity.A, Quantity.ALPHA) if indices.get(quantity) == -1]
-    if not link:
+    shifted = [quantity for quantity in indices if indices[quantity] == -1]
+    if not shifted:
         return []
-    heading = columns.heading(link[0])
-    shifted = [quantity for quantity in indices if indices[quantity] == -1 and quantity not in link]
+    link = [quantity for quantity in shifted if quantity in (Quantity.A, Quantity.ALPHA)]
     straight = [quantity for quantity in (Quantity.A, Quantity.ALPHA) if indices.get(quantity) == 0]
-    if heading is not None and (shifted or straight):
+    heading = columns.heading(link[0] if link else shifted[0])
+    if heading is not None and (len(shifted) > len(link) or straight):
+        if asked is not None:
+            findings.note(f"the headings' indices contradict each other: the table was read as {asked}, as asked for")
+            return []
         message = "a and alpha have index i - 1 in a modified table and i in a standard one, d and theta always i"
-        findings.wrong(heading.cell, "", f"the headings' indices contradict each other: {message}")
+        how = "correct them, or pass convention='modified' or convention='standard'"
+        findings.wrong(heading.cell, "", f"the headings' indices contradict each other: {message}; {how}")
+        return []
     return [] if heading is None else [Evidence(Convention.MODIFIED, f"the heading {shown(heading.cell.text)}")]
 
 

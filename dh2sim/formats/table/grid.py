@@ -19,6 +19,9 @@ PIPES: Final = "|│┃║"
 _PIPE: Final = re.compile(r"(?<!\\)[|│┃║]")
 _DASHES: Final = frozenset("-=─━═")
 _RULES: Final = _DASHES | frozenset("+:|│┌┐└┘├┤┬┴┼┃┏┓┗┛┣┫┳┻╋┠┨┯┷┿║╔╗╚╝╠╣╦╩╬ \t")
+DELIMITER: Final = re.compile(r":?-+:?")
+"""A cell of the row that Markdown has under the headings."""
+_MARKDOWN_RULE: Final = re.compile(r"[-|:\s]*\|[-|:\s]*")
 _OLD_MARK: Final = re.compile(r"\((?:std|mod)\)$")
 """Ends every row of the first toolboxes' printouts."""
 
@@ -45,6 +48,8 @@ class Grid:
     rows: tuple[Cells, ...] = field(repr=False)
     separator: str
     """``|``, ``,``, ``;``, a tab or a space."""
+    markdown: bool = False
+    """Whether a line of dashes as in Markdown is under the first row."""
     problems: tuple[tuple[int, int, str], ...] = ()
     """Line, column and what is wrong with a line, such as a quote that is never closed."""
 
@@ -57,15 +62,18 @@ class Grid:
 def pipe_grids(lines: Sequence[str]) -> Iterator[Grid]:
     """Yield the tables with pipes or the lines of a box between their cells, as in Markdown."""
     rows: list[Cells] = []
+    markdown = False
     for number, line in enumerate([*lines, ""], start=1):
         body = line[_prefix(line) :]
         ruled = _is_rule(body)
+        if ruled and len(rows) == 1:
+            markdown = _MARKDOWN_RULE.fullmatch(body) is not None
         cells = () if ruled else _piped(line, number)
         if cells and not _is_pose_row(cells):
             rows.append(cells)
         elif not ruled and rows:
-            yield Grid(rows=tuple(rows), separator="|")
-            rows = []
+            yield Grid(rows=tuple(rows), separator="|", markdown=markdown)
+            rows, markdown = [], False
 
 
 def _is_pose_row(cells: Cells) -> bool:

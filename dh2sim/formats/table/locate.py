@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Final
 
 from dh2sim.formats.table.grid import (
+    DELIMITER,
     MAX_COLUMNS,
     Cells,
     Grid,
@@ -17,15 +18,18 @@ from dh2sim.formats.table.grid import (
     separated_grid,
     split,
 )
-from dh2sim.formats.table.headers import are_headings, parameters_in
+from dh2sim.formats.table.headers import UNIT, are_headings, parameters_in, read_heading, variable_in
+from dh2sim.formats.table.notation import plain
+from dh2sim.messages import shown
 
 _SEPARATED: Final = (".csv", ".tsv", ".tab")
 _MAX_HEADING_LINES: Final = 2000
 """Lines that are searched for the headings of a table between separators."""
 _MAX_CANDIDATES: Final = 20
 """Lines that may be headings of a table between separators, and are looked at."""
-_DELIMITER: Final = re.compile(r":?-+:?")
-"""A cell of the row that Markdown has under the headings."""
+_UNIT_CELL: Final = re.compile(rf"[\[({{<]?\s*(?:in\s+)?({UNIT})\.?\s*[\])}}>]?", re.IGNORECASE)
+_NO_UNIT: Final = re.compile(r"[\[({<]?\s*[-–—/1]?\s*[\])}>]?")
+_NUMERIC: Final = re.compile(rf"[-+(]*(?:[\d.,]|pi\b)[-+*/().,\deEpi\s]*(?:{UNIT})?\.?")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,6 +39,8 @@ class Table:
     header: Cells
     rows: tuple[Cells, ...] = field(repr=False)
     grid: Grid = field(repr=False)
+    notes: tuple[str, ...] = ()
+    """What was done to its rows, a sentence each."""
 
     @property
     def lines(self) -> range:
@@ -83,11 +89,60 @@ def _between_pipes(pipes: Sequence[Grid]) -> Iterator[Table]:
     for grid in pipes:
         for index, row in enumerate(grid.rows[:5]):
             if are_headings(row[:MAX_COLUMNS]):
-                rows = grid.rows[index + 1 :]
-                if rows and all(_DELIMITER.fullmatch(cell.text) for cell in rows[0]):
-                    rows = rows[1:]
-                yield Table(header=row, rows=rows, grid=grid)
+                yield make_table(row, grid.rows[index + 1 :], grid)
                 break
+
+
+def make_table(header: Cells, rows: Sequence[Cells], grid: Grid) -> Table:
+    """Return the table of some rows of a grid.
+
+    Units in a row of their own, and a second row of headings, go to the headings. In Markdown, a row that is shorter
+    than the headings is filled up with empty cells, and what is behind the last column is cut off.
+    """
+    rows = list(rows)
+    delimited = bool(rows) and all(DELIMITER.fullmatch(cell.text) for cell in rows[0])
+    rows = rows[1:] if delimited else rows
+    while rows and len(rows[0]) == len(header) and (merged := _merged(header, rows[0])):
+        header, rows = merged, rows[1:]
+    notes: list[str] = []
+    if delimited or grid.markdown:
+        rows = [_fitted(row, len(header), number, notes) for number, row in enumerate(rows, start=1)]
+    return Table(header=header, rows=tuple(rows), grid=grid, notes=tuple(notes))
+
+
+def _merged(header: Cells, row: Cells) -> Cells | None:
+    """Return headings with what a second row says of them; None where the row is one of the table's own."""
+    texts = [plain(cell.text) for cell in row]
+    units = [found[1] if (found := _UNIT_CELL.fullmatch(text)) else None for text in texts]
+    if sum(unit is not None for unit in units) > 1 and all(
+        unit or _NO_UNIT.fullmatch(text) for unit, text in zip(units, texts, strict=True)
+    ):
+        return tuple(
+            replace(cell, text=f"{cell.text} ({unit})") if unit else cell
+            for cell, unit in zip(header, units, strict=True)
+        )
+    above, below = [read_heading(cell) for cell in header], [read_heading(cell) for cell in row]
+    agree = all(
+        None in (one.quantity, two.quantity) or one.quantity is two.quantity
+        for one, two in zip(above, below, strict=True)
+    )
+    if not (are_headings(row) and agree):
+        return None
+    return tuple(two.cell if two.quantity else one.cell for one, two in zip(above, below, strict=True))
+
+
+def _fitted(row: Cells, width: int, number: int, notes: list[str]) -> Cells:
+    """Return a row of a Markdown table as long as its headings, as far as that is what the row means."""
+    if width / 2 <= len(row) < width:
+        behind = replace(row[-1], text="", column=row[-1].column + len(row[-1].text))
+        notes.append(f"row {number} has {len(row)} cells of {width}: the others were read as empty")
+        return (*row, *[behind] * (width - len(row)))
+    extra = [cell.text for cell in row[width:] if cell.text]
+    if len(row) > width and not any(_NUMERIC.fullmatch(plain(text)) or variable_in(text) for text in extra):
+        if extra:
+            notes.append(f"behind the last column of row {number}, {shown(' | '.join(extra))} was not read")
+        return row[:width]
+    return row
 
 
 def _between_separators(lines: Sequence[str], taken: set[int]) -> Iterator[Table]:
@@ -105,7 +160,7 @@ def _between_separators(lines: Sequence[str], taken: set[int]) -> Iterator[Table
             if not grids:
                 continue
             grid = next((grid for grid in grids if len({len(row) for row in grid.rows[:2]}) == 1), grids[0])
-            table = Table(header=grid.rows[0], rows=grid.rows[1:], grid=grid)
+            table = make_table(grid.rows[0], grid.rows[1:], grid)
             yield table
             stop = table.lines.stop - 1 if _is_even(table) else stop
             candidates += 1
@@ -137,4 +192,4 @@ def _most_alike(lines: Sequence[str], pipes: Sequence[Grid]) -> list[Table]:
     best = max(candidates, key=lambda candidate: candidate[:2], default=None)
     if best is None or best[0] < 1:
         return []
-    return [Table(header=best[2].rows[0], rows=best[2].rows[1:], grid=best[2])]
+    return [make_table(best[2].rows[0], best[2].rows[1:], best[2])]

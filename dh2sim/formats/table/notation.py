@@ -56,10 +56,24 @@ _LATEX: Final[tuple[_Change, ...]] = (
         ),
         r"\1",
     ),
-    (re.compile(r"\\sqrt\s*\{([^{}]*)\}"), r"sqrt(\1)"),
+    (re.compile(r"\\?(?<![A-Za-z])(sin|cos|tan)\s*\^\s*\{?\s*-\s*1\s*\}?"), r"a\1"),
+    (re.compile(r"\\?(?<![A-Za-z])arc(sin|cos|tan2?)(?![A-Za-z0-9])"), r"a\1"),
+    (re.compile(r"\\?(?<![A-Za-z])arctg(?![A-Za-z0-9])"), "atan"),
+    (re.compile(r"\\(sqrt|a?sin|a?cos|a?tan2?)(?![A-Za-z])"), r"\1"),
 )
 _FRACTION: Final = re.compile(r"\\[dt]?frac\s*(?:\{([^{}]*)\}|(pi|\d))\s*(?:\{([^{}]*)\}|(\d))")
-_INDEX: Final = re.compile(r"_\{([^{}]*)\}")
+_NESTED: Final[tuple[_Change, ...]] = (
+    (re.compile(r"_\{([^{}]*)\}"), r"_\1"),
+    (re.compile(r"\^\s*(?:\{([^{}]*)\}|(\d+(?:\.\d+)?))"), lambda found: f"**({found[1] or found[2]})"),
+    (re.compile(r"(?<![A-Za-z])(sqrt|a?sin|a?cos|a?tan2?)\s*\{([^{}]*)\}"), r"\1(\2)"),
+    (_FRACTION, lambda found: f"(({found[1] or found[2] or ''})/({found[3] or found[4] or ''}))"),
+)
+"""Changes inside braces, innermost first."""
+_DEEPEST: Final = 8
+_ROOTS: Final[tuple[_Change, ...]] = (
+    (re.compile(r"√\s*(\d+(?:[.,]\d+)?|[A-Za-z]\w*)"), r"sqrt(\1)"),
+    (re.compile(r"(?<![A-Za-z])(sin|cos|tan)\s*⁻¹"), r"a\1"),
+)
 _EMPHASIS: Final[tuple[_Change, ...]] = (
     (re.compile(r"`+([^`]*)`+"), r"\1"),
     (re.compile(r"(?<![\w)])\*\*(?=\S)(.+?)(?<=\S)\*\*(?![\w(*])"), r"\1"),
@@ -79,19 +93,16 @@ def plain(text: str) -> str:
     Args:
         text: As written; what is longer than a cell can be is cut off.
     """
-    text = html.unescape(_changed(text[:LONGEST_CELL], _HTML)).translate(_BEFORE)
+    text = _changed(html.unescape(_changed(text[:LONGEST_CELL], _HTML)), _ROOTS).translate(_BEFORE)
     text = unicodedata.normalize("NFKC", text).translate(_AFTER)
     text = _changed(text, _EMPHASIS[:3])
     text = _changed(text, _LATEX)
-    for _ in range(4):
-        text = _INDEX.sub(r"_\1", _FRACTION.sub(_divided, text))
+    for _ in range(_DEEPEST):
+        before, text = text, _changed(text, _NESTED)
+        if text == before:
+            break
     text = text.replace("{", "").replace("}", "").strip()
     return " ".join(_changed(text, _EMPHASIS[3:]).split())
-
-
-def _divided(found: re.Match[str]) -> str:
-    above, below = found[1] or found[2] or "", found[3] or found[4] or ""
-    return f"(({above})/({below}))"
 
 
 def _changed(text: str, changes: tuple[_Change, ...]) -> str:

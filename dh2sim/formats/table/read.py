@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import Final
 
 from dh2sim.errors import Dh2simError, ImportedFileError, RobotFileError
 from dh2sim.formats.table import conventions, units
-from dh2sim.formats.table.cells import Constant, canonical
+from dh2sim.formats.table.constants import find_constants
 from dh2sim.formats.table.grid import MAX_COLUMNS, MAX_ROWS, Cell, Findings, is_comment
 from dh2sim.formats.table.headers import (
-    ANGLE_WORDS,
-    LENGTH_WORDS,
     PARAMETERS,
-    UNIT,
     Columns,
     Quantity,
     find_columns,
@@ -27,7 +24,6 @@ from dh2sim.formats.table.notation import plain
 from dh2sim.formats.table.printout import find_configurations, find_poses, find_printout, is_first_line
 from dh2sim.formats.table.rows import Body, ResolvedUnits, is_hayati, read_body, to_row
 from dh2sim.messages import member, shown
-from dh2sim.robot.expressions import FUNCTIONS, ExpressionError, evaluate
 from dh2sim.robot.fields import name_problem
 from dh2sim.robot.spec import AngleUnit, BaseSpec, Convention, JointType, LengthUnit, Pose, RobotSpec, Row, Units
 from dh2sim.robot.yaml_tree import Report, decode
@@ -77,59 +73,6 @@ def _numbers(table: Table, columns: Columns) -> Iterator[Cell]:
             cell = columns.cell(row, quantity)
             if cell is not None:
                 yield cell
-
-
-_MAX_TEXT_LINES: Final = 5000
-"""Lines that are searched for constants."""
-_NUMBER: Final = r"(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:[eE][-+]?\d+)?"
-_VALUE: Final = rf"[-+]?(?:{_NUMBER}\s*\*?\s*)?(?:{_NUMBER}|pi)(?:\s*/\s*\d+)?"
-_ASSIGNMENT: Final = re.compile(
-    rf"(?<![\w.])([A-Za-z][A-Za-z_]*_?\d+[a-z]?|[A-Za-z])\s*=\s*((?>{_VALUE}))"
-    rf"(?>\s*[\[(]?({UNIT})(?![A-Za-z0-9_])[\])]?)?+(?![\w%°\"']|[.,]\d|\s*[-+*/^(=])",
-)
-_GOES_ON: Final = re.compile(r"\s*(?!(?:and|is|are|for|where|with|which)\b)[A-Za-z]")
-"""A word behind a number without unit that may be a unit of its own."""
-_THOUSANDS: Final = re.compile(r"[1-9]\d{0,2},\d{3}")
-
-
-def find_constants(lines: Sequence[str], table: Container[int]) -> dict[str, Constant]:
-    """Return the symbols that a text gives a value, without the underscores in their names.
-
-    Args:
-        lines: The lines of the file.
-        table: Numbers of lines, from 1, that are the table's own.
-    """
-    found: dict[str, Constant] = {}
-    for number, line in enumerate(lines[:_MAX_TEXT_LINES], start=1):
-        if number in table or "=" not in line:
-            continue
-        for match in _ASSIGNMENT.finditer(plain(line)):
-            if match[3] is None and _GOES_ON.match(match.string, match.end()):
-                continue
-            name, constant = canonical(match[1]), _constant(match, number)
-            if constant is None or name in FUNCTIONS or name == "pi":
-                continue
-            first = found.setdefault(name, constant)
-            if (first.value, first.unit) != (constant.value, constant.unit):
-                problem = f"the symbol '{name}' has two values, on lines {first.line} and {number}; write the number"
-                found[name] = replace(first, problem=problem)
-    return found
-
-
-def _constant(match: re.Match[str], line: int) -> Constant | None:
-    text = match[2]
-    if _THOUSANDS.search(text):
-        return None
-    try:
-        value = evaluate(re.sub(r"(\d)\s*(?=pi)", r"\1*", text.replace(",", ".")), {})
-    except ExpressionError:
-        return None
-    word = (match[3] or ("rad" if "pi" in text else "")).casefold()
-    if angle := ANGLE_WORDS.get(word):
-        return Constant(value=Units(angle=angle).radians(value), unit=type(angle).RAD, line=line)
-    if length := LENGTH_WORDS.get(word):
-        return Constant(value=Units(length=length).metres(value), unit=type(length).M, line=line)
-    return Constant(value=value, unit=None, line=line)
 
 
 _MAX_LISTED: Final = 20
@@ -244,12 +187,15 @@ class _Reader:
         self._columns = find_columns(table.header[:MAX_COLUMNS], table.rows[:MAX_ROWS], findings)
         check_shape(table, findings)
         findings.check()
+        for note in table.notes:
+            findings.note(note)
 
     def read(
         self, name: str, convention: Convention | None, angle: AngleUnit | None, length: LengthUnit | None
     ) -> TableImport:
         findings, columns = self._findings, self._columns
-        constants = find_constants(self._lines, self._table.lines)
+        grids = [grid for grid in self._located.pipes if grid is not self._table.grid]
+        constants = find_constants(self._lines, self._table, grids)
         comma = has_decimal_comma(self._table, columns, findings)
         body = read_body(self._table, columns, constants, comma=comma, findings=findings)
         used, resolved = self._units(body, angle, length)

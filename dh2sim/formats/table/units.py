@@ -155,7 +155,9 @@ def _check(number: Number, option: Unit | None, findings: Findings) -> None:
     over, heading = number.heading_unit, shown(number.heading.cell.text)
     if unit is not None and not isinstance(unit, number.kind.units):
         findings.wrong(cell, number.path, f"{shown(cell.text)} is in {unit}, and {number.kind.what} belongs here")
-    elif unit is not None and over not in (None, unit) and number.reading.value != 0.0:
+    elif (
+        unit is not None and not number.reading.borrowed and over not in (None, unit) and number.reading.value != 0.0
+    ):
         findings.wrong(cell, number.path, f"{shown(cell.text)} is in {unit}, but the heading {heading} says {over}")
     if option is not None and over not in (None, option):
         findings.note(f"the heading {heading} says {over}; {option} was asked for, and used")

@@ -121,3 +121,44 @@ def test_a_wrong_cell_says_what_is_wrong(text: str, message: str) -> None:
     with pytest.raises(CellError) as raised:
         _read(text, THETA)
     assert str(raised.value) == message
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("$\\sqrt{L_3^2+L_2^2}$", 0.5), ("$\\sqrt{L_3^{2}+L_{2}^{2}}$", 0.5), ("√(L2² + L3²)", 0.5), ("2^3", 8.0),
+        ("$L_2^{\\,2}$", 0.09), ("$\\frac{\\sqrt{L_2^2 + L_3^2}}{2}$", 0.25), ("√2 / 2", math.sqrt(2) / 2),
+        ("$\\dfrac{1}{\\sqrt{2}}$", 1 / math.sqrt(2)), ("L2*cos(60°)", 0.15), ("L_2 \\cos(\\frac{\\pi}{3})", 0.15),
+        ("(L2 + L3)/2", 0.35),
+    ],
+)  # fmt: skip
+def test_powers_roots_and_functions_are_read_in_lengths(text: str, value: float) -> None:
+    cell = Cell(text=text, line=1, column=1)
+    constants = {name: Constant(value=v, unit=None, line=1) for name, v in (("L2", 0.3), ("L3", 0.4))}
+    assert read_cell(cell, None, constants, comma=False).value == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "$\\theta_2 + \\arctan{\\frac{L_3}{L_2}}$", "θ2 + atan(L3/L2)", "θ2 + tan⁻¹(L3/L2)",
+        "$\\theta_2 + \\tan^{-1}(L_3/L_2)$", "q2 + atan2(L3, L2)", "q2 + arctan2(L3,L2)", "θ_2 + arctg(L3/L2)",
+        "$\\operatorname{atan2}(L_3, L_2) + \\theta_2^*$",
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("unit", [None, LengthUnit.M])
+def test_an_arc_tangent_of_lengths_is_an_angle_in_radians(text: str, unit: LengthUnit | None) -> None:
+    constants = {name: Constant(value=v, unit=unit, line=1) for name, v in (("L2", 0.3), ("L3", 0.4))}
+    found = read_cell(Cell(text=text, line=1, column=1), THETA, constants, comma=False)
+    assert (found.value, found.unit) == (pytest.approx(math.atan2(0.4, 0.3), rel=1e-15), AngleUnit.RAD)
+
+
+@pytest.mark.parametrize("text", ["L1*cos(30)", "sin(90)", "tan(-45)"])
+def test_a_function_of_a_number_that_looks_like_degrees_is_refused(text: str) -> None:
+    with pytest.raises(CellError, match=r"is of radians; write .*°\) if degrees are meant"):
+        _read(text, None)
+
+
+@pytest.mark.parametrize("text", ["N/A", "n/a", "none", "nil", "—", "", "N.A."])
+def test_a_cell_that_says_not_applicable_is_empty(text: str) -> None:
+    assert _read(text, None).empty

@@ -103,5 +103,5 @@ def test_indices_that_do_not_go_together_are_refused() -> None:
     assert complaints(text) == [
         "t.md:1:15: the headings' indices contradict each other: a and alpha have index i - 1 in a modified "
         "table and i in "
-        "a standard one, d and theta always i"
+        "a standard one, d and theta always i; correct them, or pass convention='modified' or convention='standard'"
     ]
