@@ -25,8 +25,8 @@ l_ball = 8.70 mm
 TABLE = "| θ | d | a | α |\n|---|---|---|---|\n| q1 | {symbol} | 0 | 90° |\n"
 
 
-def _d(line: str, symbol: str = "d_1", **said: object) -> float:
-    return imported(f"{TABLE.format(symbol=symbol)}\n{line}\n", **{**STANDARD, **said}).spec.rows[0].d
+def _d(line: str, symbol: str = "d_1") -> float:
+    return imported(f"{TABLE.format(symbol=symbol)}\n{line}\n", **STANDARD).spec.rows[0].d
 
 
 def test_constants_of_several_letters_are_read() -> None:
