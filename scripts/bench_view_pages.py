@@ -86,11 +86,8 @@ def click(page: Page, rng: random.Random, seconds: float) -> int:
                 page.get_by_role("button", name=rng.choice(("home", "zero", "printed", "random")), exact=True).click()
             case "cell":
                 _tab(page, "Table")
-                row = rng.randrange(6)
-                _choose(page, "Edit row", row)
-                _field(page, f"d{subscript(row + 1)}").wait_for()
                 text = rng.choice(("0", "0.1", "90", "pi/2", "d2", "-45", "90 +"))
-                _field(page, rng.choice("aαdθ") + "[₀-₉]").fill(text)
+                _field(page, rng.choice("dθ") + subscript(1 + rng.randrange(6))).fill(text)
             case "convention":
                 _tab(page, "Table")
                 _choose(page, "convention[₀-₉]", rng.randrange(3))

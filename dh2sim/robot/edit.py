@@ -1,4 +1,4 @@
-"""Cells of the table in the text of a robot file: found, and exchanged without touching anything else of the text.
+"""Cells and parameters in the text of a robot file: found, and exchanged without touching anything else of the text.
 
 So comments, parameters and the order of keys are still the author's when a table that was edited is saved.
 """
@@ -12,8 +12,9 @@ from typing import Final, TypeAlias
 from dh2sim.robot.write import word
 from dh2sim.robot.yaml_tree import Entry, Node, Report, compose, resolve_plain
 
-Cell: TypeAlias = tuple[int | None, str]
-"""Row, from 0, and column; without a row a key of the whole file."""
+PARAMETERS: Final = "parameters"
+Cell: TypeAlias = tuple[int | str | None, str]
+"""Row, from 0, and column; ``PARAMETERS`` and a parameter's name; None and a key of the whole file."""
 
 _NUMBER: Final = re.compile(r"-?[0-9]+(?:\.[0-9]+)?(?:[eE][-+]?[0-9]+)?")
 
@@ -21,6 +22,12 @@ _NUMBER: Final = re.compile(r"-?[0-9]+(?:\.[0-9]+)?(?:[eE][-+]?[0-9]+)?")
 def written_cells(text: str) -> list[dict[str, str]]:
     """Return the single values in the rows of a valid robot file's text as they are written, by key."""
     return [{key: entry.value.text for key, entry in _cells(row).items()} for row in _rows(_tree(text))]
+
+
+def written_parameters(text: str) -> dict[str, str]:
+    """Return the parameters of a valid robot file's text as they are written, by name."""
+    node = _tree(text).at(PARAMETERS)
+    return {} if node is None else {name: entry.value.text for name, entry in _cells(node).items()}
 
 
 def own_conventions(text: str) -> list[int]:
@@ -83,19 +90,33 @@ def _has_anchors(node: Node) -> bool:
 def _change(root: Node, text: str, cell: Cell, typed: str | None) -> tuple[int, int, str]:
     """Return from where to where the text is exchanged, and for what."""
     index, key = cell
-    mapping = root if index is None else _rows(root)[index]
+    mapping = _mapping(root, index)
     entry = _cells(mapping).get(key)
     if typed is None:
         return (0, 0, "") if entry is None else _removal(text, entry, flow=mapping.flow)
     value = _as_value(typed)
     if entry is not None:
         return entry.value.start, entry.value.end, value
-    if index is None:
+    if not isinstance(index, int):
         raise KeyError(key)
     if mapping.flow:
         start = text.index("{", mapping.start) + 1
         return start, start, f"{key}: {value}, "
     return mapping.start, mapping.start, f"{key}: {value}\n{' ' * (mapping.column - 1)}"
+
+
+def _mapping(root: Node, index: int | str | None) -> Node:
+    """Return the mapping that a cell is in."""
+    match index:
+        case int():
+            return _rows(root)[index]
+        case str():
+            found = root.at(index)
+            if found is None:
+                raise KeyError(index)
+            return found
+        case None:
+            return root
 
 
 def _removal(text: str, entry: Entry, *, flow: bool) -> tuple[int, int, str]:

@@ -97,12 +97,12 @@ class ReleaseLink:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EditCell:
-    """Type into a cell of the table."""
+    """Type into a cell of the table, whose row is then the selected one, or into a parameter."""
 
-    row: int
-    """From 0."""
+    row: int | str
+    """From 0; ``PARAMETERS`` for a parameter."""
     column: str
-    """One of ``COLUMNS``, or ``CONVENTION``."""
+    """One of ``COLUMNS``, or ``CONVENTION``; a parameter's name."""
     text: str
     """A number in the file's units, or an expression over its parameters."""
 

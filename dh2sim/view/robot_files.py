@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import tempfile
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
+from dh2sim.errors import Dh2simError
 from dh2sim.export import Format, render, verify
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.robot.catalog import builtin_path, builtin_robots
+from dh2sim.robot.yaml_tree import MAX_BYTES
 from dh2sim.view.events import Compare, Event, Notify, OpenText, ReplaceText
 from dh2sim.view.initial_state import builtin_ghost, is_same_file, uploaded_ghost
 from dh2sim.view.state import ViewState
@@ -69,6 +74,46 @@ def _archive(files: dict[str, bytes]) -> bytes:
     return stream.getvalue()
 
 
+MAX_BESIDE = 100
+"""Robot files beside the first one that can be chosen."""
+
+
+def robot_files_in(folder: Path | None) -> tuple[str, ...]:
+    """Return the names of the robot files in a folder, sorted; none for that of the robots that come with dh2sim.
+
+    A YAML file with a key ``joints`` that is not too large for a robot file counts as one. It is read when chosen.
+    """
+    if folder is None or folder == _builtin_folder():
+        return ()
+    with contextlib.suppress(OSError):
+        files = [file for file in sorted(folder.iterdir()) if file.suffix in (".yaml", ".yml")]
+        return tuple(file.name for file in files if _is_robot_file(file))[:MAX_BESIDE]
+    return ()
+
+
+def _is_robot_file(file: Path) -> bool:
+    try:
+        return file.is_file() and file.stat().st_size <= MAX_BYTES and b"\njoints:" in b"\n" + file.read_bytes()
+    except OSError:
+        return False
+
+
+def _builtin_folder() -> Path | None:
+    path = next(map(builtin_path, builtin_robots()), None)
+    return None if path is None else path.parent
+
+
+def _name_of(state: ViewState) -> str:
+    """Return the name of a robot that comes with dh2sim, or of the file."""
+    return _listed_name(state.file, state.folder)
+
+
+@lru_cache(maxsize=8)  # asked for with every picture
+def _listed_name(file: str, folder: Path | None) -> str:
+    name = Path(file).name
+    return name.removesuffix(".yaml") if folder is not None and folder == _builtin_folder() else name
+
+
 class RobotFiles:
     """The file actions of a page; used on the page's thread alone."""
 
@@ -92,6 +137,39 @@ class RobotFiles:
         self._download = download
         self._on_open = on_open
         self._initial = state()
+        self._beside = robot_files_in(self._initial.folder)
+        self._known = (*self._beside, *builtin_robots())
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots to choose from: files beside the first one, those that come with dh2sim, and the present one."""
+        return self._known if self.chosen in self._known else (self.chosen, *self._known)
+
+    @property
+    def chosen(self) -> str:
+        """The robot that is shown, as ``robots`` names it."""
+        return _name_of(self._state())
+
+    def choose(self, robot: str) -> None:
+        """Open one of ``robots``.
+
+        Raises:
+            Dh2simError: The file cannot be read, or is no longer there.
+        """
+        if robot == self.chosen:
+            return
+        if robot == _name_of(self._initial):
+            self.reopen()
+            return
+        beside = robot in self._beside and self._initial.folder is not None
+        path = self._initial.folder / robot if beside and self._initial.folder is not None else builtin_path(robot)
+        if path is None:
+            raise Dh2simError(f"{robot} is no longer there.")
+        try:
+            text = path.read_bytes()
+        except OSError as error:
+            raise Dh2simError(f"{robot}: {error.strerror or error}") from error
+        self._open(OpenText(text=text, file=path.name, folder=path.parent))
 
     def save(self) -> None:
         """Offer the robot file as edited."""

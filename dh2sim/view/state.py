@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -56,10 +57,10 @@ INITIALLY: Final = frozenset(Part) - {Part.TRACE}
 class CellError:
     """An error in a cell of the table."""
 
-    row: int
-    """From 0."""
+    row: int | str
+    """From 0; ``PARAMETERS`` for a parameter."""
     column: str
-    """One of ``COLUMNS``, or ``CONVENTION``."""
+    """One of ``COLUMNS``, or ``CONVENTION``; a parameter's name."""
     text: str
     """As typed."""
     message: str
@@ -85,9 +86,11 @@ class TableState:
     convention: Convention
     """Of rows that name none."""
     units: Units
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    """Texts by name."""
     errors: tuple[CellError, ...] = ()
 
-    def error(self, row: int, column: str) -> CellError | None:
+    def error(self, row: int | str, column: str) -> CellError | None:
         """Return the error in a cell, or None."""
         return next((found for found in self.errors if (found.row, found.column) == (row, column)), None)
 
@@ -139,8 +142,8 @@ class ViewState:
     """Joint coordinates, rad and m."""
     undo_texts: tuple[str, ...] = field(default=(), repr=False)
     """Texts of the robot file before the last edits, the newest last."""
-    edited_cell: tuple[int, str] | None = None
-    """Row and column of the cell that the last edit was in."""
+    edited_cell: tuple[int | str, str] | None = None
+    """Row and column of the cell, or ``PARAMETERS`` and the name, that the last edit was in."""
     target: tuple[float, ...] | None = None
     """Targets of a simulation's actuators; None without a simulation."""
     shown: frozenset[Part] = INITIALLY

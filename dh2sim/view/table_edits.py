@@ -10,7 +10,7 @@ from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.forward import frame_names
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.edit import Cell, own_conventions
+from dh2sim.robot.edit import PARAMETERS, Cell, own_conventions
 from dh2sim.robot.spec import Convention, JointType
 from dh2sim.robot.write import robot_file_text
 from dh2sim.view.events import ConvertTable, EditCell, SetConvention, SetUnits
@@ -38,8 +38,11 @@ def table_changed(state: ViewState, event: TableEvent) -> ViewState:
         return replace(state, notice="The table can be edited in manual mode only.")
     match event:
         case EditCell(row=row, column=column, text=text):
+            if not isinstance(row, int):
+                known = row == PARAMETERS and column in state.table.parameters
+                return _edited(state, {(row, column): text}) if known else state
             known = 0 <= row < len(state.table.rows) and column in (*COLUMNS, CONVENTION)
-            return _edited(state, {(row, column): text}) if known else state
+            return replace(_edited(state, {(row, column): text}), selected_row=row) if known else state
         case SetConvention(row=row, convention=convention):
             known = row is None or 0 <= row < len(state.table.rows)
             return _edited(state, _in_convention(state, row, convention)) if known else state

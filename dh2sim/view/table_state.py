@@ -10,7 +10,15 @@ from typing import Final
 from dh2sim.errors import Dh2simError, RobotFileError
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.edit import Cell, can_be_edited, unit_words, with_cells, written_cells
+from dh2sim.robot.edit import (
+    PARAMETERS,
+    Cell,
+    can_be_edited,
+    unit_words,
+    with_cells,
+    written_cells,
+    written_parameters,
+)
 from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import AngleUnit, LengthUnit, RobotSpec, Units
 from dh2sim.robot.write import robot_file_text
@@ -109,7 +117,10 @@ def table_state_of(text: str, spec: RobotSpec, errors: tuple[CellError, ...] = (
         )
         for i, (row, written) in enumerate(zip(spec.rows, written_cells(text), strict=True))
     )
-    return TableState(rows=rows, convention=spec.convention, units=units_of(text), errors=errors)
+    parameters = {name: typed.get((PARAMETERS, name), written) for name, written in written_parameters(text).items()}
+    return TableState(
+        rows=rows, convention=spec.convention, units=units_of(text), parameters=parameters, errors=errors
+    )
 
 
 def too_long(cells: Mapping[Cell, str]) -> Invalid | None:
@@ -137,11 +148,13 @@ def cell_errors(cells: Mapping[Cell, str], invalid: Invalid) -> tuple[CellError,
     return tuple(
         CellError(row=row, column=column, text=cells[row, column], message=message)
         for (row, column), message in found.items()
-        if message and row is not None and column in (*COLUMNS, CONVENTION)
+        if message and row is not None and (row == PARAMETERS or column in (*COLUMNS, CONVENTION))
     )
 
 
 def path_of_cell(cell: Cell) -> str:
     """Return the place of a cell as in messages."""
     row, column = cell
-    return f"joints[{row}].{column}" if row is not None else column
+    if row is None:
+        return column
+    return f"joints[{row}].{column}" if isinstance(row, int) else f"{row}.{column}"

@@ -138,9 +138,8 @@ def test_the_labels_of_a_row_can_be_read_wherever_the_camera_is(
     page = open_page()
     (served,) = viewer.pages
     open_tab(page, "Table")
-    choose(page, "Edit row", "2: joint_2")
-    page.get_by_text("Explain in scene").click()
-    wait_until(lambda: "/row/a_label" in served._painter._drawn, "the row is explained")
+    choose(page, "Row", "2: joint_2")
+    wait_until(lambda: "α₂ = 90°" in {label.text for label in drawn_labels(served)}, "the row is explained")
     before = served.state.pinhole
     for pixels in (90.0, -170.0):
         move_the_camera(page, served, pixels)
@@ -148,9 +147,13 @@ def test_the_labels_of_a_row_can_be_read_wherever_the_camera_is(
         wait_until(lambda: not covered(page, served), f"{covered(page, served)} cover each other")
 
 
+def drawn_labels(served: ServedPage) -> list[Label]:
+    return [item for item in tuple(served._painter._drawn.values()) if isinstance(item, Label)]
+
+
 def covered(page: Page, served: ServedPage) -> list[tuple[str, str]]:
     """Which labels cover each other by more than the camera may move without them: a few pixels."""
-    labels = {item.text: item for item in tuple(served._painter._drawn.values()) if isinstance(item, Label)}
+    labels = {item.text: item for item in drawn_labels(served)}
     found = []
     for (here, a), (there, b) in combinations(labels.items(), 2):
         (xa, ya), (xb, yb) = pixel(page, served, a.position), pixel(page, served, b.position)

@@ -75,11 +75,14 @@ def test_the_pose_is_shown_in_all_notations_with_its_difference_to_mujoco(
     assert all(float(number) < 1e-12 for number in found.groups())
 
 
-def test_files_are_downloaded_as_edited_and_the_model_matches_the_table(open_page: OpenPage, tmp_path: Path) -> None:
+def test_files_are_downloaded_as_edited_and_the_model_matches_the_table(
+    open_page: OpenPage, viewer: Viewer, tmp_path: Path
+) -> None:
     page = open_page()
+    (served,) = viewer.pages
     open_tab(page, "Table")
     field(page, "a₁").fill("0.123")
-    wait_until(lambda: "0.123" in shown(page, "table"), "the cell")
+    wait_until(lambda: served.state.spec.rows[0].a == 0.123, "the cell")
     open_tab(page, "Files")
     with page.expect_download() as saved:
         page.get_by_role("button", name="Save robot file").click()
@@ -130,26 +133,31 @@ def test_joints_are_moved_by_number_slider_key_and_name(open_page: OpenPage, tmp
     assert field(page, "joint_1 [°]").input_value() == "0"
 
 
-def test_the_table_is_edited_marked_reread_and_restored(open_page: OpenPage, tmp_path: Path) -> None:
+def test_the_table_is_edited_marked_reread_and_restored(open_page: OpenPage, viewer: Viewer, tmp_path: Path) -> None:
     page, spec = open_page(), load_robot("stanford")
+    (served,) = viewer.pages
     open_tab(page, "Table")
-    choose(page, "Edit row", "2: joint_2")
     field(page, "d₂").fill("d2 + 0.1")
-    wait_until(lambda: "d2 + 0.1" in shown(page, "table"), "the cell")
+    wait_until(lambda: served.state.spec.rows[1].d == 0.25, "the cell")
+    wait_until(lambda: field(page, "Row").input_value() == "2: joint_2", "its row is selected")
     open_tab(page, "Joints")
     edited = parse_robot(spec.source_file.text.replace("d: d2", "d: 0.25"))  # type: ignore[union-attr]
     wait_for_position(page, edited, HOME)
     open_tab(page, "Table")
     field(page, "α₂").fill("90 +")
     wait_until(lambda: "it ends too early" in shown(page, "cell-errors"), "the error")
+    red, color = "rgb(180, 35, 24)", "cell => getComputedStyle(cell).color"
+    wait_until(lambda: field(page, "α₂").evaluate(color) == red, "the cell is marked")
+    assert field(page, "α₁").evaluate(color) != red
     assert shown(page, "notice") == "Robot unchanged: joints[1].alpha: in '90 +': it ends too early"
     open_tab(page, "Joints")
     wait_for_position(page, edited, HOME)
     open_tab(page, "Table")
     field(page, "α₂").fill("pi / pi * 45")
     choose(page, "convention₂", "modified")
-    wait_until(lambda: "modified" in shown(page, "table"), "the convention")
-    assert field(page, "α₁").input_value() == "pi / pi * 45", "its index in this convention"
+    wait_until(lambda: "modified" in shown(page, "conventions"), "the convention")
+    wait_until(lambda: page.locator("label", has_text="α₂").count() == 0, "the label")
+    assert page.locator("label", has_text="α₁").count() == 2, "its index in this convention"
     open_tab(page, "Joints")
     text = edited.source_file.text.replace(  # type: ignore[union-attr]
         "alpha: 90, d: 0.25", "alpha: 45, d: 0.25, convention: modified"

@@ -12,7 +12,7 @@ from dh2sim.robot.read import load_robot
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.scene.camera import viewpoint_of
-from tests.view.on_page import Serve, choose, field, open_tab, shown, wait_for_position, wait_until
+from tests.view.on_page import Serve, choose, field, open_tab, wait_for_position, wait_until
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -55,10 +55,10 @@ def test_keys_typed_into_a_field_move_nothing(serve: Serve) -> None:
     wait_until(lambda: served.state.q[0] == pytest.approx(math.radians(149.7)), "joint_1 is where it was typed")
     wait_for_position(page, SSRMS, [math.radians(149.7), *home[1:]])
     open_tab(page, "Table")
-    choose(page, "Edit row", "2: joint_2")
+    choose(page, "Row", "2: joint_2")
     field(page, "α₂").click()
     page.keyboard.type("147rfvgGyhn")
-    wait_until(lambda: "147rfvgGyhn" in shown(page, "table"), "the cell")
+    wait_until(lambda: "147rfvgGyhn" in served.state.table.rows[1].cells[1], "the cell")
     assert served.state.q[1:] == pytest.approx(home[1:], abs=1e-12)
     assert served.state.table.errors, "it is no number, and the robot is the one of before"
 

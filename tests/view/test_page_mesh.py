@@ -65,10 +65,11 @@ def test_the_mesh_of_a_link_is_sent_to_the_browser_and_seen(serve: Serve, tmp_pa
     assert served.client.scene.get_handle_by_name("/robot/link_1/shape_0") is None
 
     open_tab(page, "Show")
-    for part in ("DH frames", "Grid"):
-        page.get_by_text(part, exact=True).click()
-    wait_until(lambda: served.state.shown.isdisjoint({Part.FRAMES, Part.GRID}), "nothing but the robot is shown")
+    hidden = {"DH frames": Part.FRAMES, "Grid": Part.GRID, "Explained row": Part.ANNOTATIONS}
+    for label in (*hidden, "Handle to drag tool0"):
+        page.get_by_text(label, exact=True).click()
+    wait_until(lambda: served.state.shown.isdisjoint(hidden.values()), "nothing but the robot is shown")
     middle = table_frame_poses(spec, [0.0])[1][:3, 3]
     wait_until(lambda: color_at(page, served, middle) not in (WHITE, None), "the mesh is seen")
-    page.get_by_text("Robot", exact=True).click()
+    page.get_by_text("Shapes", exact=True).click()
     wait_until(lambda: color_at(page, served, middle) == WHITE, "the robot is hidden, and so is its mesh")

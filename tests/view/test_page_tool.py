@@ -70,10 +70,8 @@ def test_tool0_follows_its_handle_and_the_page_says_where_it_cannot(
     open_page: OpenPage, viewer: Viewer, tmp_path: Path
 ) -> None:
     page = open_page()
-    open_tab(page, "Show")
     (served,) = viewer.pages
-    page.get_by_text("Handle to drag tool0").click()
-    wait_until(lambda: Part.HANDLE in served.state.shown, "the handle")
+    assert Part.HANDLE in served.state.shown
     before = table_tool_pose(STANFORD, served.state.q)
 
     drag(page, served, 1, 0.12)

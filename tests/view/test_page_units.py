@@ -23,7 +23,7 @@ def test_the_table_is_written_in_radians_and_millimetres_and_the_robot_stays(ser
     page, served = serve(open_state(STANFORD))
     open_tab(page, "Table")
     page.get_by_text("Whole table").click()
-    choose(page, "Edit row", "2: joint_2")
+    choose(page, "Row", "2: joint_2")
     wait_until(lambda: field(page, "α₂").input_value() == "90", "degrees")
     choose(page, "Angles in", "rad")
     wait_until(lambda: field(page, "α₂").input_value() == "1.5707963267948966", "radians")

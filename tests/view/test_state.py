@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.robot.edit import PARAMETERS
 from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import AngleUnit, Convention, JointType, LengthUnit, RobotSpec
 from dh2sim.robot.write import robot_file_text
@@ -67,6 +68,7 @@ anything: st.SearchStrategy[events.Event] = st.one_of(
     ),
     st.builds(events.ReleaseLink),
     st.builds(events.EditCell, row=rows, column=st.sampled_from([*COLUMNS, "convention", "link"]), text=typed),
+    st.builds(events.EditCell, row=st.just(PARAMETERS), column=st.sampled_from(["d1", "d6", "x"]), text=typed),
     st.builds(events.SetConvention, row=st.none() | rows, convention=st.sampled_from(Convention)),
     st.builds(events.ConvertTable, convention=st.sampled_from(Convention)),
     st.builds(events.SetUnits, angle=st.sampled_from(AngleUnit), length=st.sampled_from(LengthUnit)),
@@ -142,6 +144,41 @@ def test_an_expression_in_a_cell_is_evaluated_with_the_parameters_of_the_file() 
     assert edited.spec.rows[1].d == 0.15 + 0.4 / 2
     assert edited.table.rows[1].cells[2] == "d2 + d1/2"
     assert edited.notice == ""
+
+
+def test_a_parameter_is_edited_and_every_cell_that_names_it_follows() -> None:
+    state = after(STANFORD, events.EditCell(row=1, column="d", text="d2 + d1"))
+    edited = after(state, events.EditCell(row=PARAMETERS, column="d1", text="0.3 / 2"))
+    assert [row.d for row in edited.spec.rows[:2]] == [0.15, 0.15 + 0.15]
+    assert edited.table.parameters == {"d1": "0.3 / 2", "d2": "0.15", "d6": "0.3"}
+    assert edited.text == state.text.replace("d1: 0.4", 'd1: "0.3 / 2"')
+    assert edited.selected_row == state.selected_row
+    assert after(edited, events.Undo()).text == state.text
+
+
+def test_a_wrong_parameter_keeps_the_robot_and_is_marked_until_it_is_right() -> None:
+    wrong = after(STANFORD, events.EditCell(row=PARAMETERS, column="d1", text="d1 + 1"))
+    assert wrong.model is STANFORD.model
+    message = "parameters need each other in a circle: d1 -> d1"
+    assert wrong.table.errors == (CellError(row=PARAMETERS, column="d1", text="d1 + 1", message=message),)
+    assert wrong.notice == f"Robot unchanged: parameters.d1: {message}"
+    assert wrong.table.parameters["d1"] == "d1 + 1"
+    mended = after(wrong, events.EditCell(row=PARAMETERS, column="d1", text="1"))
+    assert mended.table.errors == ()
+    assert mended.spec.rows[0].d == 1.0
+
+
+def test_a_parameter_that_the_file_does_not_have_changes_nothing() -> None:
+    assert after(STANFORD, events.EditCell(row=PARAMETERS, column="d9", text="1")) == STANFORD
+    without = open_state(parse_robot(ONE_JOINT))
+    assert without.table.parameters == {}
+    assert after(without, events.EditCell(row=PARAMETERS, column="d1", text="1")) == without
+    assert after(STANFORD, events.EditCell(row="joints", column="d1", text="1")) == STANFORD
+
+
+def test_typing_into_a_cell_selects_its_row_right_or_wrong() -> None:
+    for text in ("0.2", "0.2 +"):
+        assert after(STANFORD, events.EditCell(row=4, column="a", text=text)).selected_row == 4
 
 
 def test_an_edit_leaves_the_rest_of_the_file_as_it_was() -> None:

@@ -38,6 +38,18 @@ def table(rows: Iterable[Sequence[str]], *, head: Sequence[str] = (), name: str 
     )
 
 
+def banner(content: str, *, error: bool = False, name: str = "") -> str:
+    """Return a text, given as HTML, that covers the lower left corner of the window, so that it moves nothing."""
+    if not content:
+        return note("", name=name)
+    border = "#b42318" if error else "#235394"
+    style = (
+        "position:fixed;left:1rem;bottom:1rem;z-index:50;max-width:min(34rem,calc(100vw - 2rem));max-height:50vh;"
+        f"overflow:auto;background:#fff;border:1px solid #d5dae1;border-left:4px solid {border};border-radius:4px"
+    )
+    return f'<div style="{style}">{note(content, error=error, name=name)}</div>'
+
+
 def lines(pairs: Iterable[tuple[str, str]], *, name: str = "") -> str:
     """Return lines of names and values, both HTML."""
     body = "".join(

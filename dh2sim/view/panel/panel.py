@@ -1,4 +1,4 @@
-"""The panel of a page: a line for notices, and tabs; of these, what to show and files are defined here."""
+"""The panel of a page: the robot, notices, and tabs; of these, what to show and files are defined here."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ UseFile: TypeAlias = Callable[[bytes, str], None]
 """Takes the content and the name of an uploaded file."""
 
 _PART_LABELS: Final = {
-    Part.SHAPES: "Robot",
+    Part.SHAPES: "Shapes",
     Part.FRAMES: "DH frames",
     Part.FRAME_NAMES: "Frame names",
     Part.ANNOTATIONS: "Explained row",
@@ -64,6 +64,9 @@ class Panel:
         self._gui = client.gui
         self._name = ""
         self._notice = client.gui.add_html("")
+        chooser = client.gui.add_dropdown("Robot", files.robots, initial_value=files.chosen)
+        self._robot = bind(chooser, send, lambda name: partial(files.choose, name))
+        self._files = files
         tabs = client.gui.add_tab_group()
         with tabs.add_tab("Joints") as joints:
             self._joints = JointsTab(client, joints, send, state)
@@ -85,9 +88,12 @@ class Panel:
             self._name = state.spec.name
             self._gui.set_panel_label(f"dh2sim · {self._name}")
         notice = " ".join(text for text in (state.notice, goal_text(state)) if text)
-        self._notice.content = markup.note(
+        self._notice.content = markup.banner(
             markup.lines_of_text(notice), error=bool(state.table.errors), name="notice"
         )
+        if tuple(self._robot.handle.options) != self._files.robots:
+            self._robot.handle.options = self._files.robots
+        self._robot.show(self._files.chosen)
         self._joints.show(state)
         self._table.show(state)
         self._parts.show(state)

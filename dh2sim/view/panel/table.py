@@ -1,165 +1,31 @@
-"""The Table tab: an overview of the table as printed in textbooks, and an editor of one row."""
+"""The Table tab: the table's cells, what explains the selected row, and the robot file's parameters."""
 
 from __future__ import annotations
 
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
+from dh2sim.robot.edit import PARAMETERS
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
 from dh2sim.view.events import ConvertTable, EditCell, SelectRow, SetConvention, SetUnits, Show, Undo
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
+from dh2sim.view.panel.cells import CellGrid, identity_of
 from dh2sim.view.scene.annotations import Quantity, subscript, symbol
 from dh2sim.view.state import CONVENTION, CellError, Part, TableState, ViewState
 
 if TYPE_CHECKING:
     import viser
 
-_ERROR = "background:#fde2df;color:#b42318;border-radius:3px;padding:0 0.2em"
-_SELECTED = "font-weight:700"
-
-
-def overview(state: ViewState) -> str:
-    """Return the table as HTML; cells with errors are marked, with the message as tooltip."""
-    table = state.table
-    hayati = any(row.convention is Convention.HAYATI for row in table.rows)
-    angle = "°" if table.units.angle is AngleUnit.DEG else "rad"
-    length = table.units.length.value
-    head = ["i", "joint", f"a<br>{length}", f"α<br>{angle}", f"d<br>{length}", f"θ<br>{angle}"]
-    head += [f"β<br>{angle}"] if hayati else []
-    rows = [_row(state, i, hayati=hayati) for i in range(len(table.rows))]
-    return markup.table(rows, head=[*head, "convention"], name="table") + markup.note(_legend(table))
-
-
-def _row(state: ViewState, i: int, *, hayati: bool) -> list[str]:
-    row = state.table.rows[i]
-    number = f"<span style='{_SELECTED}'>{i + 1}</span>" if i == state.selected_row else str(i + 1)
-    columns = ("a", "alpha", "d", "theta", *(("beta",) if hayati else ()))
-    cells = [_cell(state, i, column, text) for column, text in zip(columns, row.cells, strict=False)]
-    flips = [spec.flip for spec in state.spec.rows]
-    variable = _variable(i, flip=flips[i])
-    if row.type.moves:
-        moved = 3 if row.type.turns else 2
-        marked = state.table.error(i, columns[moved]) is not None
-        cells[moved] = f"{variable} + {cells[moved]}" if marked else variable + _offset(row.cells[moved])
-    return [number, markup.text(row.name), *cells, row.convention.value]
-
-
-def _cell(state: ViewState, row: int, column: str, text: str) -> str:
-    found: CellError | None = state.table.error(row, column)
-    if found is None:
-        return markup.text(text)
-    return f'<span title="{markup.text(found.message)}" style="{_ERROR}">{markup.text(text) or "?"}</span>'
-
-
-def _variable(i: int, *, flip: bool) -> str:
-    return f"{'−' if flip else ''}q<sub>{i + 1}</sub>"
-
-
-def _offset(text: str) -> str:
-    """Return the offset after a joint's variable; empty if it is zero."""
-    number = text.strip().removeprefix("+").strip()
-    if not number or _is_zero(number):
-        return ""
-    sign, rest = ("−", number[1:].strip()) if number.startswith("-") else ("+", number)
-    return f" {sign} {markup.text(rest)}"
-
-
-def _is_zero(text: str) -> bool:
-    try:
-        return float(text) == 0.0
-    except ValueError:  # an expression
-        return False
-
-
-def _legend(table: TableState) -> str:
-    used = {row.convention for row in table.rows}
-    products = {
-        Convention.STANDARD: "standard: Rz(θ) Tz(d) Tx(a) Rx(α)",
-        Convention.MODIFIED: "modified: Tx(a) Rx(α) Rz(θ) Tz(d), a and α of index i − 1",
-        Convention.HAYATI: "hayati: Rz(θ) Tx(a) Rx(α) Ry(β)",
-    }
-    return "<br>".join(text for convention, text in products.items() if convention in used)
-
-
-_STEP: Final = 0.01
-"""Between the orders of widgets, which are placed between two of viser's, whose orders are whole numbers."""
-
-
-class RowEditor:
-    """Fields of one row, labelled with its indices; another row gets fields of its own.
-
-    So typing always goes to the row that the label names, even if another row was selected a moment before.
-    """
-
-    def __init__(self, gui: viser.GuiApi, send: Send, state: ViewState, row: int, place: float) -> None:
-        """Add the widgets to viser's current container.
-
-        Args:
-            gui: The page's widgets.
-            send: Queues events.
-            state: A state that has the row.
-            row: From 0.
-            place: Order of the widget that they are placed below.
-        """
-        self._row = row
-        shown = state.table.rows[row]
-        self._convention_shown = shown.convention
-        self._cells: dict[Quantity, Bound[str]] = {}
-        for k, quantity in enumerate(Quantity, start=1):
-            widget = gui.add_text(
-                symbol(quantity, shown.convention, row),
-                shown.cells[k - 1],
-                hint="A number, or an expression such as pi/2 or d1 + 0.1",
-                order=place + k * _STEP,
-            )
-            self._cells[quantity] = bind(widget, send, partial(self._edit, quantity.value))
-        end = place + len(Quantity) * _STEP
-        self._convention = bind(
-            gui.add_dropdown(
-                f"convention{subscript(row + 1)}",
-                [convention.value for convention in Convention],
-                initial_value=shown.convention.value,
-                hint="Reads the same numbers in another way, which makes another robot",
-                order=end + _STEP,
-            ),
-            send,
-            lambda name: SetConvention(row=row, convention=Convention(name)),
-        )
-        self._errors = gui.add_html("", order=end + 2 * _STEP)
-
-    def show(self, state: ViewState) -> None:
-        """Show a state that has the row."""
-        row = state.table.rows[self._row]
-        for (quantity, cell), text in zip(self._cells.items(), row.cells, strict=True):
-            cell.show(text)
-            marked = state.table.error(self._row, quantity.value) is not None
-            cell.handle.visible = marked or quantity is not Quantity.BETA or row.convention is Convention.HAYATI
-            if row.convention is not self._convention_shown:
-                cell.handle.label = symbol(quantity, row.convention, self._row)
-        self._convention_shown = row.convention
-        self._convention.show(row.convention.value)
-        errors = [error for error in state.table.errors if error.row == self._row]
-        text = "<br>".join(_error_text(error, row.convention) for error in errors)
-        self._errors.content = markup.note(text, error=True, name="cell-errors")
-
-    def remove(self) -> None:
-        """Remove the widgets from the page."""
-        for widget in (*(cell.handle for cell in self._cells.values()), self._convention.handle, self._errors):
-            widget.remove()
-
-    def _edit(self, column: str, text: str) -> EditCell:
-        return EditCell(row=self._row, column=column, text=text)
-
-
-def _error_text(error: CellError, convention: Convention) -> str:
-    if error.column == CONVENTION:
-        return f"<b>convention</b>: {markup.text(error.message)}"
-    return f"<b>{symbol(Quantity(error.column), convention, error.row)}</b>: {markup.text(error.message)}"
+_PRODUCTS: Final = {
+    Convention.STANDARD: "standard: Rz(θ) Tz(d) Tx(a) Rx(α)",
+    Convention.MODIFIED: "modified: Tx(a) Rx(α) Rz(θ) Tz(d), a and α of index i − 1",
+    Convention.HAYATI: "hayati: Rz(θ) Tx(a) Rx(α) Ry(β)",
+}
 
 
 class TableTab:
-    """An overview, and an editor of the selected row."""
+    """The table; below it the selected row, the parameters, and what concerns all rows."""
 
     def __init__(self, client: viser.ClientHandle, tab: viser.GuiTabHandle, send: Send, state: ViewState) -> None:
         """Add the widgets to a tab, viser's current container."""
@@ -167,19 +33,20 @@ class TableTab:
         self._tab = tab
         self._send = send
         self._shown: object = None
-        self._overview = self._gui.add_html("")
+        self._cells = CellGrid(self._gui, send, state)
+        self._notes = self._gui.add_html("")
         self._rows = _names(state)
-        chooser = self._gui.add_dropdown("Edit row", self._rows)
+        chooser = self._gui.add_dropdown("Row", self._rows, hint="The row that is explained in the scene")
         self._chooser = bind(chooser, send, self._selected)
-        self._edited = _identity(state)
-        self._editor = self._editor_of_row(state)
-        self._undo = self._gui.add_button("Undo", disabled=True, hint="Undoes the last edit of the table")
-        on_click(self._undo, send, Undo)
+        self._convention = self._convention_of_row(state)
         self._explain = bind(
             self._gui.add_checkbox("Explain in scene", Part.ANNOTATIONS in state.shown),
             send,
             lambda on: Show(part=Part.ANNOTATIONS, on=on),
         )
+        self._undo = self._gui.add_button("Undo", disabled=True, hint="Undoes the last edit of the table")
+        on_click(self._undo, send, Undo)
+        self._parameters = ParameterFields(self._gui, send, state)
         with self._gui.add_folder("Whole table", expand_by_default=False):
             self._add_whole(state)
 
@@ -189,24 +56,41 @@ class TableTab:
         if shown == self._shown:
             return
         self._shown = shown
-        self._overview.content = overview(state)
+        with self._tab:
+            if identity_of(state) != self._cells.identity:
+                self._cells.remove()
+                self._cells = CellGrid(self._gui, self._send, state, self._cells.order)
+            if self._row_of_convention != (state.spec.name, state.selected_row):
+                self._convention.handle.remove()
+                self._convention = self._convention_of_row(state)
+            if not self._parameters.belongs_to(state):
+                self._parameters.remove()
+                self._parameters = ParameterFields(self._gui, self._send, state, self._parameters.order)
+        self._cells.show(state)
+        self._notes.content = notes(state.table)
         if _names(state) != self._rows:
             self._rows = self._chooser.handle.options = _names(state)
         self._chooser.show(self._rows[state.selected_row])
-        if _identity(state) != self._edited:
-            self._edited = _identity(state)
-            self._editor.remove()
-            with self._tab:
-                self._editor = self._editor_of_row(state)
-        self._editor.show(state)
+        self._convention.show(state.table.rows[state.selected_row].convention.value)
+        self._parameters.show(state)
         if self._undo.disabled == bool(state.undo_texts):
             self._undo.disabled = not state.undo_texts
         self._explain.show(Part.ANNOTATIONS in state.shown)
         self._angle.show(state.table.units.angle.value)
         self._length.show(state.table.units.length.value)
 
-    def _editor_of_row(self, state: ViewState) -> RowEditor:
-        return RowEditor(self._gui, self._send, state, state.selected_row, self._chooser.handle.order)
+    def _convention_of_row(self, state: ViewState) -> Bound[str]:
+        """Add the convention of the selected row, which gets a field of its own, as its label names it."""
+        row = state.selected_row
+        self._row_of_convention = (state.spec.name, row)
+        field = self._gui.add_dropdown(
+            f"convention{subscript(row + 1)}",
+            [convention.value for convention in Convention],
+            initial_value=state.table.rows[row].convention.value,
+            hint="Reads the same numbers in another way, which makes another robot",
+            order=self._chooser.handle.order + 0.5,  # viser's own orders are whole numbers
+        )
+        return bind(field, self._send, lambda name: SetConvention(row=row, convention=Convention(name)))
 
     def _selected(self, label: str) -> SelectRow:
         """Return the event of a choice; one of a robot no longer shown selects no row."""
@@ -234,6 +118,64 @@ class TableTab:
         return SetUnits(angle=AngleUnit(self._angle.handle.value), length=LengthUnit(self._length.handle.value))
 
 
+class ParameterFields:
+    """A field for each parameter of the robot file; other parameters get fields of their own."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send, state: ViewState, order: float | None = None) -> None:
+        """Add the widgets to viser's current container."""
+        self._names = _parameters(state)
+        self._folder = gui.add_folder("Parameters", order=order, visible=bool(state.table.parameters))
+        with self._folder:
+            self._fields = {
+                name: bind(gui.add_text(name, text), send, partial(_edit_parameter, name))
+                for name, text in state.table.parameters.items()
+            }
+
+    @property
+    def order(self) -> float:
+        """Place in the container."""
+        return float(self._folder.order)
+
+    def belongs_to(self, state: ViewState) -> bool:
+        """Return whether the fields are those of a state's parameters."""
+        return self._names == _parameters(state)
+
+    def show(self, state: ViewState) -> None:
+        """Show a state with the same parameters."""
+        for name, text in state.table.parameters.items():
+            self._fields[name].show(text)
+
+    def remove(self) -> None:
+        """Remove the widgets from the page."""
+        self._folder.remove()
+
+
+def _parameters(state: ViewState) -> object:
+    return state.spec.name, tuple(state.table.parameters)
+
+
+def _edit_parameter(name: str, text: str) -> EditCell:
+    return EditCell(row=PARAMETERS, column=name, text=text)
+
+
+def notes(table: TableState) -> str:
+    """Return the errors of cells and parameters, and how rows are read, HTML."""
+    errors = "<br>".join(_error_text(error, table) for error in table.errors)
+    used = {row.convention for row in table.rows}
+    legend = "<br>".join(text for convention, text in _PRODUCTS.items() if convention in used)
+    return markup.note(errors, error=True, name="cell-errors") + markup.note(legend, name="conventions")
+
+
+def _error_text(error: CellError, table: TableState) -> str:
+    if not isinstance(error.row, int):
+        name = markup.text(error.column)
+    elif error.column == CONVENTION:
+        name = f"{CONVENTION}{subscript(error.row + 1)}"
+    else:
+        name = symbol(Quantity(error.column), table.rows[error.row].convention, error.row)
+    return f"<b>{name}</b>: {markup.text(error.message)}"
+
+
 def _whole(label: str, group: Any) -> SetConvention | ConvertTable:
     convention = Convention(group.value)
     return (
@@ -243,8 +185,3 @@ def _whole(label: str, group: Any) -> SetConvention | ConvertTable:
 
 def _names(state: ViewState) -> tuple[str, ...]:
     return tuple(f"{i}: {row.name}" for i, row in enumerate(state.table.rows, start=1))
-
-
-def _identity(state: ViewState) -> object:
-    """Return what the fields belong to: the robot, its rows, and the selected one."""
-    return state.spec.name, _names(state), state.selected_row

@@ -47,7 +47,7 @@ class Quantity(StrEnum):
         return {Quantity.A: 0, Quantity.ALPHA: 0, Quantity.BETA: 1}.get(self, 2)
 
 
-_LETTERS = {Quantity.ALPHA: "α", Quantity.THETA: "θ", Quantity.BETA: "β"}
+LETTERS = {Quantity.ALPHA: "α", Quantity.THETA: "θ", Quantity.BETA: "β"}
 
 
 def symbol(quantity: Quantity, convention: Convention, row: int) -> str:
@@ -61,8 +61,13 @@ def symbol(quantity: Quantity, convention: Convention, row: int) -> str:
         convention: Of the row.
         row: From 0.
     """
-    before = convention is Convention.MODIFIED and quantity in (Quantity.A, Quantity.ALPHA)
-    return f"{_LETTERS.get(quantity, quantity.value)}{subscript(row if before else row + 1)}"
+    number = row if is_indexed_before(quantity, convention) else row + 1
+    return f"{LETTERS.get(quantity, quantity.value)}{subscript(number)}"
+
+
+def is_indexed_before(quantity: Quantity, convention: Convention) -> bool:
+    """Return whether a quantity of row i has the index i - 1."""
+    return convention is Convention.MODIFIED and quantity in (Quantity.A, Quantity.ALPHA)
 
 
 def subscript(number: int) -> str:
