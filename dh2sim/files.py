@@ -11,13 +11,14 @@ import os
 import secrets
 import shutil
 import signal
+import stat
 import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import Final
+from typing import BinaryIO, Final
 
 from dh2sim.errors import OutputError
 
@@ -30,6 +31,34 @@ else:
 
 PARTIAL: Final = ".partial"
 """Suffix of files and folders that are being written; their names begin with a dot."""
+
+
+def open_plain_file(path: Path) -> BinaryIO:
+    """Open a file of a folder that may come from a stranger, for reading: no link, pipe or device, and no waiting.
+
+    Raises:
+        OSError: It cannot be opened, or is not a plain file.
+    """
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    file = open(path, "rb", opener=lambda name, _: os.open(name, flags))  # noqa: SIM115
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise OSError(errno.EINVAL, "is not a plain file", str(path))
+    return file
+
+
+def read_plain_file(path: Path, most: int) -> bytes:
+    """Return what is in a file, as ``open_plain_file`` opens it.
+
+    Raises:
+        OSError: It cannot be read, or has more than ``most`` bytes.
+    """
+    with open_plain_file(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        data = file.read(min(size, most) + 1)
+    if len(data) > most:
+        raise OSError(errno.EFBIG, f"is larger than {most} bytes", str(path))
+    return data
 
 
 @contextmanager

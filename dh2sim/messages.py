@@ -63,6 +63,13 @@ def shown(value: object) -> str:
             return f"a {type(value).__name__}"
 
 
+def printable(text: str) -> str:
+    """Return a text from a file for a terminal, which must not obey it: control characters are written as escapes."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in text)
+
+
 def listed(names: Iterable[str], between: str = ", ") -> str:
     """Return names with commas between them, or ``none``; a long list is cut short."""
     first = list(itertools.islice(names, _MOST_LISTED + 1))

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, ParamSpec, TypeVar
 import typer
 
 from dh2sim.errors import Dh2simError, MismatchError, RobotFileError, SettingsError
+from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.model.robot_model import RobotModel
@@ -170,7 +171,7 @@ def complain(error: object) -> int:
             text = "\n".join(f"dh2sim: {_as_option(name, message)}" for name, message in error.problems)
         case _:
             text = f"dh2sim: {error}"
-    print(text, file=sys.stderr)
+    print(printable(text), file=sys.stderr)
     return FELL_SHORT if isinstance(error, MismatchError) else BAD_INPUT
 
 
@@ -293,7 +294,7 @@ def report_slips(models: Sequence[RobotModel], *, strict: bool) -> None:
         printed[which] += 1
         if printed[which] <= MOST_ALIKE:
             text = f"{slip.path}: {slip.message}" if slip.path else slip.message
-            print(f"{slip.file}:{slip.line}:{slip.column}: note: {text}", file=sys.stderr)
+            print(printable(f"{slip.file}:{slip.line}:{slip.column}: note: {text}"), file=sys.stderr)
         elif printed[which] == alike[which]:
             print(f"{slip.file}: note: and {alike[which] - MOST_ALIKE} more like the last one", file=sys.stderr)
 

@@ -13,6 +13,7 @@ import typer
 
 from dh2sim.cli.common import RobotArgument, StrictOption, build_all
 from dh2sim.cli.output import table_lines
+from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.model.robot_model import JointModel, RobotModel
@@ -121,7 +122,7 @@ def _print(model: RobotModel, *, srdf: bool) -> None:
 
 
 def _print_wrapped(text: str) -> None:
-    print(textwrap.fill(text, 80, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False))
+    print(textwrap.fill(printable(text), 80, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False))
 
 
 def _dh_table(model: RobotModel) -> list[str]:

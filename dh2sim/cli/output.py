@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dh2sim.errors import OutputError
+from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -127,7 +128,7 @@ def hand_over(text: str, out: Path | None, *, summary: str, notes: Iterable[str]
     if quiet:
         return
     for note in notes:
-        text = textwrap.fill(f"dh2sim: note: {note}", 80, subsequent_indent="  ", break_on_hyphens=False)
+        text = textwrap.fill(f"dh2sim: note: {printable(note)}", 80, subsequent_indent="  ", break_on_hyphens=False)
         print(text, file=sys.stderr)
     where = "" if out is None else f"{out}: "
     print(f"{where}{summary}", file=sys.stderr if out is None else sys.stdout)

@@ -15,7 +15,7 @@ import typer
 from dh2sim.cli.common import complain
 from dh2sim.cli.output import make_console, progress_bar, size_text
 from dh2sim.errors import Dh2simError
-from dh2sim.messages import did_you_mean
+from dh2sim.messages import did_you_mean, printable
 
 if TYPE_CHECKING:
     from dh2sim.simulate.description import RunDescription
@@ -134,11 +134,11 @@ def _print(description: RunDescription) -> None:
 
     console = make_console()
     verdict = ("complete", "bold green") if description.complete else ("not complete", "bold yellow")
-    console.print(Text.assemble((description.path, "bold"), "  ", verdict), soft_wrap=True)
+    console.print(Text.assemble((printable(description.path), "bold"), "  ", verdict), soft_wrap=True)
     for title, lines in _sections(description):
         for number, line in enumerate(lines):
             wrapped = textwrap.wrap(
-                line,
+                printable(line),
                 max(console.width, 40),
                 initial_indent=f"  {title if number == 0 else '':<11} ",
                 subsequent_indent=" " * 14,

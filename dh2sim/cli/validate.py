@@ -17,6 +17,7 @@ from dh2sim.cli.common import FELL_SHORT, RobotsArgument, StrictOption, build_al
 from dh2sim.cli.output import make_console, print_whole, progress_bar
 from dh2sim.errors import Dh2simError, OutputError
 from dh2sim.extras import require_extra
+from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -158,7 +159,7 @@ def _print(report: ValidationReport) -> None:
         print_whole(_table(robot))
         for remark, style in dict.fromkeys(_remarks(robot)):
             wrapped = textwrap.wrap(
-                remark,
+                printable(remark),
                 console.width,
                 initial_indent="  ",
                 subsequent_indent="    ",

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import mujoco
 import numpy as np
 
-from dh2sim.errors import PictureError
+from dh2sim.errors import PictureError, RunError
 from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.simulate.recorded_model import recorded_model
 from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:
@@ -84,15 +85,10 @@ def motion_of_run(rollout: RolloutData) -> Motion:
         PictureError: positions were not recorded, or the model in the run's attributes cannot be read.
     """
     rollout.require("qpos", what="a video")
-    attributes = rollout.attributes
     try:
-        robot, mjcf, scene = (str(attributes[name]) for name in ("robot", "mjcf", "scene"))
-        model = mujoco.MjModel.from_xml_string(scene, {f"{robot}.xml": mjcf.encode()})
-    except KeyError as error:
-        raise PictureError(f"{rollout.run}: the attribute {error} is missing, so there is no model to show") from None
-    except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise PictureError(f"{rollout.run}: MuJoCo refuses the model in the run's attributes: {reason}") from error
+        model = recorded_model(rollout.attributes, scene=True)
+    except RunError as error:
+        raise PictureError(f"{rollout.run}: {error}") from error
     parts = [rollout.values(name) for name in ("base_pose", "qpos") if name in rollout.data]
     qpos = np.concatenate(parts, axis=1)
     if qpos.shape[1] != model.nq:

@@ -30,8 +30,9 @@ from dh2sim.draw.plot_style import (
     value_range,
 )
 from dh2sim.draw.rollout_data import RolloutData
-from dh2sim.errors import PictureError
+from dh2sim.errors import PictureError, RunError
 from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.simulate.recorded_model import recorded_model
 from dh2sim.typing import Array
 
 
@@ -61,17 +62,14 @@ def saturated(rollout: RolloutData) -> NDArray[np.bool_]:
     Raises:
         PictureError: the model in the run's attributes cannot be read.
     """
-    import mujoco
-
     joints = rollout.names("joint")
     found = np.zeros((int(rollout.data.sizes["interval"]), len(joints)), dtype=bool)
     if "ctrl" not in rollout.data and "torque" not in rollout.data:
         return found
     try:
-        model = mujoco.MjModel.from_xml_string(str(rollout.attributes.get("mjcf", "")))
-    except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise PictureError(f"{rollout.run}: MuJoCo refuses the model in the run's attributes: {reason}") from error
+        model = recorded_model(rollout.attributes)
+    except RunError as error:
+        raise PictureError(f"{rollout.run}: {error}") from error
     for number in range(model.nu):
         actuator, joint = model.actuator(number).name, model.joint(int(model.actuator_trnid[number, 0])).name
         if joint not in joints:

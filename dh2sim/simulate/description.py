@@ -109,7 +109,7 @@ def describe(path: str | PathLike[str]) -> RunDescription:
     status, stop_step, saturation = (run.values(name) for name in ("status", "stop_step", "saturation"))
     done = np.zeros(manifest.rollouts, dtype=bool)
     seconds = []
-    for block in range(manifest.blocks):
+    for block in run.recorded_blocks():
         record = run.committed(block)
         if record is not None:
             done[manifest.part(block)] = True

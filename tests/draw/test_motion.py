@@ -76,7 +76,10 @@ def test_attributes_without_a_model_are_refused() -> None:
         motion_of_run(rollout(run))
     assert str(caught.value) == "run.zarr: the attribute 'scene' is missing, so there is no model to show"
     run.attrs["scene"] = "<mujoco"
-    with pytest.raises(PictureError, match=r"^run\.zarr: MuJoCo refuses the model in the run's attributes: XML "):
+    with pytest.raises(
+        PictureError,
+        match=r"^run\.zarr: the model in the run's attributes is not one that dh2sim wrote: scene is not XML",
+    ):
         motion_of_run(rollout(run))
     run.attrs.update(scene=arm("planar_2r").scene, mjcf=arm("planar_2r").mjcf, robot="planar_2r")
     with pytest.raises(PictureError) as caught:

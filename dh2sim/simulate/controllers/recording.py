@@ -13,11 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from dh2sim.errors import ControllerError
+from dh2sim.errors import ControllerError, RunError
 from dh2sim.messages import closest, listed
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.dataset_layout import FORMAT
+from dh2sim.simulate.store.manifest import check_array
 from dh2sim.typing import Array, read_only
+
+MOST_LABELS = 10_000
+"""Joints or actuators of a run that is replayed."""
+MOST_INSTANTS = 10**8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,12 +123,16 @@ def read_run(path: Path, file: str, kind: str) -> Recording:
     positions = kind == "reference"
     variable, labels, instants = ("qpos", "joint", "time") if positions else ("ctrl", "actuator", "interval_time")
     with _readable(file):
-        run: Any = zarr.open_group(path, mode="r")
+        # without consolidated metadata, so that arrays are what was checked
+        run: Any = zarr.open_group(path, mode="r", zarr_format=3, use_consolidated=False)
         if run.attrs.get("dh2sim_run") != FORMAT:
             raise ControllerError(f"'{file}' is not a run of dh2sim")
-        if variable not in run:
+        if not (path / variable).is_dir():
             what = "positions" if positions else "controls"
             raise ControllerError(f"'{file}' has recorded no {what}; run it again with '{variable}' in record")
+        check_array(path / variable)
+        for array, most in ((labels, MOST_LABELS), ("joint", MOST_LABELS), (instants, MOST_INSTANTS)):
+            check_array(path / array, most=most)
         names = tuple(str(name) for name in run[labels][:])
         joints = len(run["joint"][:])
         times = read_only(run[instants][:])
@@ -149,6 +158,8 @@ def _readable(file: str) -> Iterator[None]:
         yield
     except (ControllerError, MemoryError):
         raise
+    except RunError as error:
+        raise ControllerError(str(error)) from error
     except Exception as error:
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ControllerError(f"'{file}' cannot be read as a run of dh2sim: {text}") from error

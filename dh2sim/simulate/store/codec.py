@@ -13,6 +13,8 @@ from numcodecs.blosc import Blosc  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from zarr.codecs import BloscCodec, Crc32cCodec
 
+from dh2sim.files import open_plain_file
+
 CODECS: Final = (BloscCodec(cname="lz4", clevel=3, shuffle="shuffle"), Crc32cCodec())
 """The codecs of variables in zarr's terms; ``encode`` writes the same bytes."""
 LARGEST_CHUNK: Final = 2**31 - 2**16
@@ -20,6 +22,23 @@ LARGEST_CHUNK: Final = 2**31 - 2**16
 CHECKSUM_BYTES: Final = 4
 _BLOSC: Final = Blosc(cname="lz4", clevel=3, shuffle=Blosc.SHUFFLE)
 _PIECE: Final = 4 * 2**20
+ITEM_SIZES: Final = {"int8": 1, "int32": 4, "int64": 8, "float32": 4, "float64": 8, "string": 8}
+"""Bytes of an item of every type that arrays of a run have; of text those that lengths take, twice."""
+READABLE_CODECS: Final = frozenset(("bytes", "blosc", "zstd", "gzip", "crc32c", "vlen-utf8"))
+"""Codecs of arrays that others may have written, such as xarray; none of them executes anything."""
+
+
+def is_known(kind: str, codecs: object) -> bool:
+    """Whether zarr's metadata name codecs that arrays of a run of this type have; no others are ever called."""
+    if kind not in ITEM_SIZES or not isinstance(codecs, list):
+        return False
+    crc32c = {"name": "crc32c"}
+    if kind == "string":
+        return codecs == [{"name": "vlen-utf8", "configuration": {}}, crc32c]
+    size = ITEM_SIZES[kind]
+    plain = {"name": "bytes"} if size == 1 else {"name": "bytes", "configuration": {"endian": "little"}}
+    blosc = {"cname": "lz4", "clevel": 3, "shuffle": "shuffle", "typesize": size, "blocksize": 0}
+    return codecs in ([plain, crc32c], [plain, {"name": "blosc", "configuration": blosc}, crc32c])
 
 
 def encode(values: NDArray[Any], *, dtype: np.dtype[Any], length: int, fill: float | int) -> tuple[bytes, int]:
@@ -64,7 +83,7 @@ def decode_text(chunk: bytes) -> str | None:
 def stored_checksum(path: Path) -> int | None:
     """Return the checksum at the end of a chunk file, unverified; None if the file is missing or too short."""
     try:
-        with path.open("rb") as file:
+        with open_plain_file(path) as file:
             file.seek(-CHECKSUM_BYTES, os.SEEK_END)
             return int.from_bytes(file.read(CHECKSUM_BYTES), "little")
     except OSError:
@@ -74,7 +93,7 @@ def stored_checksum(path: Path) -> int | None:
 def verified_checksum(path: Path) -> int | None:
     """Return the checksum at the end of a chunk file; None if the file is missing or differs from its checksum."""
     try:
-        with path.open("rb") as file:
+        with open_plain_file(path) as file:
             left = os.fstat(file.fileno()).st_size - CHECKSUM_BYTES
             checksum = 0
             while left > 0:

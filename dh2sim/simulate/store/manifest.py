@@ -4,19 +4,28 @@ The attributes of the run and the metadata of its arrays are in ``zarr.json`` of
 is the attributes of the group ``blocks``, names those that belong to the run and holds their digest. It is written
 once. Each block adds one record of its own to ``blocks/record``, which repeats the digest; nothing is shared between
 the blocks, so that each may be written by another process.
+
+A run may come from a stranger. Its metadata are compared with what dh2sim writes before a library sees them: codecs,
+types and names are those of a short list, and sizes are bounded by files that are there.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
 from dh2sim.errors import RunDamagedError, RunError
+from dh2sim.files import read_plain_file
+from dh2sim.messages import listed, shown
 from dh2sim.simulate.dataset_layout import FORMAT as LAYOUT_FORMAT
+from dh2sim.simulate.options import MOST_ROLLOUTS
+from dh2sim.simulate.store.codec import ITEM_SIZES, LARGEST_CHUNK, READABLE_CODECS, is_known
 
 FORMAT: Final = 2
 """Version of the manifest and the records."""
@@ -29,6 +38,27 @@ COORDINATES: Final = "coordinates"
 METADATA: Final = "zarr.json"
 _MARK, _STORE_MARK = "dh2sim_run", "dh2sim_store"
 """Attributes of the root group and of ``BLOCKS`` that only runs have: versions of the dataset and of the manifest."""
+MOST_METADATA: Final = 64 * 2**20
+"""Bytes of a file of metadata, which holds the MJCF of the robot."""
+MOST_BLOCKS: Final = 100_000
+_NAME: Final = re.compile("[A-Za-z][A-Za-z0-9_]*")
+_KEYS: Final = {"name": "default", "configuration": {"separator": "."}}
+_ATTRIBUTES: Final[dict[str, type | tuple[type, ...]]] = {
+    "robot": str,
+    "command": str,
+    "created": str,
+    "integrator": str,
+    "timestep": (int, float),
+    "versions": dict,
+    "randomize": dict,
+    "settings": dict,
+    "settings.controller": str,
+    "settings.start": str,
+    "settings.steps": int,
+    "settings.every": int,
+    "settings.seed": int,
+}
+"""Attributes that readers use, with their types."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,6 +171,8 @@ def read_manifest(path: Path) -> Manifest:
     if not sound:
         raise damaged_metadata(path / METADATA, path / BLOCKS / METADATA)
     nodes = own["consolidated_metadata"]["metadata"]
+    if problem := _problem(root, own, stored, attributes):
+        raise RunError(f"'{path}' is not a run as dh2sim writes it: {problem}")
     return Manifest(
         attributes={name: value for name, value in attributes.items() if name != COORDINATES},
         coordinates={name: _stored_array(nodes[name]) for name in stored["coordinates"]},
@@ -166,7 +198,7 @@ def read_node(file: Path) -> dict[str, Any] | None:
         RunError: The file may not be read.
     """
     try:
-        node = json.loads(file.read_bytes())
+        node = json.loads(read_plain_file(file, MOST_METADATA))
     except PermissionError as error:
         raise RunError(f"cannot read '{file}': {error.strerror}") from error
     except (OSError, ValueError, RecursionError):
@@ -194,9 +226,12 @@ class BlockRecord:
     def from_text(text: str) -> BlockRecord | None:
         """Read a record; None if the text is not one."""
         try:
-            return BlockRecord(**json.loads(text))
-        except (TypeError, ValueError):
+            record = BlockRecord(**json.loads(text))
+        except (TypeError, ValueError, RecursionError):
             return None
+        numbers = record.checksums.values() if isinstance(record.checksums, dict) else [None]
+        sound = type(record.block) is int and all(type(number) is int for number in numbers)
+        return record if sound and isinstance(record.seconds, float) and 0.0 <= record.seconds < math.inf else None
 
 
 def _group_nodes(path: Path) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
@@ -210,6 +245,118 @@ def _marked(root: dict[str, Any] | None, blocks: dict[str, Any] | None) -> bool:
 def _attributes(node: Mapping[str, Any] | None) -> dict[str, Any]:
     attributes = None if node is None else node.get("attributes")
     return attributes if isinstance(attributes, dict) else {}
+
+
+def _problem(
+    root: Mapping[str, Any], own: Mapping[str, Any], names: Mapping[str, Any], attributes: Mapping[str, Any]
+) -> str | None:
+    """Return why a run's metadata, which match their digest, are not such as dh2sim writes; None if they are."""
+    nodes = own["consolidated_metadata"]["metadata"]
+    if (root.get("zarr_format"), root.get("node_type")) != (3, "group"):
+        return "it is not a group of zarr's format 3"
+    if unknown := sorted({*root["consolidated_metadata"]["metadata"]} - {*nodes}):
+        return f"it has arrays that do not belong to it ({listed(map(shown, unknown))})"
+    sizes: dict[str, int] = {}
+    for name in (*names["coordinates"], *names["variables"], f"{BLOCKS}/{RECORD}"):
+        if problem := _array_problem(name, nodes[name]):
+            return f"array {shown(name)}: {problem}"
+    for name in names["coordinates"]:
+        dimensions, shape = nodes[name]["dimension_names"], nodes[name]["shape"]
+        if len(shape) != 1 or sizes.setdefault(dimensions[0], shape[0]) != shape[0]:
+            return f"coordinate {shown(name)} is not one number or label for each of a dimension"
+    blocks = {nodes[name]["chunk_grid"]["configuration"]["chunk_shape"][0] for name in names["variables"]}
+    rollouts = sizes.get("rollout", 0)
+    if not 1 <= rollouts <= MOST_ROLLOUTS or len(blocks) != 1 or -(-rollouts // min(blocks)) > MOST_BLOCKS:
+        return "its rollouts do not make up a possible number of blocks"
+    for name in names["variables"]:
+        node = nodes[name]
+        shape, chunk = node["shape"], node["chunk_grid"]["configuration"]["chunk_shape"]
+        known = [sizes.get(dimension) for dimension in node["dimension_names"]]
+        if node["dimension_names"][0] != "rollout" or known != shape:
+            return f"variable {shown(name)} has other sizes than the coordinates"
+        if chunk[1:] != [max(size, 1) for size in shape[1:]] or node["data_type"] == "string":
+            return f"variable {shown(name)} has chunks of other sizes"
+    return _attribute_problem(attributes)
+
+
+def _array_problem(name: str, node: Any) -> str | None:
+    """Return why a node is not an array as dh2sim writes them, or None."""
+    if not all(map(_NAME.fullmatch, name.split("/"))):
+        return "not a name"
+    if problem := _shape_problem(node):
+        return problem
+    if node.get("chunk_key_encoding") != _KEYS or not isinstance(node.get("attributes"), dict):
+        return "its files are named in another way"
+    if not is_known(node["data_type"], node.get("codecs")):
+        return "other types or codecs than those of dh2sim"
+    return None
+
+
+def _shape_problem(node: Any) -> str | None:
+    """Return why a node is not an array of a possible shape, or None."""
+    if not isinstance(node, dict) or (node.get("zarr_format"), node.get("node_type")) != (3, "array"):
+        return "not an array"
+    grid, shape, dimensions = node.get("chunk_grid"), node.get("shape"), node.get("dimension_names")
+    configuration = grid.get("configuration") if isinstance(grid, dict) and grid.get("name") == "regular" else None
+    chunk = configuration.get("chunk_shape") if isinstance(configuration, dict) else None
+    if not (isinstance(shape, list) and isinstance(chunk, list) and isinstance(dimensions, list)):
+        return "no shape"
+    if not 1 <= len(shape) == len(chunk) == len(dimensions) or not all(isinstance(each, str) for each in dimensions):
+        return "no shape"
+    if not (_whole_numbers(shape, 0) and _whole_numbers(chunk, 1)):
+        return "no shape"
+    if not isinstance(node.get("data_type"), str) or node["data_type"] not in ITEM_SIZES:
+        return f"its type is {shown(node.get('data_type'))}"
+    if node.get("storage_transformers"):
+        return "its numbers are stored in another way"
+    if math.prod(chunk) * ITEM_SIZES[node["data_type"]] > LARGEST_CHUNK:
+        return "its chunks are too large"
+    return None
+
+
+def check_array(folder: Path, *, most: int | None = None) -> None:
+    """Check an array that dh2sim or xarray wrote, before zarr opens it; its numbers are read by the slice.
+
+    Args:
+        folder: Of the array.
+        most: Items that it may have, where it is to be read as a whole.
+
+    Raises:
+        RunError: It is none, its codecs are not those that xarray uses, or it is too large.
+    """
+    node = read_node(folder / METADATA)
+    problem = _shape_problem(node)
+    if node is not None and problem is None:
+        codecs = node.get("codecs")
+        names = [codec.get("name") for codec in codecs if isinstance(codec, dict)] if isinstance(codecs, list) else []
+        if not isinstance(codecs, list) or len(names) != len(codecs) or not set(names) <= READABLE_CODECS:
+            problem = "its codecs are not among those that are read"
+        elif most is not None and math.prod(node["shape"]) > most:
+            problem = "it is too large"
+    if problem is not None:
+        raise RunError(f"'{folder}' cannot be read: {problem}")
+
+
+def _whole_numbers(value: Any, least: int) -> bool:
+    return isinstance(value, list) and all(type(number) is int and least <= number < 2**62 for number in value)
+
+
+def _attribute_problem(attributes: Mapping[str, Any]) -> str | None:
+    """Return which attribute is missing or of another type, or None."""
+    for path, kind in _ATTRIBUTES.items():
+        value: Any = attributes
+        for key in path.split("."):
+            value = value.get(key)
+        if not isinstance(value, kind) or isinstance(value, bool):
+            return f"its attribute '{path}' is {shown(value)}"
+    settings, timestep = attributes["settings"], attributes["timestep"]
+    if not (0.0 < timestep <= 1.0 and settings["steps"] >= 0 and settings["every"] >= 1):
+        return "its time steps are impossible"
+    if not all(isinstance(version, str) for version in attributes["versions"].values()):
+        return "its attribute 'versions' does not hold text"
+    if not all(isinstance(share, int | float) for share in attributes["randomize"].values()):
+        return "its attribute 'randomize' does not hold numbers"
+    return None
 
 
 def _stored_array(node: Mapping[str, Any]) -> StoredArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,13 +16,15 @@ from numpy.typing import NDArray
 
 from dh2sim.errors import RunDamagedError, RunError
 from dh2sim.extras import require_extra
-from dh2sim.simulate.store.codec import decode_text, stored_checksum, verified_checksum
+from dh2sim.files import read_plain_file
+from dh2sim.simulate.store.codec import CHECKSUM_BYTES, ITEM_SIZES, decode_text, stored_checksum, verified_checksum
 from dh2sim.simulate.store.manifest import (
     BLOCKS,
     METADATA,
     RECORD,
     BlockRecord,
     Manifest,
+    StoredArray,
     damaged_metadata,
     read_manifest,
     read_node,
@@ -29,6 +32,9 @@ from dh2sim.simulate.store.manifest import (
 
 if TYPE_CHECKING:
     import xarray
+
+_MOST_RECORD = 2**20
+"""Bytes of a record."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +55,7 @@ class StoredRun:
     def record(self, block: int) -> BlockRecord | None:
         """Return the record of a block, or None if there is no valid one."""
         try:
-            text = decode_text(self.record_file(block).read_bytes())
+            text = decode_text(read_plain_file(self.record_file(block), _MOST_RECORD))
         except OSError:
             return None
         record = None if text is None else BlockRecord.from_text(text)
@@ -67,9 +73,10 @@ class StoredRun:
 
     def _matching(self, block: int, checksum_of: Callable[[Path], int | None]) -> BlockRecord | None:
         record = self.record(block)
-        if record is None or any(
-            checksum_of(self.chunk(name, block)) != checksum for name, checksum in record.checksums.items()
-        ):
+        written = {name for name, variable in self.manifest.variables.items() if not variable.empty}
+        if record is None or {*record.checksums} != written:
+            return None
+        if any(checksum_of(self.chunk(name, block)) != checksum for name, checksum in record.checksums.items()):
             return None
         return record
 
@@ -82,6 +89,23 @@ class StoredRun:
         for name, coordinate in self.manifest.coordinates.items():
             file = self.path / name / coordinate.chunk_name(0)
             if not coordinate.empty and verified_checksum(file) is None:
+                raise damaged_metadata(file)
+
+    def check_files(self) -> None:
+        """Check that arrays have folders, and that coordinates have as many bytes as their sizes ask for.
+
+        So no size is believed that nothing on the disk stands for.
+
+        Raises:
+            RunDamagedError: A file or folder is missing or differs.
+        """
+        arrays = {**self.manifest.coordinates, **self.manifest.variables}
+        for folder in (*(self.path / name for name in arrays), self.path / BLOCKS, self.path / BLOCKS / RECORD):
+            if folder.is_symlink() or not folder.is_dir():
+                raise damaged_metadata(folder / METADATA)
+        for name, coordinate in self.manifest.coordinates.items():
+            file = self.path / name / coordinate.chunk_name(0)
+            if not coordinate.empty and not _has_size(file, coordinate):
                 raise damaged_metadata(file)
 
     def check_array_metadata(self) -> None:
@@ -102,12 +126,23 @@ class StoredRun:
             RunDamagedError: A chunk or a folder is missing.
         """
         with reading(self.path):
-            records = os.listdir(self.path / BLOCKS / RECORD)
-            blocks = [int(name.removeprefix("c.")) for name in records if name.startswith("c.")]
+            blocks = self.recorded_blocks()
             for name, variable in self.manifest.variables.items():
-                existing = set(os.listdir(self.path / name))
-                if not variable.empty and any(variable.chunk_name(block) not in existing for block in blocks):
+                with os.scandir(self.path / name) as entries:
+                    files = {entry.name: entry.is_file(follow_symlinks=False) for entry in entries}
+                missing = any(variable.chunk_name(block) not in files for block in blocks)
+                if (missing and not variable.empty) or not all(files.values()):
                     raise RunDamagedError(damaged_run(self.path))
+
+    def recorded_blocks(self) -> list[int]:
+        """Return the blocks that have a record, which is not read.
+
+        Raises:
+            OSError, ValueError: The folder cannot be listed, or contains something else.
+        """
+        records = os.listdir(self.path / BLOCKS / RECORD)
+        found = sorted(int(name.removeprefix("c.")) for name in records if name.startswith("c."))
+        return [block for block in found if block < self.manifest.blocks]
 
     def values(self, variable: str) -> NDArray[Any]:
         """Read a whole variable, without xarray.
@@ -118,7 +153,9 @@ class StoredRun:
         import zarr
 
         with reading(self.path):
-            group = zarr.open_group(self.path, mode="r")  # its consolidated metadata are those of the manifest
+            group = zarr.open_group(
+                self.path, mode="r", zarr_format=3
+            )  # its consolidated metadata are those of the manifest
             return np.asarray(group[variable][...])  # type: ignore[index]
 
 
@@ -129,7 +166,9 @@ def open_run(path: Path) -> StoredRun:
         RunError: There is no run.
         RunDamagedError: Its metadata are damaged.
     """
-    return StoredRun(path=path, manifest=read_manifest(path))
+    run = StoredRun(path=path, manifest=read_manifest(path))
+    run.check_files()
+    return run
 
 
 def open_dataset(path: str | PathLike[str]) -> xarray.Dataset:
@@ -149,7 +188,18 @@ def open_dataset(path: str | PathLike[str]) -> xarray.Dataset:
     run.check_coordinates()
     run.check_chunks()
     with reading(run.path):
-        return xarray.open_dataset(run.path, engine="zarr", chunks=None)
+        return xarray.open_dataset(run.path, engine="zarr", chunks=None, consolidated=True, zarr_format=3)
+
+
+def _has_size(file: Path, coordinate: StoredArray) -> bool:
+    """Whether a file is a plain one with as many bytes as a coordinate takes; of text, at least as many."""
+    try:
+        found = file.lstat()
+    except OSError:
+        return False
+    [count], text = coordinate.shape, coordinate.dtype == "string"
+    least = count * (CHECKSUM_BYTES if text else ITEM_SIZES[coordinate.dtype]) + CHECKSUM_BYTES
+    return stat.S_ISREG(found.st_mode) and (found.st_size > least if text else found.st_size == least)
 
 
 @contextmanager
