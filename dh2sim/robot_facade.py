@@ -225,6 +225,8 @@ class Robot:
         convention: Convention | str = Convention.STANDARD,
         tolerance: float = 1e-9,
         package_paths: Iterable[FilePath] | FilePath = (),
+        root: FilePath | None = None,
+        arguments: Mapping[str, object] | None = None,
         name: str | None = None,
     ) -> Self:
         """Make the DH table of a URDF, whatever way its axes lie, and compare it with the file's own kinematics.
@@ -237,6 +239,8 @@ class Robot:
             tolerance: Greatest residual, rad, and m for a reach of up to 1 m, then of the reach; numbers within it of
                 a simple one are made simple.
             package_paths: Folders, or a folder, in which ``package://`` is looked for first.
+            root: Folder outside of which a xacro file includes no file; by default the file's own.
+            arguments: Values of a xacro file's arguments, by name.
             name: Of the robot, instead of the file's.
 
         Raises:
@@ -250,6 +254,8 @@ class Robot:
             convention=convention,
             tolerance=tolerance,
             package_paths=[package_paths] if isinstance(package_paths, str | os.PathLike) else tuple(package_paths),
+            root=root,
+            arguments=arguments or {},
             name=name,
         )
         return cls._imported(path, options)
@@ -263,10 +269,13 @@ class Robot:
         tip: str | None = None,
         convention: Convention | str = Convention.STANDARD,
         tolerance: float = 1e-9,
+        root: FilePath | None = None,
         name: str | None = None,
     ) -> Self:
         """Make the DH table of an MJCF, as :meth:`from_urdf` does; ``tip`` may be a body or a site."""
-        return cls.from_urdf(path, base=base, tip=tip, convention=convention, tolerance=tolerance, name=name)
+        return cls.from_urdf(
+            path, base=base, tip=tip, convention=convention, tolerance=tolerance, root=root, name=name
+        )
 
     @classmethod
     def from_table(

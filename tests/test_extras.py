@@ -24,6 +24,7 @@ MODULES = {
     "video": {"PIL", "imageio_ffmpeg", "xarray"},
     "data": {"xarray", "pyarrow", "h5netcdf", "h5py"},
     "engines": {"yourdfpy"},
+    "xacro": {"xacro"},
 }
 """What is imported of each extra's libraries."""
 BROUGHT = {

@@ -62,6 +62,16 @@ def import_robot(
         list[Path] | None,
         typer.Option(metavar="FOLDER", help="Folder to find package:// in; may be repeated."),
     ] = None,
+    root: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Folder to read included files in and below. [default: the file's folder]"
+        ),
+    ] = None,
+    arg: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME:=VALUE", help="Argument of a xacro file; may be repeated."),
+    ] = None,
     name: Annotated[str | None, typer.Option(metavar="NAME", help="Name of the robot. [default: the file's]")] = None,
     out: OutOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
@@ -78,6 +88,7 @@ def import_robot(
     Examples:
       dh2sim import panda.urdf --tip panda_link8 -o panda.yaml
       dh2sim import arm.xml --base base_link --tip attachment_site
+      dh2sim import urdf/ur.urdf.xacro --root . --arg ur_type:=ur5e --arg name:=ur
       dh2sim import table.md --convention modified --angle deg -o arm.yaml
       dh2sim import README.md --table 2
       dh2sim import - --convention standard < table.csv
@@ -97,6 +108,8 @@ def import_robot(
         table=table,
         tolerance=tolerance_of(tolerance),
         package_paths=tuple(package_path or ()),
+        root=root,
+        arguments=dict(map(_argument, arg or ())),
         name=name,
     )
     folder = Path.cwd() if out is None else out.resolve().parent
@@ -130,11 +143,21 @@ def _read_axes_file(file: str) -> bytes:
     return data
 
 
-_ARGUMENT = re.compile(r"\b(tip|convention|angle|length|table)=('[^']*'|\"[^\"]*\"|\d+)")
+def _argument(text: str) -> tuple[str, str]:
+    """Return the name and the value of ``--arg``."""
+    name, between, value = text.partition(":=")
+    if not between or not name.strip():
+        raise typer.BadParameter(f"expected NAME:=VALUE, found {text!r}", param_hint="--arg")
+    return name.strip(), value
+
+
+_XACRO = re.compile(r"arguments=\{'([^']*)': \.\.\.\}")
+_ARGUMENT = re.compile(r"\b(tip|convention|angle|length|root|table)=('[^']*'|\"[^\"]*\"|\d+)")
 
 
 def _with_options(message: str) -> str:
     """Return a message of the library with options for its arguments: ``--tip hand`` for ``tip='hand'``."""
+    message = _XACRO.sub(r"--arg \1:=VALUE", message)
     return _ARGUMENT.sub(lambda found: f"--{found[1]} {shlex.quote(str(ast.literal_eval(found[2])))}", message)
 
 

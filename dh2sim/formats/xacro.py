@@ -1,17 +1,31 @@
-"""xacro in a URDF: what a file still needs it for."""
+"""xacro in a URDF: what a file still needs it for, and its expansion by the package ``xacro``."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Final, NamedTuple
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
-from dh2sim.formats.xml_read import Element
+from dh2sim.errors import Dh2simError, ImportedFileError, MissingExtraError, Problem
+from dh2sim.extras import require_extra
+from dh2sim.formats.xml_read import Element, XmlReport, parse_xml
 from dh2sim.messages import shown
 
 DEFINITIONS: Final = ("property", "arg", "macro")
 """Elements of xacro that do nothing by themselves."""
 _EXPANDED: Final = ("link", "joint", "material")
 """Elements of a robot whose attributes xacro fills in; others may keep ``$(...)`` for other programs."""
+
+
+TIME_LIMIT: Final = 60
+"""Seconds for an expansion."""
+
+
+NO_LINK: Final = "the file has no <link>, only definitions for xacro; import a file that uses them"
 
 
 class Unexpanded(NamedTuple):
@@ -73,3 +87,76 @@ def _outside_macros(element: Element, prefixes: tuple[str, ...]) -> Iterator[Ele
         yield found
         if _name(found.tag, prefixes) not in DEFINITIONS:
             waiting += reversed(found.children)
+
+
+class Expanded(NamedTuple):
+    """A file that xacro has expanded."""
+
+    robot: Element
+    """The root element; it and those below it know where they were written."""
+    messages: tuple[str, ...]
+    """Warnings of xacro or of the file itself."""
+
+
+def expand(data: bytes, *, file: str, path: Path, root: Path | None, arguments: Mapping[str, str]) -> Expanded:
+    """Replace everything that xacro replaces.
+
+    It is done in another process, in which expressions can reach nothing but the file's own symbols, and nothing
+    outside of a folder is read (``xacro_worker``). ``$(find package)`` is a folder below it with a ``package.xml`` of
+    that name; environment variables are not read.
+
+    Args:
+        data: The file's content.
+        file: Its name, for messages.
+        path: Where it is; relative names in it start from there.
+        root: Folder outside of which no file is read; by default the file's own.
+        arguments: Values of its ``xacro:arg``.
+
+    Raises:
+        ImportedFileError: xacro refuses the file, or it takes too long.
+        MissingExtraError: xacro is not installed.
+    """
+    try:
+        require_extra("xacro", "xacro", what="xacro")
+    except MissingExtraError as error:
+        found = unexpanded(parse_xml(data, file=file))
+        line, column, what = (1, 1, file) if found is None else (found.element.line, found.element.column, found.what)
+        raise MissingExtraError(f"{file}:{line}:{column}: found {what}: {error}") from None
+    request = {
+        "text": data.decode("latin-1"),
+        "file": file,
+        "path": os.path.abspath(path),
+        "root": os.path.abspath(path.parent if root is None else root),
+        "allowed": "the file's folder" if root is None else str(root),
+        "arguments": dict(arguments),
+    }
+    answer = _answer(request, file)
+    if "problems" in answer:
+        raise ImportedFileError(Problem(**problem) for problem in answer["problems"])
+    places = [(str(name), int(line), int(column)) for name, line, column in answer["places"]]
+    robot = parse_xml(answer["text"].encode(), file=file, places=places)
+    if robot.first("link") is None:
+        raise XmlReport(file).failure(robot, "", NO_LINK)
+    return Expanded(robot, tuple(answer["messages"]))
+
+
+def _answer(request: dict[str, Any], file: str) -> dict[str, Any]:
+    """Return the worker's answer."""
+    environment = {key: os.environ[key] for key in ("SYSTEMROOT", "TEMP", "LANG") if key in os.environ}
+    environment["PYTHONPATH"] = os.pathsep.join(folder for folder in sys.path if folder)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "dh2sim.formats.xacro_worker"],
+            input=json.dumps(request).encode(),
+            capture_output=True,
+            timeout=TIME_LIMIT,
+            env=environment,
+            check=False,
+        )
+        answer: dict[str, Any] = json.loads(done.stdout)
+    except subprocess.TimeoutExpired:
+        raise Dh2simError(f"{file}: xacro took longer than {TIME_LIMIT} seconds, and was stopped") from None
+    except ValueError:
+        reason = f"exit status {done.returncode}" if done.returncode >= 0 else f"stopped by signal {-done.returncode}"
+        raise Dh2simError(f"{file}: xacro needed too much time or memory, or failed ({reason})") from None
+    return answer

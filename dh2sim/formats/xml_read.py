@@ -9,10 +9,10 @@ from __future__ import annotations
 import codecs
 import dataclasses
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Final
+from typing import Final, TypeAlias
 from xml.parsers import expat
 
 from dh2sim.errors import ImportedFileError, Problem
@@ -51,6 +51,8 @@ class Element:
     """Of its start tag, counted from 1."""
     column: int
     """Of its start tag, counted from 1."""
+    file: str = ""
+    """What messages call the file it is in, where that is not the one that was parsed."""
 
     def all(self, tag: str) -> tuple[Element, ...]:
         """Return the children of this tag."""
@@ -80,7 +82,9 @@ class XmlReport:
     def add(self, element: Element, path: str, message: str) -> None:
         """Note a problem of an element, or of the attribute that ``path`` ends with."""
         self.problems.append(
-            Problem(file=self.file, line=element.line, column=element.column, path=path, message=message)
+            Problem(
+                file=element.file or self.file, line=element.line, column=element.column, path=path, message=message
+            )
         )
 
     def guess(self, name: str, known: Iterable[str]) -> str:
@@ -108,12 +112,17 @@ class XmlReport:
         return ImportedFileError(problems)
 
 
-def parse_xml(data: bytes, *, file: str) -> Element:
+Place: TypeAlias = tuple[str, int, int]
+"""File, line and column of an element."""
+
+
+def parse_xml(data: bytes, *, file: str, places: Sequence[Place] = ()) -> Element:
     """Return the root element of an XML file.
 
     Args:
         data: The file's content.
         file: Its name, for messages.
+        places: Where its elements come from, in the order of the text, if they were not written here.
 
     Raises:
         ImportedFileError: Not well-formed; in an encoding that is not read; with a document type that declares
@@ -121,8 +130,8 @@ def parse_xml(data: bytes, *, file: str) -> Element:
     """
     if len(data) > MAX_BYTES:
         raise _error(file, 1, 1, f"the file has {len(data)} bytes; at most {MAX_BYTES} are read")
-    data = _tolerated(data)
-    builder = _Builder()
+    data = tolerated(data)
+    builder = _Builder(places)
     try:
         _feed(builder, data)
     except _RefusedError as error:
@@ -134,7 +143,7 @@ def parse_xml(data: bytes, *, file: str) -> Element:
     return builder.root()
 
 
-def _tolerated(data: bytes) -> bytes:
+def tolerated(data: bytes) -> bytes:
     """Return a file with what expat alone refuses made right, every element at its place.
 
     MuJoCo, urdfdom and other readers of robots accept blanks and comments before the declaration, and ``--`` in
@@ -200,8 +209,7 @@ class _Open:
 
     tag: str
     attributes: Mapping[str, str]
-    line: int
-    column: int
+    place: Place
     children: list[Element] = field(default_factory=list)
 
     def closed(self) -> Element:
@@ -209,15 +217,17 @@ class _Open:
             tag=self.tag,
             attributes=MappingProxyType(self.attributes),
             children=tuple(self.children),
-            line=self.line,
-            column=self.column,
+            file=self.place[0],
+            line=self.place[1],
+            column=self.place[2],
         )
 
 
 class _Builder:
     """Makes the tree from what expat sees."""
 
-    def __init__(self) -> None:
+    def __init__(self, places: Sequence[Place]) -> None:
+        self._places = places
         self.parser = parser = expat.ParserCreate()
         parser.XmlDeclHandler = self._declaration
         parser.StartDoctypeDeclHandler = self._doctype
@@ -226,7 +236,7 @@ class _Builder:
         self.encoding: str | None = None
         self.began = False
         self._count = 0
-        self._open = [_Open("", {}, 1, 1)]
+        self._open = [_Open("", {}, ("", 1, 1))]
 
     def root(self) -> Element:
         return self._open[0].children[0]
@@ -259,7 +269,10 @@ class _Builder:
                 message = f"an attribute of {length} characters; at most {MAX_ATTRIBUTE} are read"
                 self._refuse(message)
         parser = self.parser
-        self._open.append(_Open(tag, attributes, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1))
+        place = ("", parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
+        if self._count <= len(self._places):
+            place = self._places[self._count - 1]
+        self._open.append(_Open(tag, attributes, place))
 
     def _end(self, _tag: str) -> None:
         element = self._open.pop().closed()

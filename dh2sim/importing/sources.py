@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from dh2sim.errors import Dh2simError
 from dh2sim.formats.serial_robot import SerialLink, SerialRobot
 from dh2sim.formats.table.read import read_table
+from dh2sim.formats.xml_read import Element
 from dh2sim.importing.explain import explanation
 from dh2sim.importing.result import Imported
 from dh2sim.importing.serial import import_serial, robot_name
@@ -22,7 +26,7 @@ from dh2sim.kinematics.frame_assignment.result import Tolerances
 from dh2sim.kinematics.frame_assignment.rounding import simple_angle, simple_length
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.messages import Choice, member
+from dh2sim.messages import Choice, member, shown
 from dh2sim.robot.axes_file import AxesSpec
 from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
@@ -198,6 +202,10 @@ class ImportOptions:
     """Greatest residual, rad, and m for a reach of up to 1 m, then of the reach."""
     package_paths: Sequence[str | os.PathLike[str]] = ()
     """Folders, or the path of one, in which ``package://`` is looked for first."""
+    root: str | os.PathLike[str] | None = None
+    """Folder outside of which an MJCF or a xacro file includes no file; by default the file's own."""
+    arguments: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    """Values of a xacro file's arguments, by name."""
     name: str | None = None
     """Of the robot, instead of the file's."""
 
@@ -208,16 +216,22 @@ class ImportOptions:
             Dh2simError: An option has a value that is not allowed.
         """
         paths = self.package_paths
-        changed: dict[str, object] = {
+        changed: dict[str, Any] = {
             "convention": _choice(Convention, self.convention, "convention"),
             "angle": _choice(AngleUnit, self.angle, "angle"),
             "length": _choice(LengthUnit, self.length, "length"),
+            "arguments": MappingProxyType({name: str(value) for name, value in self.arguments.items()}),
             "package_paths": (paths,) if isinstance(paths, str | os.PathLike) else tuple(paths),
         }
+        for path in (*changed["package_paths"], *([] if self.root is None else [self.root])):
+            if not isinstance(path, str | os.PathLike):
+                raise Dh2simError(f"package_paths and root must be paths, got {path!r}")
         for name, value in changed.items():
             object.__setattr__(self, name, value)
         if isinstance(self.tolerance, bool) or not isinstance(self.tolerance, int | float):
             raise Dh2simError(f"tolerance must be a number, got {self.tolerance!r}")
+        if not 0.0 < self.tolerance < math.inf:
+            raise Dh2simError(f"tolerance must be a positive number, got {self.tolerance!r}")
         for what in ("base", "tip", "name"):
             if not isinstance(value := getattr(self, what), str | None):
                 raise Dh2simError(f"{what} must be a string, got {value!r}")
@@ -238,6 +252,8 @@ def import_robot(
         MismatchError: The table that was made is not the file's kinematics to within the tolerance.
         Dh2simError: The file cannot be read, or is of another format.
     """
+    if not isinstance(options, ImportOptions):
+        raise Dh2simError(f"options must be ImportOptions, got {options!r}")
     file = os.fspath(path)
     return import_data(read_file(Path(file)), file, options, folder=folder)
 
@@ -302,11 +318,27 @@ def _root_element(data: bytes, file: str) -> str | None:
 def _read_urdf(data: bytes, file: str, options: ImportOptions) -> SerialRobot:
     from dh2sim.formats.mesh_paths import mesh_finder
     from dh2sim.formats.urdf.read import read_urdf
+    from dh2sim.formats.xml_read import parse_xml
 
     _refuse_units(file, "URDF", options)
     directory = Path.cwd() if file == STDIN else Path(file).parent
     find_mesh = mesh_finder(directory, [Path(folder) for folder in options.package_paths])
-    return read_urdf(data, file=file, base=options.base, tip=options.tip, find_mesh=find_mesh)
+    element, notes = _expanded(parse_xml(data, file=file), data, file, options)
+    robot = read_urdf(element, file=file, base=options.base, tip=options.tip, find_mesh=find_mesh)
+    return replace(robot, notes=(*notes, *robot.notes))
+
+
+def _expanded(robot: Element, data: bytes, file: str, options: ImportOptions) -> tuple[Element, list[str]]:
+    """Return the root element of a URDF, expanded by xacro where that is needed, and notes."""
+    from dh2sim.formats.xacro import expand, unexpanded
+
+    if unexpanded(robot) is None:
+        if options.arguments:
+            raise Dh2simError(f"{file}: arguments are for xacro files; this one needs no xacro")
+        return robot, []
+    path = Path("standard_input.xacro" if file == STDIN else file)
+    expanded = expand(data, file=file, path=path, root=_root(file, options), arguments=options.arguments)
+    return expanded.robot, [f"xacro says: {message}" for message in expanded.messages]
 
 
 def _read_mjcf(file: str, options: ImportOptions) -> SerialRobot:
@@ -315,7 +347,25 @@ def _read_mjcf(file: str, options: ImportOptions) -> SerialRobot:
     from dh2sim.formats.mjcf.read import read_mjcf
 
     _refuse_units(file, "MJCF", options)
-    return read_mjcf(Path(file), file=file, base=options.base, tip=options.tip)
+    return read_mjcf(Path(file), file=file, base=options.base, tip=options.tip, root=_root(file, options))
+
+
+def _root(file: str, options: ImportOptions) -> Path | None:
+    """Return the folder outside of which no file is read, where the options name one.
+
+    Raises:
+        Dh2simError: It is no folder, or does not hold the file.
+    """
+    if options.root is None:
+        return None
+    root = Path(options.root)
+    if not root.is_dir():
+        raise Dh2simError(f"{root}: no such folder, to read files in and below it")
+    if file != STDIN and not Path(os.path.normpath(Path(file).absolute())).is_relative_to(
+        os.path.normpath(root.absolute())
+    ):
+        raise Dh2simError(f"{file}: not in the folder {shown(str(root))}, in and below which files are read")
+    return root
 
 
 def _refuse_units(file: str, kind: str, options: ImportOptions) -> None:
@@ -326,13 +376,19 @@ def _refuse_units(file: str, kind: str, options: ImportOptions) -> None:
 
 
 def _serial(robot: SerialRobot, data: bytes, options: ImportOptions, folder: Path | None) -> Imported:
+    if options.convention is Convention.HAYATI:
+        raise Dh2simError(
+            "a table is made in the standard or the modified convention; Hayati's rows come by themselves"
+        )
+    given = ", ".join(f"{name}:={value}" for name, value in options.arguments.items())
+    expanded = f", expanded by xacro with {given}" if given else ""
     return import_serial(
         robot,
         convention=_choice(Convention, options.convention, "convention") or Convention.STANDARD,
         tolerance=options.tolerance,
         folder=folder,
         name=options.name,
-        source=f"{robot.description} (SHA-256 {hashlib.sha256(data).hexdigest()[:16]}…).",
+        source=f"{robot.description}{expanded} (SHA-256 {hashlib.sha256(data).hexdigest()[:16]}…).",
     )
 
 

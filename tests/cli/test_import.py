@@ -150,3 +150,41 @@ def test_another_table_of_a_file_is_read_by_its_number(tmp_path: Path) -> None:
     assert (first.out.count("a: 1,"), second.out.count("a: 2,")) == (1, 1)
     third = dh2sim("import", str(path), "--table", "3")
     assert (third.status, third.out) == (2, "")
+
+
+XACRO = """\
+<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:include filename="../names.xacro"/>
+  <link name="base"/><link name="$(arg tip)"/>
+  <joint name="j" type="continuous"><parent link="base"/><child link="$(arg tip)"/><axis xyz="0 0 1"/></joint>
+</robot>
+"""
+
+
+def test_errors_of_xacro_name_the_options_that_help(tmp_path: Path) -> None:
+    pytest.importorskip("xacro", reason="the extra 'xacro' is not installed")
+    folder = tmp_path / "urdf"
+    folder.mkdir()
+    (tmp_path / "names.xacro").write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"/>', encoding="utf-8")
+    path = folder / "arm.xacro"
+    path.write_text(XACRO, encoding="utf-8")
+    run = dh2sim("import", path)
+    assert run.status == 2
+    assert f"{path}:2:3: xacro: found " in run.err
+    assert run.err.endswith(f"allow others with --root {tmp_path}\n")
+    run = dh2sim("import", path, "--root", tmp_path)
+    assert (run.status, run.out) == (2, "")
+    assert run.err == (
+        f"{path}:3:22: xacro: argument 'tip' has no value, and no default; give it one: --arg tip:=VALUE\n"
+    )
+    run = dh2sim("import", path, "--root", tmp_path, "--arg", "tip:=hand")
+    assert run.status == 0
+    assert parse_robot(run.out).rows[0].name == "j"
+
+
+def test_an_argument_of_xacro_has_a_name_and_a_value(urdf: Path) -> None:
+    run = dh2sim("import", urdf, "--arg", "tip=hand")
+    assert run.status == 2
+    assert "--arg: expected NAME:=VALUE, found 'tip=hand'" in " ".join(run.err.split())
+    run = dh2sim("import", urdf, "--arg", "tip:=hand")
+    assert (run.status, run.err) == (2, f"dh2sim: {urdf}: arguments are for xacro files; this one needs no xacro\n")

@@ -252,6 +252,10 @@ def test_options_may_be_plain_strings() -> None:
         ({"convention": "craig"}, "unknown convention 'craig'. Allowed: standard, modified, hayati"),
         ({"angle": "degree"}, "unknown angle 'degree'. Did you mean 'deg'? Allowed: rad, deg"),
         ({"tolerance": "1e-4"}, "tolerance must be a number, got '1e-4'"),
+        ({"tolerance": -1e-4}, "tolerance must be a positive number, got -0.0001"),
+        ({"tolerance": math.nan}, "tolerance must be a positive number, got nan"),
+        ({"package_paths": [3]}, "package_paths and root must be paths, got 3"),
+        ({"root": 3}, "package_paths and root must be paths, got 3"),
         ({"tip": 3}, "tip must be a string, got 3"),
     ],
 )
@@ -292,3 +296,12 @@ def test_an_element_that_nobody_knows_is_refused_by_its_name_where_the_file_is_x
     assert _refused("<part/>", file="part.xml").startswith("part.xml: a file of <part> cannot be imported.")
     assert _refused("<?xml version='1.0'?><part/>", file="part").startswith("part: a file of <part> cannot be ")
     assert _refused("<part/>", file="part").startswith("part:1:1: no table of Denavit-Hartenberg parameters found")
+
+
+def test_what_is_no_options_and_a_convention_that_is_not_made_are_refused() -> None:
+    assert (
+        refusal(Dh2simError, import_robot, "arm.urdf", "modified") == "options must be ImportOptions, got 'modified'"
+    )
+    assert _refused(ARM, ImportOptions(convention="hayati")) == (
+        "a table is made in the standard or the modified convention; Hayati's rows come by themselves"
+    )

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from dh2sim.errors import Dh2simError
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.importing.result import Imported
 from dh2sim.importing.sources import ImportOptions, import_robot
@@ -15,6 +16,7 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
+from tests.refusals import refusal
 
 FOLDER = Path(__file__).parent / "third_party"
 Q = np.array([0.3, -0.5])
@@ -50,6 +52,17 @@ def _tool(spec: RobotSpec) -> Array:
 )
 def test_the_tip_is_where_pinocchio_and_mujoco_found_it(name: str, T_base_tip: list[list[float]]) -> None:
     assert _tool(_imported(name).spec)[:3] == pytest.approx(np.array(T_base_tip), abs=1e-8)
+
+
+def test_an_include_from_a_parent_folder_needs_a_wider_root() -> None:
+    name = "parent_include/cell/cell.xml"
+    imported = _imported(name, root=FOLDER / "parent_include")
+    assert _tool(imported.spec)[:3] == pytest.approx(np.array(SITE), abs=1e-8)
+    assert [(row.actuator.kp, row.actuator.kv) for row in imported.spec.rows] == [(50.0, 5.0), (30.0, 3.0)]
+    assert refusal(Dh2simError, _imported, name).endswith(f"allow others with root='{FOLDER / 'parent_include'}'")
+    assert refusal(Dh2simError, _imported, name, root=FOLDER / "parent_include" / "no").endswith(
+        "files in and below it"
+    )
 
 
 def test_a_servo_without_damping_comes_out_of_the_export_without_damping() -> None:

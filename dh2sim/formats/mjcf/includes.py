@@ -99,20 +99,21 @@ class MjcfFiles:
         return Problem(file=place.file, line=place.line, column=place.column, path=path, message=message)
 
 
-def scan_files(path: Path, *, file: str) -> MjcfFiles:
+def scan_files(path: Path, *, file: str, root: Path | None = None) -> MjcfFiles:
     """Read an MJCF and the files that it includes or attaches, without MuJoCo.
 
     Args:
         path: The file.
         file: Its name, for messages.
+        root: Folder outside of which no file is included; by default the file's own.
 
     Raises:
-        ImportedFileError: Not an MJCF; a file outside the folder of the model is included; a plugin is requested; or
-            the whole is larger than the limits above.
+        ImportedFileError: Not an MJCF; a file outside of ``root`` is included; a plugin is requested; or the whole is
+            larger than the limits above.
         Dh2simError: A file cannot be read.
     """
     main = path.absolute()
-    search = _Search(file)
+    search = _Search(main, file, root)
     search.model(main, file)
     return MjcfFiles(
         path=main,
@@ -126,8 +127,11 @@ def scan_files(path: Path, *, file: str) -> MjcfFiles:
 class _Search:
     """The files of all models so far."""
 
-    def __init__(self, file: str) -> None:
+    def __init__(self, main: Path, file: str, root: Path | None) -> None:
+        self._main = main
         self.file = file
+        self.root = Path(os.path.normpath(main.parent if root is None else root.absolute()))
+        self.allowed = "the model's folder" if root is None else str(root)
         self.folders: dict[Path, None] = {}
         self.places: dict[tuple[str, str], Place] = {}
         self.trees: dict[Path, Element] = {}
@@ -154,6 +158,14 @@ class _Search:
     def models(self) -> int:
         """Number of models."""
         return len(self._counts)
+
+    def root_hint(self, path: Path) -> str:
+        """Return how to allow a file outside, or nothing where that would be a whole disk."""
+        folder = Path(os.path.commonpath([self.root, path.parent]))
+        if folder == folder.parent:
+            return ""
+        named = os.path.join(os.path.dirname(self.file), os.path.relpath(folder, self._main.parent))
+        return f"; allow others with root={os.path.normpath(named)!r}"
 
     def attach_problem(self, path: Path) -> str | None:
         """Return why a model must not be attached to those that are being scanned, or None."""
@@ -247,25 +259,30 @@ class _Model:
         return count
 
     def _found(self, element: Element) -> tuple[Path, str]:
-        """Return the file that an element names, and what messages call it.
+        """Return the file that an element names, and what messages call it."""
+        paths = self._check_inside(element)
+        path = next((path for path in paths if os.path.lexists(path)), None)
+        if path is not None:
+            return path, os.path.join(os.path.dirname(self._name), os.path.relpath(path, self._path.parent))
+        given = shown(element.attributes.get("file", ""))
+        raise self._failure(element, f"no file {given} in {self._path.parent}", "file")
+
+    def _check_inside(self, element: Element) -> tuple[Path, ...]:
+        """Return the files that an element may name, which must be in the folder that is allowed.
 
         MuJoCo looks in the model's folder first, then in that of the file with the element.
         """
-        given = self._check_inside(element)
-        for folder in dict.fromkeys((self._path.parent, self._here[0])):
-            path = Path(os.path.normpath(folder / given))
-            if os.path.lexists(path):
-                return path, os.path.join(os.path.dirname(self._name), os.path.relpath(path, self._path.parent))
-        raise self._failure(element, f"no file {shown(given)} in {self._path.parent}", "file")
-
-    def _check_inside(self, element: Element) -> str:
-        """Return the file that an element names, which must be in the model's folder."""
         given = element.attributes.get("file", "")
-        path, windows = os.path.normpath(given.replace("\\", "/")), PureWindowsPath(given)
-        if not given or os.path.isabs(path) or windows.drive or windows.root or path.startswith(".."):
-            message = f"found {shown(given)}; only files in the model's folder and those below it are read"
+        folders = dict.fromkeys((self._path.parent, self._here[0]))
+        paths = [Path(os.path.normpath(folder / given.replace("\\", "/"))) for folder in folders]
+        there = [path for path in paths if os.path.lexists(path)]
+        outside = [path for path in there or paths if not path.is_relative_to(self._search.root)]
+        on_a_drive = os.name != "nt" and PureWindowsPath(given).drive
+        if not given or outside or on_a_drive:
+            hint = self._search.root_hint(outside[0]) if there and outside else ""
+            message = f"found {shown(given)}; only files in {self._search.allowed} and those below it are read{hint}"
             raise self._failure(element, message, "file")
-        return path
+        return tuple(paths)
 
 
 def _own_count(element: Element) -> int:

@@ -225,7 +225,9 @@ def _plural(word: str) -> str:
     return f"{word[:-1]}ies" if word.endswith("y") else f"{word}s"
 
 
-def read_mjcf(path: Path, *, file: str, base: str | None = None, tip: str | None = None) -> SerialRobot:
+def read_mjcf(
+    path: Path, *, file: str, base: str | None = None, tip: str | None = None, root: Path | None = None
+) -> SerialRobot:
     """Return the serial arm that an MJCF describes.
 
     MuJoCo parses and compiles the file, after its text and those that it includes were scanned: it deals with
@@ -234,20 +236,21 @@ def read_mjcf(path: Path, *, file: str, base: str | None = None, tip: str | None
     the file's ``qpos``.
 
     Args:
-        path: The file. Files that it includes must be in its folder or below; meshes and textures may be missing.
+        path: The file. Meshes and textures may be missing.
         file: Its name, for messages.
         base: Name of the body at which the arm begins, or ``world``. By default the topmost body above the arm,
             where that has no joint or floats; else the world.
         tip: Name of the site or else the body at which it ends. By default the site ``tool0``, or the only one of
             ``attachment_site``, ``ee_site``, ``end_effector`` and ``tcp``; else where the only way with joints ends,
             or at a hand: a fork behind three joints or more, into branches of fewer joints.
+        root: Folder that holds all files that are included; by default the file's own.
 
     Raises:
         ImportedFileError: The file is refused, by MuJoCo or before, or it holds no such arm.
         Dh2simError: The file, or one that it includes, cannot be read.
     """
     notes = Notes()
-    files = scan_files(path, file=file)
+    files = scan_files(path, file=file, root=root)
     compiled = compile_mjcf(files, notes)
     tree = read_tree(compiled.model)
     selection = select_chain(tree, base, tip, files, notes)

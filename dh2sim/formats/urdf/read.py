@@ -16,7 +16,7 @@ from dh2sim.formats.urdf.joints import read_joints
 from dh2sim.formats.urdf.links import Body, read_bodies, read_inertial, read_look, read_materials, weight_of
 from dh2sim.formats.urdf.tree import UrdfJoint, UrdfTree, read_pose, read_tree
 from dh2sim.formats.xacro import is_definition
-from dh2sim.formats.xml_read import XmlReport, parse_xml
+from dh2sim.formats.xml_read import Element, XmlReport, parse_xml
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.messages import Notes, listed, shown
 from dh2sim.typing import Array, read_only
@@ -76,7 +76,7 @@ def _note_elements(tree: UrdfTree, notes: Notes) -> None:
 
 
 def read_urdf(
-    data: bytes, *, file: str, base: str | None = None, tip: str | None = None, find_mesh: FindMesh
+    data: bytes | Element, *, file: str, base: str | None = None, tip: str | None = None, find_mesh: FindMesh
 ) -> SerialRobot:
     """Return the serial arm that a URDF describes.
 
@@ -85,7 +85,7 @@ def read_urdf(
     No file is opened; ``find_mesh`` may look for files.
 
     Args:
-        data: The file's content.
+        data: The file's content, or its root element.
         file: Its name, for messages.
         base: Name of the link at which the arm begins; by default the root.
         tip: Name of the link at which it ends. By default ``tool0`` where there is one; else where the only way that
@@ -96,7 +96,7 @@ def read_urdf(
         ImportedFileError: The file is wrong, or holds no such arm; the error holds everything that is wrong.
     """
     report, notes = XmlReport(file), Notes()
-    tree = read_tree(parse_xml(data, file=file), report)
+    tree = read_tree(data if isinstance(data, Element) else parse_xml(data, file=file), report)
     selection = select_chain(tree, base, tip, report, notes)
     joints = read_joints(selection, report, notes)
     bodies = read_bodies(tree, selection, report, notes)

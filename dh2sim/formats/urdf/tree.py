@@ -14,7 +14,7 @@ from typing import Final
 
 from dh2sim.formats.arm import LinkTree
 from dh2sim.formats.serial_robot import GREATEST
-from dh2sim.formats.xacro import unexpanded
+from dh2sim.formats.xacro import NO_LINK, is_definition, unexpanded
 from dh2sim.formats.xml_read import Element, XmlReport, place
 from dh2sim.kinematics.transforms import identity, pose_from_rpy
 from dh2sim.messages import closest, listed, shown
@@ -251,7 +251,8 @@ def _links(robot: Element, report: XmlReport) -> dict[str, Element]:
         elif name:
             links[name] = element
     if not links and not report.problems:
-        report.add(robot, "", "the file has no <link>")
+        only_definitions = any(is_definition(element, robot) for element in robot.children)
+        report.add(robot, "", NO_LINK if only_definitions else "the file has no <link>")
     return links
 
 

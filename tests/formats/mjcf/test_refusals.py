@@ -71,7 +71,6 @@ def test_a_wrong_file_is_reported_with_its_place(text: str, message: str, tmp_pa
 def test_only_files_in_the_models_folder_are_read(tag: str, path: str, tmp_path: Path) -> None:
     folder = tmp_path / "model"
     folder.mkdir()
-    (tmp_path / "x.xml").write_text("<x/>")
     shown = path.replace("\\", "\\\\")
     assert refused(folder, f'<mujoco><{tag} file="{path}"/></mujoco>') == (
         f"robot.xml:1:9: {tag}.file: found '{shown}'; only files in the model's folder and those below it are read"
@@ -79,13 +78,36 @@ def test_only_files_in_the_models_folder_are_read(tag: str, path: str, tmp_path:
 
 
 def test_included_files_are_looked_through_too(tmp_path: Path) -> None:
-    (tmp_path / "sub").mkdir()
-    (tmp_path / "sub" / "one.xml").write_text('<x><include file="two.xml"/></x>')
-    (tmp_path / "sub" / "two.xml").write_text('<x>\n<include file="../../three.xml"/></x>')
+    (tmp_path / "model" / "sub").mkdir(parents=True)
+    (tmp_path / "model" / "sub" / "one.xml").write_text('<x><include file="two.xml"/></x>')
+    (tmp_path / "model" / "sub" / "two.xml").write_text('<x>\n<include file="../../three.xml"/></x>')
+    (tmp_path / "three.xml").write_text("<x/>")
     place = os.path.join("sub", "two.xml")
-    assert refused(tmp_path, '<mujoco><include file="sub/one.xml"/></mujoco>') == (
+    assert refused(tmp_path / "model", '<mujoco><include file="sub/one.xml"/></mujoco>') == (
         f"{place}:2:1: include.file: found '../../three.xml'; only files in the model's folder and those below it "
-        "are read"
+        "are read; allow others with root='..'"
+    )
+
+
+@pytest.mark.parametrize("form", ["../arm.xml", "ABOVE/arm.xml", "sub/../../arm.xml"])
+def test_a_wider_root_allows_files_of_a_parent_folder(tmp_path: Path, form: str) -> None:
+    folder = tmp_path / "models" / "cell"
+    folder.mkdir(parents=True)
+    (tmp_path / "models" / "arm.xml").write_text(arm_text())
+    (tmp_path / "arm.xml").write_text("<mujoco/>")
+    path = folder / "robot.xml"
+    path.write_text(
+        f'<mujoco model="cell"><include file="{form.replace("ABOVE", str(tmp_path / "models"))}"/></mujoco>'
+    )
+    assert read_mjcf(path, file="robot.xml", root=tmp_path / "models").chain.n == 2
+    with pytest.raises(ImportedFileError, match="only files in the model's folder"):
+        read_mjcf(path, file="robot.xml")
+    path.write_text('<mujoco model="cell"><include file="../../arm.xml"/></mujoco>')
+    with pytest.raises(ImportedFileError) as caught:
+        read_mjcf(path, file="cell/robot.xml", root=tmp_path / "models")
+    assert str(caught.value) == (
+        f"cell/robot.xml:1:22: include.file: found '../../arm.xml'; only files in {tmp_path / 'models'} and those "
+        "below it are read; allow others with root='..'"
     )
 
 
