@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.typing import Array
+from dh2sim.typing import Array, read_only
 
 SINGULAR = 1e-9
 """A singular value below this share of the largest counts as zero: what is left of it is rounding."""
@@ -72,6 +74,34 @@ def lost_directions(J: ArrayLike) -> Array:
         Linear and angular velocities, shape (6 - rank, 6), in reduced form.
     """
     return _basis(np.asarray(J, dtype=np.float64).T)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class VelocityEllipsoid:
+    """The velocities that a frame's origin has while the joint rates have the norm 1."""
+
+    axes: Array
+    """Its principal axes in base_link, the longest first: the columns of a rotation, shape (3, 3)."""
+    semi_axes: Array
+    """Their half lengths, m/s, shape (3,); zero in a direction in which the origin cannot move."""
+
+
+def velocity_ellipsoid(J: ArrayLike) -> VelocityEllipsoid:
+    """Return the ellipsoid of manipulability of a Jacobian's linear part J_v: v with vᵀ (J_v J_vᵀ)⁻¹ v = 1.
+
+    Its half axes are the left singular vectors of J_v times the singular values. Source: B. Siciliano, L. Sciavicco,
+    L. Villani, G. Oriolo, Robotics: Modelling, Planning and Control, 2009, section 3.9.
+
+    Args:
+        J: The Jacobian at one configuration, shape (6, n).
+    """
+    linear = np.asarray(J, dtype=np.float64)[:3]
+    axes, values, _ = np.linalg.svd(linear)
+    semi_axes = np.zeros(3)
+    semi_axes[: len(values)] = values
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 2] *= -1.0
+    return VelocityEllipsoid(axes=read_only(axes), semi_axes=read_only(semi_axes))
 
 
 def _basis(A: Array) -> Array:

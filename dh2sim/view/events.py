@@ -194,6 +194,13 @@ class ChooseFrame:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ChooseReference:
+    """Choose the frame that it is shown in."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MoveTool:
     """Move the tool towards a goal; ``q`` is the result of inverse kinematics."""
 
@@ -254,6 +261,7 @@ Event: TypeAlias = (
     | SetOpacity
     | ShowAngles
     | ChooseFrame
+    | ChooseReference
     | MoveTool
     | Compare
     | CompareMisread

@@ -10,13 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dh2sim.errors import Dh2simError
 from dh2sim.export import Format, render
+from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import frame_pose, geometric_jacobian
-from dh2sim.kinematics.transforms import quaternion_from_rotation, rpy_from_rotation
+from dh2sim.kinematics.singularity import VelocityEllipsoid, singular_values, velocity_ellipsoid
+from dh2sim.kinematics.transforms import compose, invert, quaternion_from_rotation, rpy_from_rotation
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.typing import Array
+from dh2sim.typing import Array, read_only
 from dh2sim.view.robot_files import write_files
 from dh2sim.view.state import ViewState
 
@@ -26,16 +29,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FrameReadout:
-    """The pose of a frame, and measures of tool0's Jacobian J."""
+    """The pose of a frame in another one, and measures of tool0's Jacobian J."""
 
-    T_base_frame: Array
-    """Pose of the frame in base_link, shape (4, 4)."""
+    T_reference_frame: Array
+    """Pose of the frame in the reference frame, shape (4, 4)."""
     xyz: tuple[float, ...]
     """m."""
     rpy: tuple[float, ...]
     """rad."""
     quaternion: tuple[float, ...]
     """(w, x, y, z)."""
+    jacobian: Array
+    """J, shape (6, n)."""
+    ellipsoid: VelocityEllipsoid
+    """Of the linear part of J."""
     manipulability: float
     """sqrt(det(J Jᵀ)); for fewer than six joints, where that is zero, sqrt(det(Jᵀ J)).
 
@@ -50,16 +57,19 @@ class FrameReadout:
 
 def readout_of(state: ViewState) -> FrameReadout:
     """Return the readout of the frame that a state has chosen."""
-    return _readout_of(state.model, state.frame, state.q)
+    return _readout_of(state.model, state.reference, state.frame, state.q)
 
 
 @lru_cache(maxsize=8)  # several parts of a page show the same state
-def _readout_of(model: RobotModel, frame: str, q: tuple[float, ...]) -> FrameReadout:
+def _readout_of(model: RobotModel, reference: str, frame: str, q: tuple[float, ...]) -> FrameReadout:
     chain = model.chain
-    T = np.asarray(frame_pose(chain, frame, q))
-    values = singular_values(geometric_jacobian(chain, q))
+    T = relative_pose(chain, reference, frame, q)
+    J = geometric_jacobian(chain, q)
+    values = singular_values(J).tolist()
     return FrameReadout(
-        T_base_frame=T,
+        T_reference_frame=T,
+        jacobian=read_only(J),
+        ellipsoid=velocity_ellipsoid(J),
         xyz=tuple(T[:3, 3].tolist()),
         rpy=tuple(rpy_from_rotation(T).tolist()),
         quaternion=tuple(quaternion_from_rotation(T).tolist()),
@@ -68,9 +78,19 @@ def _readout_of(model: RobotModel, frame: str, q: tuple[float, ...]) -> FrameRea
     )
 
 
-def singular_values(jacobian: Array) -> list[float]:
-    """Return the singular values of a Jacobian of shape (6, n), as many as the smaller of 6 and n."""
-    return [float(value) for value in np.linalg.svd(jacobian, compute_uv=False)] if jacobian.size else []
+def relative_pose(chain: KinematicChain, reference: str, frame: str, q: ArrayLike) -> Array:
+    """Return the pose of a frame in another one, shape (4, 4).
+
+    Args:
+        chain: The robot.
+        reference: One of ``frame_names``.
+        frame: Likewise.
+        q: Joint vector, rad and m, shape (n,).
+    """
+    T_base_frame = read_only(frame_pose(chain, frame, q))
+    if reference == "base_link":
+        return T_base_frame
+    return read_only(compose(invert(read_only(frame_pose(chain, reference, q))), T_base_frame))
 
 
 @dataclass(slots=True, eq=False)

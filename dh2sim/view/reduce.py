@@ -126,6 +126,8 @@ def _reduced(state: ViewState, event: events.Event) -> ViewState:
             return replace(state, selected_row=row) if 0 <= row < len(state.table.rows) else state
         case events.ChooseFrame(name=name):
             return replace(state, frame=name) if name in frame_names(state.model.chain) else state
+        case events.ChooseReference(name=name):
+            return replace(state, reference=name) if name in frame_names(state.model.chain) else state
         case events.Compare(ghost=ghost):
             return replace(state, ghost=ghost)
         case events.CompareMisread():

@@ -47,9 +47,11 @@ class Part(StrEnum):
     """Soft shading of surfaces, instead of a few steps, which a browser without a graphics card draws faster."""
     HANDLE = "handle"
     """That tool0 is dragged by."""
+    ELLIPSOID = "ellipsoid"
+    """Of the velocities that tool0's origin can have."""
 
 
-INITIALLY: Final = frozenset(Part) - {Part.TRACE}
+INITIALLY: Final = frozenset(Part) - {Part.TRACE, Part.ELLIPSOID}
 """Parts that a page shows at first."""
 
 
@@ -155,6 +157,8 @@ class ViewState:
     """Unit of angles outside of the table."""
     frame: str = "tool0"
     """Frame whose pose is shown, one of ``frame_names``."""
+    reference: str = "base_link"
+    """Frame that it is shown in, one of ``frame_names``."""
     ghost: Ghost | None = None
     trace: tuple[Vector, ...] = ()
     """Path of tool0 in the world since ``Part.TRACE`` is shown, m."""

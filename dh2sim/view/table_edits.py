@@ -130,6 +130,7 @@ def _with_robot(
         table=table_state_of(text, model.spec, errors),
         q=within(model, state.q) if same_joints else configurations(model)["home"],
         frame=state.frame if state.frame in frame_names(model.chain) else "tool0",
+        reference=state.reference if state.reference in frame_names(model.chain) else "base_link",
         selected_row=min(state.selected_row, rows - 1),
         ghost=misread_ghost(model) if state.ghost is not None and state.ghost.misread else state.ghost,
         goal=None,

@@ -6,7 +6,14 @@ from hypothesis import given
 from numpy.testing import assert_allclose
 
 from dh2sim import build_chain, geometric_jacobian, load_robot
-from dh2sim.kinematics.singularity import lost_directions, manipulability, rank, singular_values, still_motions
+from dh2sim.kinematics.singularity import (
+    lost_directions,
+    manipulability,
+    rank,
+    singular_values,
+    still_motions,
+    velocity_ellipsoid,
+)
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.strategies import robots_with_joint_vectors
@@ -47,6 +54,34 @@ def test_still_motions_and_lost_directions_are_all_there_are(robot: tuple[RobotS
         for vector in basis:
             columns = np.flatnonzero(vector == 1.0)
             assert any(np.count_nonzero(basis[:, column]) == 1 for column in columns)
+
+
+@given(robots_with_joint_vectors(must_move=False))
+def test_the_velocity_ellipsoid_holds_the_velocity_of_every_unit_joint_rate(robot: tuple[RobotSpec, Array]) -> None:
+    spec, q = robot
+    J = geometric_jacobian(build_chain(spec), q[0])
+    ellipsoid, size = velocity_ellipsoid(J), max(1.0, abs(J).max(initial=0.0))
+    assert_allclose(ellipsoid.axes.T @ ellipsoid.axes, np.eye(3), atol=1e-12)
+    assert np.linalg.det(ellipsoid.axes) > 0.0
+    assert np.all(np.diff(ellipsoid.semi_axes) <= 0.0)
+    # Gram matrices of both, which are the ellipsoids
+    spread = ellipsoid.axes @ np.diag(ellipsoid.semi_axes**2) @ ellipsoid.axes.T
+    assert_allclose(spread, J[:3] @ J[:3].T, rtol=0, atol=1e-12 * size**2 * max(1, J.shape[1]))
+    rates = np.random.default_rng(1).normal(size=(200, J.shape[1]))
+    rates /= np.maximum(np.linalg.norm(rates, axis=1, keepdims=True), 1e-300)
+    for k in range(3):
+        reach = np.abs(rates @ J[:3].T @ ellipsoid.axes[:, k]).max(initial=0.0)
+        assert reach <= ellipsoid.semi_axes[k] + 1e-12 * size
+
+
+def test_the_ellipse_of_two_links_has_the_half_axes_of_the_closed_form() -> None:
+    a1, a2, q1, q2 = 1.0, 0.7, 0.3, 1.1
+    ellipsoid = velocity_ellipsoid(jacobian("planar_2r", q1, q2))
+    # eigenvalues of J Jᵀ out of its trace and determinant
+    trace = a1**2 + 2 * a2**2 + 2 * a1 * a2 * np.cos(q2)
+    root = np.sqrt(trace**2 - 4 * (a1 * a2 * np.sin(q2)) ** 2)
+    assert_allclose(ellipsoid.semi_axes, [*np.sqrt([(trace + root) / 2, (trace - root) / 2]), 0.0], atol=1e-12)
+    assert_allclose(np.abs(ellipsoid.axes[:, 2]), [0, 0, 1], atol=1e-12)
 
 
 def test_a_straight_wrist_turns_joints_4_and_6_against_each_other() -> None:

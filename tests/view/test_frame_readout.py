@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,9 +13,11 @@ from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
-from dh2sim.view.events import ChooseFrame, RandomConfiguration, SetJoints
+from dh2sim.view.events import ChooseFrame, ChooseReference, RandomConfiguration, SelectRow, SetJoints
 from dh2sim.view.frame_readout import readout_of
 from dh2sim.view.initial_state import open_state
+from dh2sim.view.panel.pose import frame_title, jacobian_markup
+from dh2sim.view.panel.table import row_matrix
 from dh2sim.view.reduce import reduce
 
 
@@ -61,7 +64,7 @@ def test_a_pose_is_given_in_three_notations_that_agree_with_the_table(frame: str
     frames = table_frame_poses(spec, state.q)
     expected = table_tool_pose(spec, state.q) if frame == "tool0" else frames[int(frame.removeprefix("dh_"))]
     readout = readout_of(state)
-    assert np.allclose(readout.T_base_frame, expected, rtol=0, atol=1e-12)
+    assert np.allclose(readout.T_reference_frame, expected, rtol=0, atol=1e-12)
     assert np.allclose(readout.xyz, expected[:3, 3], rtol=0, atol=1e-12)
     # rpy: about the fixed axes x, y and z in turn, as URDF has it; quaternion: the scalar first
     turns = [turn_about(axis, angle) for axis, angle in enumerate(readout.rpy)]
@@ -69,6 +72,45 @@ def test_a_pose_is_given_in_three_notations_that_agree_with_the_table(frame: str
     w, *vector = readout.quaternion
     v, cross = np.array(vector), np.cross(np.eye(3), vector)
     assert np.allclose((w * w - v @ v) * np.eye(3) + 2.0 * np.outer(v, v) + 2.0 * w * cross, expected[:3, :3])
+
+
+@pytest.mark.parametrize(
+    ("reference", "frame"), [("dh_2", "dh_3"), ("tool0", "dh_1"), ("dh_4", "dh_4"), ("dh_0", "tool0")]
+)
+@pytest.mark.parametrize("robot", ["stanford", "puma560"])
+def test_a_pose_in_another_frame_is_the_product_of_the_rows_between(robot: str, reference: str, frame: str) -> None:
+    spec = load_robot(robot)
+    state = reduce(open_state(spec), RandomConfiguration(seed=5))
+    state = reduce(reduce(state, ChooseFrame(name=frame)), ChooseReference(name=reference))
+    poses = {f"dh_{i}": T for i, T in enumerate(table_frame_poses(spec, state.q))}
+    poses["tool0"] = table_tool_pose(spec, state.q)
+    expected = np.linalg.solve(poses[reference], poses[frame])
+    assert np.allclose(readout_of(state).T_reference_frame, expected, rtol=0, atol=1e-12)
+    assert frame_title(state) == f"<b>{frame}</b> in {reference}"
+    assert reduce(state, ChooseReference(name="dh_99")) == state
+
+
+@pytest.mark.parametrize("robot", ["stanford", "puma560"])
+def test_the_matrix_of_each_row_is_printed_and_their_product_is_the_pose(robot: str) -> None:
+    spec = load_robot(robot)
+    state = reduce(open_state(spec), RandomConfiguration(seed=8))
+    product = table_frame_poses(spec, state.q)[0]
+    for row in range(len(spec.rows)):
+        html = row_matrix(reduce(state, SelectRow(row=row)))
+        product = product @ np.array(re.findall(r">([-+]\d+\.\d+)<", html), dtype=np.float64).reshape(4, 4)
+        assert f"<b>dh_{row + 1}</b> in dh_{row}" in html
+    assert np.allclose(product, table_frame_poses(spec, state.q)[-1], rtol=0, atol=1e-5)
+
+
+def test_the_jacobian_is_printed_with_the_half_axes_of_its_ellipsoid() -> None:
+    spec = load_robot("stanford")
+    state = reduce(open_state(spec), RandomConfiguration(seed=8))
+    html, J = jacobian_markup(readout_of(state)), jacobian_by_differences(spec, state.q)
+    printed = np.array(re.findall(r">([-+]\d+\.\d+)<", html), dtype=np.float64).reshape(6, 6)
+    assert np.allclose(printed, J, rtol=0, atol=6e-4)
+    halves = np.sqrt(np.linalg.eigvalsh(J[:3] @ J[:3].T))[::-1]
+    assert " ".join(f"{half:.4g}" for half in halves) in html
+    assert "-0.000" not in jacobian_markup(readout_of(open_state(spec)))
 
 
 def turn_about(axis: int, angle: float) -> Array:

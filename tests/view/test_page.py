@@ -63,7 +63,7 @@ def test_pages_have_their_own_states_and_a_reload_starts_again(open_page: OpenPa
 
 
 def test_the_pose_is_shown_in_all_notations_with_its_difference_to_mujoco(
-    open_page: OpenPage, tmp_path: Path
+    open_page: OpenPage, viewer: Viewer, tmp_path: Path
 ) -> None:
     page, spec = open_page(), load_robot("stanford")
     open_tab(page, "Pose")
@@ -73,6 +73,13 @@ def test_the_pose_is_shown_in_all_notations_with_its_difference_to_mujoco(
     found = re.search(r"Difference to MuJoCo: (\S+) m, (\S+) rad", shown(page, "mujoco"))
     assert found is not None
     assert all(float(number) < 1e-12 for number in found.groups())
+    choose(page, "in", "dh_2")
+    wait_until(lambda: "tool0 in dh_2" in page.get_by_text("Pose of ").inner_text(), "another frame")
+    relative = np.linalg.solve(table_frame_poses(spec, HOME)[2], table_tool_pose(spec, HOME))
+    matrix = np.array(shown(page, "matrix").split(), dtype=np.float64).reshape(4, 4)
+    assert np.allclose(matrix, relative, rtol=0, atol=1e-6)
+    page.get_by_text("Ellipsoid in scene").click()
+    wait_until(lambda: "/ellipsoid/surface" in viewer.pages[0]._painter._drawn, "the ellipsoid")
 
 
 def test_files_are_downloaded_as_edited_and_the_model_matches_the_table(

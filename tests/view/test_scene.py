@@ -8,7 +8,7 @@ from hypothesis import given, settings
 
 from dh2sim.kinematics.forward import joint_poses
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
-from dh2sim.robot.read import load_robot
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from dh2sim.view.events import CompareMisread, MoveJoint, SelectRow, SetJoints, SetOpacity, Show
@@ -18,6 +18,7 @@ from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import Part, ViewState, within
 from tests.strategies import robots_with_joint_vectors
 from tests.view.states import STANFORD, after
+from tests.view.test_frame_readout import jacobian_by_differences
 from tests.view.test_solids import matrix, pose_in_scene
 
 
@@ -120,6 +121,31 @@ def test_without_soft_shading_surfaces_are_plain_and_nothing_else_changes() -> N
     assert {name for name in soft if soft[name] != plain[name]} == solids
     assert all(item.plain for item in plain.values() if isinstance(item, Solid))
     assert not any(item.plain for item in soft.values() if isinstance(item, Solid))
+
+
+def test_the_velocity_ellipsoid_is_around_tool0_with_the_half_axes_of_the_jacobian() -> None:
+    state = after(STANFORD, Show(part=Part.ELLIPSOID, on=True), MoveJoint(joint=1, value=0.8))
+    scene = scene_of(state)
+    surface, axes = scene["/ellipsoid/surface"], scene["/ellipsoid/axes"]
+    assert isinstance(surface, Solid)
+    assert isinstance(axes, Lines)
+    T = pose_in_scene(scene, "/ellipsoid/surface")
+    assert np.allclose(T[:3, 3], table_tool_pose(state.spec, state.q)[:3, 3], rtol=0, atol=1e-12)
+    J = jacobian_by_differences(state.spec, state.q)[:3]
+    shape = T[:3, :3] @ np.diag(np.square(surface.scale)) @ T[:3, :3].T
+    assert np.allclose(shape, 0.15**2 * J @ J.T, rtol=0, atol=1e-8)
+    assert np.allclose([end for _, end in axes.segments], np.diag(surface.scale), rtol=0, atol=1e-12)
+    assert np.allclose(np.linalg.norm(surface.vertices, axis=1), 1.0)
+    assert not below(scene_of(STANFORD), "/ellipsoid")
+
+
+def test_the_ellipsoid_of_a_planar_arm_is_flat_and_of_a_robot_that_cannot_move_none() -> None:
+    planar = scene_of(after(open_state(load_robot("planar_2r")), Show(part=Part.ELLIPSOID, on=True)))
+    surface = planar["/ellipsoid/surface"]
+    assert isinstance(surface, Solid)
+    assert 0.0 < surface.scale[2] < 0.02 * surface.scale[0]
+    fixed = open_state(parse_robot("name: x\nconvention: standard\njoints: [{type: fixed, a: 1}]\n"))
+    assert not below(scene_of(after(fixed, Show(part=Part.ELLIPSOID, on=True))), "/ellipsoid")
 
 
 def test_the_ghost_is_where_the_misread_table_has_it() -> None:

@@ -77,6 +77,8 @@ anything: st.SearchStrategy[events.Event] = st.one_of(
     st.builds(events.SelectRow, row=rows),
     st.builds(events.Show, part=st.sampled_from(Part), on=st.booleans()),
     st.builds(events.ShowAngles, unit=st.sampled_from(AngleUnit)),
+    st.builds(events.ChooseReference, name=st.sampled_from(["dh_3", "base_link", "dh_99"])),
+    st.builds(events.SetOpacity, opacity=numbers),
     st.builds(events.ChooseFrame, name=st.sampled_from(["tool0", "dh_3", "link_1", "dh_99", ""])),
     st.builds(events.MoveTool, T_base_link_tool0=matrices, q=st.none() | st.just((0.1,) * 6), reached=st.booleans()),
     st.builds(events.Undo),

@@ -39,6 +39,7 @@ _PART_LABELS: Final = {
     Part.TRACE: "Path of tool0",
     Part.GHOST: "Show ghost",
     Part.HANDLE: "Handle to drag tool0",
+    Part.ELLIPSOID: "Velocity ellipsoid",
     Part.GRID: "Grid",
     Part.SHADING: "Soft shading",
 }
@@ -102,7 +103,8 @@ class Panel:
 
     def show_slow(self, state: ViewState) -> None:
         """Show what takes a while to compute."""
-        self._pose.compare(state)
+        self._pose.show_slow(state)
+        self._table.show_slow(state)
 
 
 class ShowTab:

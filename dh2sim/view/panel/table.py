@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 from dh2sim.robot.edit import PARAMETERS
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
 from dh2sim.view.events import ConvertTable, EditCell, SelectRow, SetConvention, SetUnits, Show, Undo
+from dh2sim.view.frame_readout import relative_pose
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
 from dh2sim.view.panel.cells import CellGrid, identity_of
+from dh2sim.view.panel.pose import matrix_markup
 from dh2sim.view.scene.annotations import Quantity, subscript, symbol
 from dh2sim.view.state import CONVENTION, CellError, Part, TableState, ViewState
 
@@ -33,6 +35,7 @@ class TableTab:
         self._tab = tab
         self._send = send
         self._shown: object = None
+        self._shown_slow: object = None
         self._cells = CellGrid(self._gui, send, state)
         self._notes = self._gui.add_html("")
         self._rows = _names(state)
@@ -44,6 +47,7 @@ class TableTab:
             send,
             lambda on: Show(part=Part.ANNOTATIONS, on=on),
         )
+        self._matrix = self._gui.add_html("")
         self._undo = self._gui.add_button("Undo", disabled=True, hint="Undoes the last edit of the table")
         on_click(self._undo, send, Undo)
         self._parameters = ParameterFields(self._gui, send, state)
@@ -78,6 +82,13 @@ class TableTab:
         self._explain.show(Part.ANNOTATIONS in state.shown)
         self._angle.show(state.table.units.angle.value)
         self._length.show(state.table.units.length.value)
+
+    def show_slow(self, state: ViewState) -> None:
+        """Show the matrix of the selected row at the joint coordinates."""
+        shown = (state.model, state.q, state.selected_row)
+        if shown != self._shown_slow:
+            self._shown_slow = shown
+            self._matrix.content = row_matrix(state)
 
     def _convention_of_row(self, state: ViewState) -> Bound[str]:
         """Add the convention of the selected row, which gets a field of its own, as its label names it."""
@@ -156,6 +167,14 @@ def _parameters(state: ViewState) -> object:
 
 def _edit_parameter(name: str, text: str) -> EditCell:
     return EditCell(row=PARAMETERS, column=name, text=text)
+
+
+def row_matrix(state: ViewState) -> str:
+    """Return the matrix A of the selected row at the joint coordinates, HTML."""
+    row = state.selected_row
+    T = relative_pose(state.model.chain, f"dh_{row}", f"dh_{row + 1}", state.q)
+    title = f"A{subscript(row + 1)}: <b>dh_{row + 1}</b> in dh_{row}, lengths in m"
+    return markup.note(title) + matrix_markup(T, name="row-matrix")
 
 
 def notes(table: TableState) -> str:

@@ -11,7 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.kinematics.forward import forward_kinematics
+from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian
+from dh2sim.kinematics.singularity import velocity_ellipsoid
 from dh2sim.kinematics.transforms import compose, pose_errors
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
@@ -33,7 +34,7 @@ from dh2sim.view.scene.items import (
 )
 from dh2sim.view.scene.labels import spread_labels
 from dh2sim.view.scene.link_poses import poses_at, robot_size, round_length, triad_length
-from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids
+from dh2sim.view.scene.solids import ball_triangles, orientation_of, position_of, robot_solids
 from dh2sim.view.state import Goal, LinkDrag, Part, ViewState
 
 ROBOT: Final = "/robot"
@@ -42,7 +43,8 @@ ROW: Final = "/row"
 GHOST: Final = "/ghost"
 DRAG: Final = "/drag"
 GOAL: Final = "/goal"
-IN_BASE_LINK: Final = (ROBOT, NAMES, ROW, GHOST)
+ELLIPSOID: Final = "/ellipsoid"
+IN_BASE_LINK: Final = (ROBOT, NAMES, ROW, GHOST, ELLIPSOID)
 """Items below these are given in base_link, all others, such as the trace and the grid, in the world."""
 _TRACE_COLOR: Final[Color] = (0.10, 0.45, 0.85)
 _GRID_COLOR: Final[Color] = (0.82, 0.84, 0.87)
@@ -55,6 +57,11 @@ _TOGETHER: Final = 0.25
 """Frames nearer to each other than this share of their axes' length share a label."""
 _ABOVE: Final = 0.45
 """Height of a label above its frame, as a share of the axes' length."""
+_ELLIPSOID_COLOR: Final[Color] = (0.05, 0.50, 0.62)
+_ELLIPSOID_SCALE: Final = 0.15
+"""m of an ellipsoid for each m/s of a velocity."""
+_FLAT: Final = 0.01
+"""Thickness of an ellipsoid that is flat, as a share of its length."""
 _THICKNESS: Final = 0.12
 """Of the arrow of a drag, as a share of the axes' length."""
 
@@ -88,6 +95,8 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
     if Part.GHOST in state.shown and state.ghost is not None:
         configuration = ghost_configuration(state.ghost.model, state.model, state.q)
         yield from _without(GHOST, ghost_scene(state.ghost.model, configuration.q))
+    if Part.ELLIPSOID in state.shown:
+        yield from _ellipsoid(state)
     if state.drag is not None:
         yield DRAG, _drag_arrow(state, state.drag)
     if (marker := _goal_marker(state)) is not None:
@@ -96,6 +105,33 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
         yield "/trace", Polyline(points=state.trace, color=_TRACE_COLOR, width=3.0)
     if Part.GRID in state.shown:
         yield from _grid(robot_size(state.model)).items()
+
+
+def _ellipsoid(state: ViewState) -> Iterator[tuple[str, Item]]:
+    """Yield the velocity ellipsoid around the origin of tool0, and its principal axes."""
+    ellipsoid = velocity_ellipsoid(geometric_jacobian(state.model.chain, state.q))
+    halves = _ELLIPSOID_SCALE * ellipsoid.semi_axes
+    if not halves[0] > 0.0:
+        return
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = ellipsoid.axes, poses_at(state.model, state.q).tool0[:3, 3]
+    position, orientation = position_of(T), orientation_of(T)
+    vertices, faces = ball_triangles()
+    yield (
+        f"{ELLIPSOID}/surface",
+        Solid(
+            position=position,
+            orientation=orientation,
+            vertices=vertices,
+            faces=faces,
+            color=_ELLIPSOID_COLOR,
+            opacity=0.35,
+            scale=vector(np.maximum(halves, _FLAT * halves[0])),
+        ),
+    )
+    segments = tuple((vector(-half), vector(half)) for half in np.diag(halves))
+    axes = Lines(position=position, orientation=orientation, segments=segments, color=_ELLIPSOID_COLOR, width=2.0)
+    yield f"{ELLIPSOID}/axes", axes
 
 
 def _spread_labels(state: ViewState, items: Scene) -> Scene:

@@ -123,6 +123,13 @@ def _shape_triangles(kind: ShapeKind, radius: float, length: float) -> Triangles
             return _revolved(_capsule_profile(radius, half))
 
 
+@lru_cache(maxsize=1)
+def ball_triangles() -> Triangles:
+    """Return the closed surface of a ball of radius 1 around the origin."""
+    angles = (math.pi * (k / (2 * RINGS) - 0.5) for k in range(1, 2 * RINGS))
+    return _revolved([(0.0, -1.0), *((math.cos(angle), math.sin(angle)) for angle in angles), (0.0, 1.0)])
+
+
 def mesh_triangles(mesh: MeshAsset) -> Triangles:
     """Return the surface of a mesh in its own frame, m; coincident corners are merged."""
     return _mesh_triangles(mesh.data, mesh.scale)
