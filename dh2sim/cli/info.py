@@ -17,7 +17,7 @@ from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.model.robot_model import JointModel, RobotModel
-    from dh2sim.robot.spec import Row, Units
+    from dh2sim.robot.spec import RobotSpec, Row, Units
 
 T = TypeVar("T")
 
@@ -55,6 +55,7 @@ def as_dict(model: RobotModel) -> dict[str, Any]:
     frames = {f"dh_{i}": T.tolist() for i, T in enumerate(frame_poses(chain, model.home))}
     return {
         "name": spec.name,
+        "group": _group(spec),
         "description": spec.description,
         "source": spec.source,
         "rows": [_row_dict(row, joint) for row, joint in zip(spec.rows, model.joints, strict=True)],
@@ -76,6 +77,13 @@ def as_dict(model: RobotModel) -> dict[str, Any]:
         ],
         "notes": [slip.to_json() for slip in find_slips(model)],
     }
+
+
+def _group(spec: RobotSpec) -> str | None:
+    """Return what kind of robot one is that comes with dh2sim."""
+    from dh2sim.robot.catalog import builtin_group
+
+    return None if spec.source_file is None else builtin_group(spec.name, spec.source_file.text)
 
 
 def _row_dict(row: Row, joint: JointModel) -> dict[str, Any]:
@@ -103,7 +111,8 @@ def _row_dict(row: Row, joint: JointModel) -> dict[str, Any]:
 def _print(model: RobotModel, *, srdf: bool) -> None:
     spec = model.spec
     description, source = (" ".join(text.split()) for text in (spec.description, spec.source))
-    _print_wrapped(f"{spec.name}  {description}".rstrip())
+    group = _group(spec)
+    _print_wrapped(f"{spec.name}  {description}{f' ({group})' if group else ''}".rstrip())
     if source:
         _print_wrapped(f"Source: {source}")
     for lines in (_dh_table(model), _frame_table(model)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from dataclasses import asdict
 from typing import Annotated
 
@@ -14,7 +15,7 @@ def list_robots(
         bool, typer.Option("--json", help="Print JSON alone: a list with an object for each robot.")
     ] = False,
 ) -> None:
-    """List the robots that come with dh2sim: name, moving joints, and what they are.
+    """List the robots that come with dh2sim, by kind: name, moving joints, and what they are.
 
     R is a revolute joint, P a prismatic one.
 
@@ -30,9 +31,15 @@ def list_robots(
     if as_json:
         print(json.dumps([asdict(robot) for robot in robots], indent=2))
         return
-    width = max((len(robot.name) for robot in robots), default=0)
-    for robot in robots:
-        print(f"{robot.name:{width}}  {robot.joints:8}  {robot.description}")
+    for group in dict.fromkeys(robot.group for robot in robots):
+        members = [robot for robot in robots if robot.group == group]
+        width = max(len(robot.name) for robot in members)
+        if members[0] is not robots[0]:
+            print()
+        print(f"{group.capitalize()}s")
+        for robot in members:
+            start = f"  {robot.name:{width}}  {robot.joints:7}  "
+            print(textwrap.fill(robot.description, 80, initial_indent=start, subsequent_indent=" " * len(start)))
 
 
 def schema() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,8 @@ from dh2sim.robot.yaml_tree import Node, Report, compose
 _PACKAGE: Final = Path(__file__).resolve().parent.parent
 _FOLDERS: Final = (_PACKAGE / "robots", _PACKAGE.parent / "robots")
 """In an installed wheel; in a checkout."""
+_GROUPS: Final = "groups.toml"
+"""The file in the folder that sorts the robots: a list of names for each group."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,6 +22,8 @@ class Summary:
     """What a list says of a robot."""
 
     name: str
+    group: str
+    """What kind of robot it is, in the singular: 'course robot', 'cobot', …"""
     joints: str
     """The moving rows, base first: R for a revolute joint, P for a prismatic one."""
     conventions: tuple[str, ...]
@@ -38,24 +43,45 @@ def builtin_path(name: str) -> Path | None:
     return _folder() / f"{stem}.yaml" if stem in builtin_robots() else None
 
 
+def builtin_groups() -> dict[str, tuple[str, ...]]:
+    """Return the names of the robots that come with dh2sim, by what kind of robot they are."""
+    file = _folder() / _GROUPS
+    listed = tomllib.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    return {group: tuple(names) for group, names in listed.items()}
+
+
+def builtin_group(name: str, text: str) -> str | None:
+    """Return the group of the robot that comes with dh2sim by this name and with this file, None for others."""
+    path = builtin_path(name)
+    if path is None or path.read_text(encoding="utf-8") != text:
+        return None
+    return next((group for group, names in builtin_groups().items() if name in names), None)
+
+
 def summaries() -> Iterator[Summary]:
-    """Yield the summary of every robot that comes with dh2sim, sorted by name.
+    """Yield the summary of every robot that comes with dh2sim, group by group.
 
     Their files are known to be right, so they are not checked, and no number in them is evaluated.
     """
-    for path in sorted(_folder().glob("*.yaml")):
-        root = compose(path.read_text(encoding="utf-8"), Report(path.name))
-        rows = root.at("joints")
-        assert rows is not None and isinstance(rows.value, list), path  # noqa: PT018
-        types = [_text(row, "type") for row in rows.value]
-        common = _text(root, "convention")
-        yield Summary(
-            name=_text(root, "name"),
-            joints="".join("P" if kind == "prismatic" else "R" for kind in types if kind != "fixed"),
-            conventions=tuple(dict.fromkeys(_text(row, "convention") or common for row in rows.value)),
-            description=" ".join(_text(root, "description").split()),
-            source=" ".join(_text(root, "source").split()),
-        )
+    for group, names in builtin_groups().items():
+        for name in names:
+            yield _summary(_folder() / f"{name}.yaml", group)
+
+
+def _summary(path: Path, group: str) -> Summary:
+    root = compose(path.read_text(encoding="utf-8"), Report(path.name))
+    rows = root.at("joints")
+    assert rows is not None and isinstance(rows.value, list), path  # noqa: PT018
+    types = [_text(row, "type") for row in rows.value]
+    common = _text(root, "convention")
+    return Summary(
+        name=_text(root, "name"),
+        group=group,
+        joints="".join("P" if kind == "prismatic" else "R" for kind in types if kind != "fixed"),
+        conventions=tuple(dict.fromkeys(_text(row, "convention") or common for row in rows.value)),
+        description=" ".join(_text(root, "description").split()),
+        source=" ".join(_text(root, "source").split()),
+    )
 
 
 def _text(node: Node, key: str) -> str:

@@ -65,6 +65,12 @@ def test_json_holds_everything_in_si_units(tmp_path: Path) -> None:
     ]
 
 
+def test_a_robot_that_comes_with_dh2sim_is_printed_with_its_kind(tmp_path: Path) -> None:
+    assert dh2sim("info", "ur5e").out.startswith("ur5e  Universal Robots UR5e, six turning joints (cobot)\n")
+    assert json.loads(dh2sim("info", "ur5e", "--json").out)["group"] == "cobot"
+    assert json.loads(dh2sim("info", write(tmp_path, RICH), "--json").out)["group"] is None
+
+
 def test_the_table_reads_as_in_a_textbook(tmp_path: Path) -> None:
     robot = write(tmp_path, FLIPPED)
     lines = dh2sim("info", robot).out.splitlines()
