@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+WIDTH = 80
+"""Columns of what is printed; a table of many or long columns may need more."""
+
 
 def info(
     robot: RobotArgument,
@@ -115,7 +118,7 @@ def _print(model: RobotModel, *, srdf: bool) -> None:
     _print_wrapped(f"{spec.name}  {description}{f' ({group})' if group else ''}".rstrip())
     if source:
         _print_wrapped(f"Source: {source}")
-    for lines in (_dh_table(model), _frame_table(model)):
+    for lines in (*_dh_tables(model), _frame_table(model)):
         print()
         print("\n".join(lines))
     print()
@@ -131,11 +134,16 @@ def _print(model: RobotModel, *, srdf: bool) -> None:
 
 
 def _print_wrapped(text: str) -> None:
-    print(textwrap.fill(printable(text), 80, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False))
+    print(
+        textwrap.fill(printable(text), WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    )
 
 
-def _dh_table(model: RobotModel) -> list[str]:
-    """Return the table as in a textbook, its lengths in m and beside it in the robot file's unit."""
+def _dh_tables(model: RobotModel) -> list[list[str]]:
+    """Return the table as in a textbook, its lengths in m and beside it in the robot file's unit.
+
+    The limits are in its last column, or where that makes it wider than ``WIDTH`` in a table of their own.
+    """
     from dh2sim.robot.textbook_table import Cell, plain_symbol, textbook_table
 
     spec = model.spec
@@ -162,7 +170,14 @@ def _dh_table(model: RobotModel) -> list[str]:
         parameters = [cell.text(plain_symbol) for cell in doubled(cells, in_file_unit)]
         kind = (row.convention.value,) if table.mixed else ()
         lines.append([str(i), row.name, row.type.value, *kind, *parameters, _limits(joint, spec.units)])
-    return [table.title, *table_lines(lines, left=3 + len(extra), head=2)]
+    left = 3 + len(extra)
+    whole = table_lines(lines, left=left, head=2)
+    if max(map(len, whole)) <= WIDTH:
+        return [[table.title, *whole]]
+    return [
+        [table.title, *table_lines([line[:-1] for line in lines], left=left, head=2)],
+        ["Limits", *table_lines([[*line[:2], line[-1]] for line in lines[1:] if line[-1]], left=2)],
+    ]
 
 
 def _limits(joint: JointModel, units: Units) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dh2sim import build_chain, frame_poses, geometric_jacobian
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.spec import Convention, JointType
 from tests.sample_robots import NAMES, robot
 
 from .samples import limits, random_configurations
@@ -77,8 +77,9 @@ def test_file_says_of_its_masses_that_they_are_estimated(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_moving_joint_has_position_limits(name: str) -> None:
-    assert all(row.limits.position is not None for row in robot(name).moving_rows)
+def test_every_joint_has_position_limits_that_is_not_continuous(name: str) -> None:
+    for row in robot(name).moving_rows:
+        assert (row.limits.position is None) == (row.type is JointType.CONTINUOUS)
 
 
 @pytest.mark.parametrize("name", NAMES)
