@@ -233,9 +233,9 @@ def test_shells_complete_commands_options_robots_and_robot_files(tmp_path: Path)
     (tmp_path / "stock" / "arm.yml").touch()
     assert _completions("dh2sim ex", tmp_path) == ["export"]
     assert _completions("dh2sim fk --ra", tmp_path) == ["--radians"]
-    stanfords = ["stanford", "stanford_shoulder_origin"]
-    assert _completions("dh2sim fk sta", tmp_path) == [*stanfords, "stall.yaml"]
-    assert _completions("dh2sim export rpr st", tmp_path) == [*stanfords, "stall.yaml", "stock/"]
+    robots = ["stanford", "stanford_shoulder_origin", "staubli_tx2_60"]
+    assert _completions("dh2sim fk sta", tmp_path) == [*robots, "stall.yaml"]
+    assert _completions("dh2sim export rpr st", tmp_path) == [*robots, "stall.yaml", "stock/"]
     assert _completions("dh2sim info stock/", tmp_path) == ["stock/arm.yml"]
     assert _completions("dh2sim info missing/", tmp_path) == []
     assert _completions("dh2sim new arm --from sca", tmp_path) == ["scara"]

@@ -97,7 +97,7 @@ def test_the_program_ends_in_good_order_on_a_signal(tmp_path: Path, kind: signal
     first = process.stdout.readline()
     process.send_signal(kind)
     _, stderr = process.communicate(timeout=30)
-    assert first == f"arm_5r: {tmp_path / 'arm_5r'}\n"
+    assert first == f"{builtin_robots()[0]}: {tmp_path / builtin_robots()[0]}\n"
     assert (process.returncode, stderr) == (status, "dh2sim: interrupted\n" if kind is signal.SIGINT else "")
     for folder in tmp_path.iterdir():
         name = load_robot(folder.name).name
