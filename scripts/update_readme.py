@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Update the pages that show what commands print, and the accuracy table of docs/validation.md.
+"""Update the pages that show what commands print, and the tables of docs/validation.md and docs/robots.md.
 
 Every block of README.md and docs/importing.md that begins with ``$ dh2sim …`` is run, all of a page in one folder and
 80 columns wide, without the optional engines that README's first line does not install. The accuracy table
@@ -17,15 +17,16 @@ from tempfile import TemporaryDirectory
 
 from dh2sim import build_model, load_robot
 from dh2sim.cli.new import DEFAULT_JOINTS, TYPES, template
-from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.catalog import builtin_robots, summaries
 from dh2sim.robot.spec import Convention
 from dh2sim.validate.report import Quantity, RobotReport
 from dh2sim.validate.run import validate_robot
 
 ROOT = Path(__file__).resolve().parent.parent
 README, IMPORTING, VALIDATION = ROOT / "README.md", ROOT / "docs" / "importing.md", ROOT / "docs" / "validation.md"
+ROBOTS = ROOT / "docs" / "robots.md"
 CONSOLE = re.compile(r"^```console\n\$ (.*?)\n.*?```$", flags=re.MULTILINE | re.DOTALL)
-TABLE = re.compile(r"(<!-- accuracy: begin -->\n).*(<!-- accuracy: end -->)", flags=re.DOTALL)
+TABLE = re.compile(r"(<!-- (?:accuracy|robots): begin -->\n).*(<!-- (?:accuracy|robots): end -->)", flags=re.DOTALL)
 MARKDOWN = re.compile(r"^```markdown\n(.*?)^```", flags=re.MULTILINE | re.DOTALL)
 ROBOT_FILE = re.compile(r"^```yaml\n(name: my_arm\n.*?)^```", flags=re.MULTILINE | re.DOTALL)
 MISTAKES = (("alpha: 90,", "alfa: 90,"), ("[0.1, 1.2]", "[1.2, 0.1]"))
@@ -91,6 +92,24 @@ def _line(report: RobotReport, engines: list[str]) -> str:
     return f"| {report.name} | {report.reach:.3g} m | {' | '.join(cells)} |"
 
 
+def robots() -> str:
+    """Return the table of the robots that come with dh2sim, as Markdown."""
+    lines = ["| robot | kind | joints | convention | reach | moving mass |", "|---|---|---|---|---:|---:|"]
+    for summary in summaries():
+        model = build_model(load_robot(summary.name))
+        given = all(row.link.mass is not None for row in model.spec.moving_rows)
+        cells = (
+            f"`{summary.name}`",
+            summary.group,
+            summary.joints,
+            ", ".join(summary.conventions),
+            f"{model.reach:.3g} m",
+            f"{model.mass:.3g} kg" if given else "estimated",
+        )
+        lines.append(f"| {' | '.join(cells)} |")
+    return "".join(f"{line}\n" for line in lines)
+
+
 def updated(page: Path) -> str:
     """Return a page that shows what its commands print now."""
     text = page.read_text(encoding="utf-8")
@@ -106,8 +125,10 @@ def main() -> None:
     """Rewrite the pages."""
     for page in (README, IMPORTING):
         page.write_text(updated(page), encoding="utf-8")
-    text = VALIDATION.read_text(encoding="utf-8")
-    VALIDATION.write_text(TABLE.sub(lambda found: found[1] + accuracy() + found[2], text), encoding="utf-8")
+    for page, table in ((VALIDATION, accuracy), (ROBOTS, robots)):
+        made = table()
+        text = TABLE.sub(lambda found, made=made: found[1] + made + found[2], page.read_text(encoding="utf-8"))
+        page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
