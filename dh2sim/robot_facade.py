@@ -537,7 +537,10 @@ class Robot:
         return rollout(self.model, out=out, threads=threads, resume=resume, overwrite=overwrite, **options)
 
     def convert(self, convention: Convention | str) -> Self:
-        """Return the same arm with its table in another convention, 'standard' or 'modified'.
+        """Return the same arm with its table in another convention, 'standard' or 'modified', or 'compact'.
+
+        A compact table has every frame within reach of the arm, with Hayati rows where they are needed; ``notes``
+        says which rows changed, and why.
 
         Raises:
             Dh2simError: The poses of tool0 would differ by more than rounding.

@@ -218,11 +218,11 @@ def test_an_unknown_word_is_named_with_those_that_are_allowed(arm: Robot) -> Non
     with pytest.raises(Dh2simError) as caught:
         arm.convert("modfied")
     assert str(caught.value) == (
-        "unknown convention 'modfied'. Did you mean 'modified'? Allowed: standard, modified, hayati"
+        "unknown form of a table 'modfied'. Did you mean 'modified'? Allowed: standard, modified, compact"
     )
     with pytest.raises(Dh2simError) as caught:
         arm.convert("hayati")
-    assert str(caught.value) == "a table can be converted to standard or modified, not to hayati"
+    assert str(caught.value) == "a table can be converted to standard, modified or compact, not to hayati"
     with pytest.raises(Dh2simError, match="unknown format 'sdf'"):
         arm.export("build", formats=["sdf"])
 

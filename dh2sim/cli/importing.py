@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import shlex
 import sys
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,6 +20,7 @@ from dh2sim.errors import Dh2simError, ImportedFileError, MissingExtraError
 
 if TYPE_CHECKING:
     from dh2sim.importing.result import Imported
+    from dh2sim.robot.spec import RobotSpec
 
 ToleranceOption = Annotated[
     float, typer.Option(metavar="T", help="Largest residual, rad and m; numbers are rounded as far as it allows.")
@@ -26,6 +29,9 @@ OutOption = Annotated[
     Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="File to write. [default: print it]")
 ]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but the robot file and errors.")]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="Print JSON: the robot file as a text, its notes, how far it is off.")
+]
 
 
 def import_robot(
@@ -76,6 +82,7 @@ def import_robot(
     out: OutOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     quiet: QuietOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Make a robot file from a URDF, an MJCF, or a table.
 
@@ -121,7 +128,22 @@ def import_robot(
             replace(problem, message=_with_options(problem.message)) for problem in error.problems
         ) from error
     notes = [_with_options(note) for note in imported.notes]
+    if as_json:
+        hand_over_json(imported.text, out, imported.spec, notes, _residual(imported))
+        return
     hand_over(imported.text, out, summary=summary(imported), notes=notes, quiet=quiet)
+
+
+def _residual(imported: Imported) -> dict[str, object] | None:
+    residual = imported.residual
+    if residual is None:
+        return None
+    return {
+        "position": residual.position,
+        "rotation": residual.rotation,
+        "worst": residual.worst,
+        "configurations": residual.configurations,
+    }
 
 
 def _read_axes_file(file: str) -> bytes:
@@ -194,6 +216,7 @@ def frames(
     out: OutOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
     quiet: QuietOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Assign DH frames to joint axes, step by step as in a textbook.
 
@@ -234,13 +257,16 @@ def frames(
     require_free(drawing, force=force)
     folder = Path.cwd() if out is None else out.resolve().parent
     imported = import_axes(spec, convention=chosen, tolerance=allowed, explain=explain, folder=folder)
-    hand_over(imported.text, out, summary=summary(imported), notes=imported.notes, quiet=quiet)
+    if as_json:
+        hand_over_json(imported.text, out, imported.spec, imported.notes, _residual(imported))
+    else:
+        hand_over(imported.text, out, summary=summary(imported), notes=imported.notes, quiet=quiet)
     if drawing is not None:
         from dh2sim.draw.frame_figure.figure import draw_assignment
 
         draw_assignment(imported, drawing)
         if not quiet:
-            print(f"{drawing}: axes and frames", file=sys.stderr if out is None else sys.stdout)
+            print(f"{drawing}: axes and frames", file=sys.stderr if out is None or as_json else sys.stdout)
 
 
 def _require_frame_figure(path: Path) -> None:
@@ -251,27 +277,57 @@ def _require_frame_figure(path: Path) -> None:
 
 def convert(
     robot: RobotArgument,
-    to: Annotated[str, typer.Option(metavar="standard|modified", help="Convention to convert to.")],
+    to: Annotated[str, typer.Option(metavar="standard|modified|compact", help="Form of the table to convert to.")],
     out: OutOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     quiet: QuietOption = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Write a robot's table in the other convention.
+    """Write a robot's table in the other convention, or with every frame within reach of the arm.
 
-    a and alpha move by one row; what is left over at the ends goes to base and tool. The arm stays the same, which
-    is checked at 1000 configurations. Its DH frames 1 to n change; masses and meshes are moved with them.
+    standard, modified: a and alpha move by one row; what is left over at the ends goes to base and tool.
+    compact: rows that lead far out and back, as those of a calibrated robot do (d = 574 m), are cut anew, as
+    Hayati's rows where axes are nearly parallel; the other rows keep their numbers.
+
+    The arm stays the same, which is checked at random configurations. Its DH frames change; masses and meshes are
+    moved with them.
 
     \b
     Examples:
       dh2sim convert stanford --to modified
       dh2sim convert my_arm.yaml --to standard -o my_arm_standard.yaml
+      dh2sim convert calibrated_ur5.yaml --to compact -o ur5_compact.yaml
     """
-    from dh2sim.importing.convert import convert_robot
-    from dh2sim.robot.spec import CONVENTIONS, Convention
+    from dh2sim.importing.convert import TableForm, convert_robot
+    from dh2sim.robot.spec import CONVENTIONS
 
-    target = choice(to, Convention, "--to", without=(Convention.HAYATI,), other_names=CONVENTIONS)
+    target = choice(to, TableForm, "--to", other_names=CONVENTIONS)
     require_free(out, force=force)
     [spec] = load_all([robot])
     folder = Path.cwd() if out is None else out.resolve().parent
-    converted = convert_robot(spec, target or Convention.STANDARD, folder=folder)
+    converted = convert_robot(spec, target or TableForm.STANDARD, folder=folder)
+    if as_json:
+        errors = {"position": converted.position_error, "rotation": converted.rotation_error}
+        hand_over_json(
+            converted.text,
+            out,
+            converted.spec,
+            converted.notes,
+            {**errors, "configurations": converted.configurations},
+        )
+        return
     hand_over(converted.text, out, summary=converted.summary, notes=converted.notes, quiet=quiet)
+
+
+def hand_over_json(
+    text: str, out: Path | None, spec: RobotSpec, notes: Iterable[str], residual: dict[str, object] | None
+) -> None:
+    """Print what was made as JSON; the robot file is in it, or written to ``out``."""
+    if out is not None:
+        hand_over(text, out, summary="", quiet=True)
+    made: dict[str, object] = {"robot": spec.name, "rows": len(spec.rows)}
+    made["conventions"] = list(dict.fromkeys(row.convention.value for row in spec.rows))
+    made["residual"] = residual
+    made["notes"] = list(notes)
+    made |= {"text": text} if out is None else {"file": str(out)}
+    print(json.dumps(made, indent=2, ensure_ascii=False))

@@ -7,6 +7,10 @@ be wrong in the same way. This module has its own sines, its own matrices and it
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from decimal import Context, Decimal, localcontext
+from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +18,8 @@ from numpy.typing import ArrayLike
 from dh2sim.errors import ConfigurationError
 from dh2sim.robot.spec import Convention, Pose, RobotSpec, Row
 from dh2sim.typing import Array
+
+_Number = TypeVar("_Number", Array, Decimal)
 
 _BLOCK = 2048
 """Configurations handled at a time, so that a block's matrices stay in the processor's cache."""
@@ -79,29 +85,44 @@ def row_matrix(row: Row, q: Array) -> Array:
     coordinate = -q if row.flip else q
     theta = row.theta + coordinate if row.type.turns else np.full(q.shape, row.theta)
     d = row.d + coordinate if row.type.moves and not row.type.turns else np.full(q.shape, row.d)
-    ct, st, ca, sa = np.cos(theta), np.sin(theta), math.cos(row.alpha), math.sin(row.alpha)
-    cb, sb = math.cos(row.beta), math.sin(row.beta)
+    ct, st = np.cos(theta), np.sin(theta)
+    ca, sa, cb, sb = (np.asarray(f(angle)) for angle in (row.alpha, row.beta) for f in (math.cos, math.sin))
     zero, one, a = np.zeros(q.shape), np.ones(q.shape), np.full(q.shape, row.a)
-    match row.convention:
+    matrix = _entries(row.convention, (ct, st), (ca, sa), (cb, sb), a, d, zero, one)
+    return np.array([*matrix, [zero, zero, zero, one]])
+
+
+def _entries(
+    convention: Convention,
+    theta: tuple[_Number, _Number],
+    alpha: tuple[_Number, _Number],
+    beta: tuple[_Number, _Number],
+    a: _Number,
+    d: _Number,
+    zero: _Number,
+    one: _Number,
+) -> list[list[_Number]]:
+    """The upper three rows of A_i, as the textbooks print them; angles as cosine and sine."""
+    (ct, st), (ca, sa), (cb, sb) = theta, alpha, beta
+    match convention:
         case Convention.STANDARD:  # Rz(theta) Tz(d) Tx(a) Rx(alpha)
-            matrix = [
+            return [
                 [ct, -st * ca, st * sa, a * ct],
                 [st, ct * ca, -ct * sa, a * st],
                 [zero, one * sa, one * ca, d],
             ]
         case Convention.MODIFIED:  # Tx(a) Rx(alpha) Rz(theta) Tz(d)
-            matrix = [
+            return [
                 [ct, -st, zero, a],
                 [st * ca, ct * ca, -one * sa, -sa * d],
                 [st * sa, ct * sa, one * ca, ca * d],
             ]
         case Convention.HAYATI:  # Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)
-            matrix = [
+            return [
                 [ct * cb - st * sa * sb, -st * ca, ct * sb + st * sa * cb, a * ct],
                 [st * cb + ct * sa * sb, ct * ca, st * sb - ct * sa * cb, a * st],
                 [-one * ca * sb, one * sa, one * ca * cb, d],
             ]
-    return np.array([*matrix, [zero, zero, zero, one]])
 
 
 def _block_poses(spec: RobotSpec, columns: Array, poses: Array) -> None:
@@ -134,3 +155,87 @@ def _pose_matrix(pose: Pose) -> Array:
     matrix[:3, :3] = Rz @ Ry @ Rx
     matrix[:3, 3] = pose.xyz
     return matrix
+
+
+_DIGITS = Context(prec=60)
+_HALF_PI = Decimal("1.5707963267948966192313216916397514420985846996875529104874722961539")
+_ROUNDING = Decimal("4e-16")
+"""What a double leaves of a quarter turn, in quarter turns of 1 and more."""
+
+
+def table_tool_errors(spec: RobotSpec, reference: RobotSpec, q: ArrayLike) -> tuple[float, float]:
+    """Return how far tool0 of one table is from tool0 of another at most, to 60 digits.
+
+    For tables whose rows lead so far out and back that doubles would measure themselves. Angles within the rounding
+    of a double of a right one are taken for that.
+
+    Args:
+        spec: The robot.
+        reference: The robot to compare it with.
+        q: Joint vectors, rad and m, shape (N, n).
+
+    Returns:
+        Distance, m, and Frobenius norm of the difference of the rotations over sqrt(2), which for small angles is
+        the angle between them, rad.
+    """
+    position, rotation = Decimal(0), Decimal(0)
+    with localcontext(_DIGITS):
+        for vector in np.asarray(q, dtype=np.float64).tolist():
+            T, T_reference = _decimal_tool_pose(spec, vector), _decimal_tool_pose(reference, vector)
+            gaps = [[(T[i][k] - T_reference[i][k]) ** 2 for k in range(4)] for i in range(3)]
+            position = max(position, sum((row[3] for row in gaps), Decimal(0)))
+            rotation = max(rotation, sum((sum(row[:3], Decimal(0)) for row in gaps), Decimal(0)))
+        return float(position.sqrt()), float((rotation / 2).sqrt())
+
+
+def _decimal_tool_pose(spec: RobotSpec, q: Sequence[float]) -> list[list[Decimal]]:
+    zero, one = Decimal(0), Decimal(1)
+    product = _decimal_pose(spec.base.pose)
+    coordinates = iter(q)
+    for row in spec.rows:
+        theta, d = Decimal(row.theta), Decimal(row.d)
+        cosine_sine = _decimal_cos_sin(theta)
+        if row.type.moves:
+            coordinate = Decimal(next(coordinates)) * (-1 if row.flip else 1)
+            if row.type.turns:
+                (c, s), (cq, sq) = cosine_sine, _decimal_cos_sin(coordinate)
+                cosine_sine = c * cq - s * sq, s * cq + c * sq
+            else:
+                d += coordinate
+        twists = _decimal_cos_sin(Decimal(row.alpha)), _decimal_cos_sin(Decimal(row.beta))
+        matrix = _entries(row.convention, cosine_sine, *twists, Decimal(row.a), d, zero, one)
+        product = _decimal_product(product, matrix)
+    return _decimal_product(product, _decimal_pose(spec.tool))
+
+
+def _decimal_pose(pose: Pose) -> list[list[Decimal]]:
+    (cr, sr), (cp, sp), (cy, sy) = (_decimal_cos_sin(Decimal(angle)) for angle in pose.rpy.tolist())
+    x, y, z = (Decimal(value) for value in pose.xyz.tolist())
+    zero, one = Decimal(0), Decimal(1)
+    Rx = [[one, zero, zero, zero], [zero, cr, -sr, zero], [zero, sr, cr, zero]]
+    Ry = [[cp, zero, sp, zero], [zero, one, zero, zero], [-sp, zero, cp, zero]]
+    Rz = [[cy, -sy, zero, x], [sy, cy, zero, y], [zero, zero, one, z]]
+    return _decimal_product(_decimal_product(Rz, Ry), Rx)
+
+
+def _decimal_product(A: list[list[Decimal]], B: list[list[Decimal]]) -> list[list[Decimal]]:
+    return [
+        [row[0] * B[0][k] + row[1] * B[1][k] + row[2] * B[2][k] + (row[3] if k == 3 else 0) for k in range(4)]
+        for row in A
+    ]
+
+
+@lru_cache(maxsize=256)
+def _decimal_cos_sin(angle: Decimal) -> tuple[Decimal, Decimal]:
+    """By the Taylor series of what is left of an angle, rad, beyond quarter turns."""
+    quarters = int((angle / _HALF_PI).to_integral_value())
+    rest = angle - quarters * _HALF_PI
+    if abs(rest) <= _ROUNDING * max(1, abs(quarters)):
+        rest = Decimal(0)
+    sums, term, k = [Decimal(0), Decimal(0)], Decimal(1), 0
+    while term and abs(term) > Decimal("1e-70"):
+        sums[k % 2] += term if k % 4 < 2 else -term
+        k += 1
+        term = term * rest / k
+    cosine, sine = sums
+    return ((cosine, sine), (-sine, cosine), (-cosine, -sine), (sine, -cosine))[quarters % 4]

@@ -31,14 +31,29 @@ def sin_cos(angle: float) -> tuple[float, float]:
     Raises:
         ValueError: ``angle`` is NaN or infinite.
     """
+    sine, cosine, bits = scaled_sin_cos(angle)
+    return sine / (1 << bits), cosine / (1 << bits)
+
+
+def scaled_sin_cos(angle: float) -> tuple[int, int, int]:
+    """Return the sine and the cosine of ``angle`` before they are rounded to doubles; angles are taken as there.
+
+    Args:
+        angle: rad, finite.
+
+    Returns:
+        Sine and cosine in units of 2**-bits, good to more than 70 digits, and bits.
+
+    Raises:
+        ValueError: ``angle`` is NaN or infinite.
+    """
     if not math.isfinite(angle):
         raise ValueError(f"the angle must be finite, got {angle!r}")
     bits = _GUARD_BITS + abs(math.frexp(angle)[1])
     quadrant, rest = _reduce(angle, bits)
     if abs(quadrant) <= _SNAP_TURNS and abs(rest / (1 << bits)) <= _SNAP_WIDTH * max(1, abs(quadrant)):
         rest = 0
-    sine, cosine = _turn(quadrant, *_taylor(rest, bits))
-    return sine / (1 << bits), cosine / (1 << bits)
+    return *_turn(quadrant, *_taylor(rest, bits)), bits
 
 
 def atan2(y: float, x: float) -> float:

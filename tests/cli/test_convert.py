@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from dh2sim.robot.read import load_robot, parse_robot
+from dh2sim.robot.write import robot_file_text
+from tests.kinematics.test_compaction import calibrated_ur5
 from tests.program import dh2sim
 
 
@@ -33,7 +36,7 @@ def test_the_other_table_is_written_and_converts_back(tmp_path: Path) -> None:
 def test_a_wrong_convention_is_reported() -> None:
     run = dh2sim("convert", "scara", "--to", "hayati")
     assert (run.status, run.out) == (2, "")
-    assert "'hayati' is not one of standard, modified" in run.err
+    assert "'hayati' is not one of standard, modified, compact" in run.err
 
 
 def test_the_convention_wanted_must_be_named() -> None:
@@ -56,3 +59,27 @@ def test_a_mesh_is_found_from_where_the_new_file_stands(tmp_path: Path) -> None:
     assert mesh_spec is not None
     assert mesh_spec.file.resolve() == (tmp_path / "old" / "m.stl").resolve()
     assert mesh_spec.pose.xyz.tolist() == [0.4, 0.0, 0.0]
+
+
+def test_a_calibrated_table_becomes_compact_and_says_why(tmp_path: Path) -> None:
+    (tmp_path / "ur5.yaml").write_text(robot_file_text(calibrated_ur5()))
+    out = tmp_path / "compact.yaml"
+    run = dh2sim("convert", tmp_path / "ur5.yaml", "--to", "compact", "-o", out)
+    assert run.status == 0
+    assert [row.convention.value for row in load_robot(out).rows].count("hayati") == 2
+    assert "joint_2 is a Hayati row now: frame 2 was 574.1 m away from the arm" in run.err.replace("\n ", "")
+    assert run.out.startswith(f"{out}: ur5, 6 rows, standard and hayati; tool0 off by at most ")
+
+
+def test_json_holds_the_robot_file_or_where_it_is(tmp_path: Path) -> None:
+    run = dh2sim("convert", "stanford", "--to", "modified", "--json")
+    made = json.loads(run.out)
+    assert run.err == ""
+    assert parse_robot(made["text"]).name == made["robot"] == "stanford"
+    assert made["conventions"] == ["modified"]
+    assert made["notes"] == ["Parameters are replaced by their values."]
+    assert made["residual"]["configurations"] == 1000
+    out = tmp_path / "stanford.yaml"
+    written = json.loads(dh2sim("convert", "stanford", "--to", "modified", "--json", "-o", out).out)
+    assert written == {**{key: value for key, value in made.items() if key != "text"}, "file": str(out)}
+    assert out.read_text(encoding="utf-8") == made["text"]

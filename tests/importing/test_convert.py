@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from dh2sim.errors import MismatchError
+from dh2sim.errors import Dh2simError, MismatchError
 from dh2sim.importing import convert as converted
 from dh2sim.importing.convert import convert_robot
+from dh2sim.kinematics.compaction import compact_rows
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.catalog import builtin_robots
-from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import Convention, RobotSpec
+from dh2sim.robot.read import load_robot, parse_robot
+from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
 from dh2sim.robot.write import robot_file_text
+from tests.kinematics.test_compaction import calibrated_ur5
 from tests.strategies import robot_specs
 
 OTHER = {Convention.STANDARD: Convention.MODIFIED, Convention.MODIFIED: Convention.STANDARD}
@@ -60,3 +62,47 @@ def test_a_conversion_that_moves_the_tool_is_an_error(monkeypatch: pytest.Monkey
     with pytest.raises(MismatchError) as caught:
         convert_robot(load_robot("stanford"), Convention.MODIFIED)
     assert str(caught.value).startswith("stanford: tool0 of the converted table is off by 1.0e-01 m and ")
+
+
+def test_a_compact_table_is_checked_in_exact_arithmetic() -> None:
+    spec = calibrated_ur5()
+    made = convert_robot(spec, "compact")
+    assert made.configurations == 100
+    assert made.position_error < 1e-15
+    assert made.rotation_error < 1e-15
+    assert [row.convention.value for row in made.spec.rows].count("hayati") == 2
+    assert made.notes == compact_rows(spec).notes
+    # in doubles the far rows of the original cost three digits
+    q = np.random.default_rng(0).uniform(-3, 3, (100, 6))
+    assert np.abs(table_tool_pose(made.spec, q) - table_tool_pose(spec, q)).max() < 1e-11
+
+
+def test_a_compact_table_that_moves_the_tool_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+
+    def wrong(spec: RobotSpec, **options: Any) -> str:
+        return robot_file_text(spec, **options).replace("a: -0.42522725704007", "a: -0.42522725704")
+
+    monkeypatch.setattr(converted, "robot_file_text", wrong)
+    monkeypatch.setattr(converted, "TOLERANCE", 1e-14)
+    with pytest.raises(MismatchError, match=r"tool0 of the converted table is off by \d\.\de-14 m"):
+        convert_robot(calibrated_ur5(), "compact")
+
+
+def test_a_table_that_is_compact_already_is_written_as_it_is() -> None:
+    spec = load_robot("scara")
+    made = convert_robot(spec, "compact")
+    assert [(r.a, r.alpha, r.d, r.theta) for r in made.spec.rows] == [(r.a, r.alpha, r.d, r.theta) for r in spec.rows]
+    assert made.notes[0] == "Every frame is within reach of the arm already: no row was changed."
+    assert made.position_error == 0.0
+
+
+def test_the_units_of_the_file_are_kept() -> None:
+    text = robot_file_text(calibrated_ur5(), angle=AngleUnit.RAD, length=LengthUnit.MM)
+    made = convert_robot(parse_robot(text), "compact")
+    assert "units: {angle: rad, length: mm}" in made.text.splitlines()
+    assert made.position_error < 1e-15
+
+
+def test_hayati_is_no_form_of_a_whole_table() -> None:
+    with pytest.raises(Dh2simError, match="can be converted to standard, modified or compact, not to hayati"):
+        convert_robot(load_robot("scara"), Convention.HAYATI)

@@ -1,18 +1,22 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
 
 from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics import table_oracle as table
-from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses, table_tool_pose
-from dh2sim.robot.spec import Convention, Pose, RobotSpec
-from dh2sim.typing import read_only
-from tests.sample_robots import HAYATI, MODIFIED, ODD, ODD_ROBOT, STANDARD, STANFORD, row
+from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses, table_tool_errors, table_tool_pose
+from dh2sim.kinematics.transforms import pose_errors
+from dh2sim.robot.spec import Convention, Pose, RobotSpec, Row
+from dh2sim.typing import Array, read_only
+from tests.sample_robots import HAYATI, MODIFIED, ODD, ODD_ROBOT, REVOLUTE, STANDARD, STANFORD, row
+from tests.strategies import robots_with_joint_vectors
 
 BETA = math.radians(123.4)
 # cos and sin of 37.3 degrees, of 20 degrees and of 123.4 degrees, from tables
@@ -143,3 +147,24 @@ def test_the_oracle_imports_nothing_of_what_it_judges() -> None:
     imported |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     ours = {name for name in imported if name.startswith("dh2sim")}
     assert ours == {"dh2sim.errors", "dh2sim.robot.spec", "dh2sim.typing"}
+
+
+@given(robot=robots_with_joint_vectors(max_rows=6))
+def test_errors_in_exact_arithmetic_are_those_of_doubles(robot: tuple[RobotSpec, Array]) -> None:
+    spec, q = robot
+    longer = dataclasses.replace(spec, tool=Pose(xyz=spec.tool.xyz + np.array([0.0, 0.03, 0.04]), rpy=spec.tool.rpy))
+    position, rotation = table_tool_errors(longer, spec, q)
+    assert position == pytest.approx(0.05, rel=1e-12)
+    assert rotation == 0.0
+    turned = dataclasses.replace(spec, base=dataclasses.replace(spec.base, pose=Pose(rpy=read_only([0.0, 0.0, 0.3]))))
+    expected = pose_errors(table_tool_pose(turned, q), table_tool_pose(spec, q))
+    found = table_tool_errors(turned, spec, q)
+    assert found[0] == pytest.approx(expected[0].max(), abs=1e-12)
+    assert found[1] == pytest.approx(2.0 * np.sin(0.5 * expected[1].max()), abs=1e-12)
+
+
+def test_errors_in_exact_arithmetic_do_not_drown_in_far_rows() -> None:
+    rows = (Row(type=REVOLUTE, d=1e9, a=0.4), Row(type=REVOLUTE, d=-1e9, alpha=0.3), Row(type=REVOLUTE, a=0.2))
+    far = RobotSpec(name="far", rows=rows)
+    moved = dataclasses.replace(far, rows=(dataclasses.replace(far.rows[0], a=0.4 + 1e-15), *far.rows[1:]))
+    assert table_tool_errors(moved, far, [[0.1, 0.2, 0.3]])[0] == pytest.approx(1e-15, rel=0.2)
