@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parent.parent
 README, IMPORTING, VALIDATION = ROOT / "README.md", ROOT / "docs" / "importing.md", ROOT / "docs" / "validation.md"
 ROBOTS = ROOT / "docs" / "robots.md"
 CONSOLE = re.compile(r"^```console\n\$ (.*?)\n.*?```$", flags=re.MULTILINE | re.DOTALL)
-TABLE = re.compile(r"(<!-- (?:accuracy|robots): begin -->\n).*(<!-- (?:accuracy|robots): end -->)", flags=re.DOTALL)
+TABLE = re.compile(r"(?<=: begin -->\n)\|.*(?=<!-- )", flags=re.DOTALL)
 MARKDOWN = re.compile(r"^```markdown\n(.*?)^```", flags=re.MULTILINE | re.DOTALL)
 ROBOT_FILE = re.compile(r"^```yaml\n(name: my_arm\n.*?)^```", flags=re.MULTILINE | re.DOTALL)
 MISTAKES = (("alpha: 90,", "alfa: 90,"), ("[0.1, 1.2]", "[1.2, 0.1]"))
@@ -126,9 +126,8 @@ def main() -> None:
     for page in (README, IMPORTING):
         page.write_text(updated(page), encoding="utf-8")
     for page, table in ((VALIDATION, accuracy), (ROBOTS, robots)):
-        made = table()
-        text = TABLE.sub(lambda found, made=made: found[1] + made + found[2], page.read_text(encoding="utf-8"))
-        page.write_text(text, encoding="utf-8")
+        before, after = TABLE.split(page.read_text(encoding="utf-8"))
+        page.write_text(before + table() + after, encoding="utf-8")
 
 
 if __name__ == "__main__":
