@@ -9,9 +9,9 @@ from dataclasses import replace
 from typing import Final
 
 from dh2sim.formats.table.cells import CellError, Constant, canonical, read_cell
+from dh2sim.formats.table.dh_table import Table
 from dh2sim.formats.table.grid import Cell, Grid
 from dh2sim.formats.table.headers import UNIT, read_heading
-from dh2sim.formats.table.locate import Table
 from dh2sim.formats.table.notation import LONGEST_CELL, plain
 from dh2sim.robot.expressions import FUNCTIONS
 from dh2sim.robot.spec import AngleUnit, LengthUnit, Units

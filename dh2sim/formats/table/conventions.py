@@ -49,7 +49,7 @@ class Evidence:
 
 def decide_convention(
     option: Convention | None,
-    printed: Convention | None,
+    printed: Evidence | None,
     columns: Columns,
     lines: Sequence[str],
     table: range,
@@ -59,7 +59,7 @@ def decide_convention(
 
     Args:
         option: The user's choice.
-        printed: From the first line of a toolbox's printout.
+        printed: From the first line of a toolbox's printout, or from a script.
         columns: The columns; headings of index i - 1 mean modified, headings of index i throughout standard.
         lines: The file.
         table: Numbers of the table's lines, counted from 1.
@@ -67,7 +67,7 @@ def decide_convention(
     """
     wrong_before = len(findings.problems)
     first = columns.headings[0].cell
-    said = [] if printed is None else [Evidence(printed, "the printout's first line")]
+    said = [] if printed is None else [printed]
     asked = option if option in (Convention.STANDARD, Convention.MODIFIED) else None
     said += _by_headings(columns, asked, findings)
     said += [] if printed is not None else _by_words(lines, table)

@@ -167,6 +167,40 @@ def _about(axis: str, angle: float) -> list[list[float]]:
             return [[c, -s, 0], [s, c, 0], [0, 0, 1]]
 
 
+def pose_of(T: Sequence[Sequence[float]], units: Units) -> Pose:
+    """Return the pose that a 4 x 4 transform is, its lengths in the table's unit."""
+    return Pose(
+        xyz=read_only([units.metres(row[3]) for row in T[:3]]),
+        rpy=rpy_from_rotation(read_only([row[:3] for row in T[:3]])),
+    )
+
+
+def given_configurations(
+    vectors: Mapping[str, Sequence[float]], rows: Sequence[Row], units: Units, findings: Findings
+) -> dict[str, Array]:
+    """Return the named joint vectors of a script, rad and m; what cannot be one is noted."""
+    moving = [row for row in rows if row.type.moves]
+    configurations: dict[str, Array] = {}
+    for name, vector in vectors.items():
+        if len(vector) != len(moving):
+            findings.note(
+                f"the configuration {shown(name)} was left out: {len(vector)} numbers for {len(moving)} joints"
+            )
+            continue
+        q = [value if row.type.turns else units.metres(value) for value, row in zip(vector, moving, strict=True)]
+        outside = next(
+            (row.name for value, row in zip(q, moving, strict=True)
+             if row.limits.position and not row.limits.position[0] <= value <= row.limits.position[1]), None
+        )  # fmt: skip
+        if outside is not None:
+            findings.note(f"the configuration {shown(name)} was left out: it is outside the limits of {outside}")
+        elif problem := name_problem(name, "the name of a configuration"):
+            findings.note(f"the configuration {shown(name)} was left out: {problem}")
+        else:
+            configurations[name] = read_only(q)
+    return configurations
+
+
 def _from_matrices(lines: Sequence[str], units: Units, findings: Findings) -> dict[str, Pose]:
     """Return base and tool of an older MATLAB toolbox, which prints two 4 x 4 matrices side by side."""
     rows = [[float(number) for number in re.findall(_NUMBER, line.rpartition("grav")[2])][-8:] for line in lines]
@@ -177,6 +211,5 @@ def _from_matrices(lines: Sequence[str], units: Units, findings: Findings) -> di
     for name, start in (("base", 0), ("tool", 4)):
         matrix = [row[start : start + 4] for row in rows]
         if tuple(value for row in matrix for value in row) != _IDENTITY:
-            xyz = [units.metres(row[3]) for row in matrix[:3]]
-            poses[name] = Pose(xyz=read_only(xyz), rpy=rpy_from_rotation(read_only([row[:3] for row in matrix[:3]])))
+            poses[name] = pose_of(matrix, units)
     return poses

@@ -12,6 +12,7 @@ from typing import Final
 from dh2sim.errors import Dh2simError, ImportedFileError, RobotFileError
 from dh2sim.formats.table import conventions, units
 from dh2sim.formats.table.constants import find_constants
+from dh2sim.formats.table.dh_table import Located, Table
 from dh2sim.formats.table.grid import MAX_COLUMNS, MAX_ROWS, Cell, Findings, is_comment
 from dh2sim.formats.table.headers import (
     PARAMETERS,
@@ -19,9 +20,16 @@ from dh2sim.formats.table.headers import (
     Quantity,
     find_columns,
 )
-from dh2sim.formats.table.locate import Located, Table, locate
+from dh2sim.formats.table.locate import locate
 from dh2sim.formats.table.notation import plain
-from dh2sim.formats.table.printout import find_configurations, find_poses, find_printout, is_first_line
+from dh2sim.formats.table.printout import (
+    find_configurations,
+    find_poses,
+    find_printout,
+    given_configurations,
+    is_first_line,
+    pose_of,
+)
 from dh2sim.formats.table.rows import Body, ResolvedUnits, is_hayati, read_body, to_row
 from dh2sim.messages import member, shown
 from dh2sim.robot.fields import name_problem
@@ -78,7 +86,7 @@ def _numbers(table: Table, columns: Columns) -> Iterator[Cell]:
 _MAX_LISTED: Final = 20
 _NO_TABLE: Final = (
     "no table of Denavit-Hartenberg parameters found: none has headings such as theta, d, a and alpha. "
-    "Allowed: a Markdown table, CSV, TSV, or a printout of the Robotics Toolbox for Python or MATLAB"
+    "Allowed: a Markdown table, CSV, TSV, or a printout or a script of the Robotics Toolbox for Python or MATLAB"
 )
 
 
@@ -107,7 +115,8 @@ def read_table(
 
     The table is, unless ``table`` says otherwise, the first one in the text that has at least three of the headings
     theta, d, a, alpha and beta: a Markdown table, values separated by commas, semicolons, tabs or spaces, or what
-    Corke's Robotics Toolbox for Python or MATLAB prints for a robot.
+    Corke's Robotics Toolbox for Python or MATLAB prints for a robot. A script that makes a robot with that toolbox
+    is a table too; it is read as text.
 
     Args:
         data: The file's content, UTF-8.
@@ -132,7 +141,8 @@ def read_table(
         raise ImportedFileError(error.problems) from None
     located = locate(lines, file)
     if not located.tables:
-        findings.wrong_at(1, 1, "", _NO_TABLE)
+        for line, column, message in located.problems or [(1, 1, _NO_TABLE)]:
+            findings.wrong_at(line, column, "", message)
         raise findings.error()
     reader = _Reader(lines, located, _chosen(located.tables, table, findings), findings)
     return reader.read(
@@ -183,7 +193,10 @@ class _Reader:
         self._located = located
         self._table = table
         self._findings = findings
-        self._printout = find_printout(lines, table.lines)
+        self._given = table.given
+        self._printout = find_printout(lines, table.lines) if table.given is None else None
+        for line, column, message in table.given.problems if table.given else ():
+            findings.wrong_at(line, column, "", message)
         self._columns = find_columns(table.header[:MAX_COLUMNS], table.rows[:MAX_ROWS], findings)
         check_shape(table, findings)
         findings.check()
@@ -233,7 +246,11 @@ class _Reader:
         hayati = [option is Convention.HAYATI or is_hayati(row.numbers, self._columns) for row in body.rows]
         if all(hayati):
             return Convention.HAYATI, [Convention.HAYATI] * len(hayati)
-        printed = self._printout.convention if self._printout else None
+        printed = None
+        if self._printout is not None:
+            printed = conventions.Evidence(self._printout.convention, "the printout's first line")
+        elif self._given is not None and self._given.convention is not None:
+            printed = conventions.Evidence(self._given.convention, self._given.by)
         lines = self._table.lines
         chosen = conventions.decide_convention(option, printed, self._columns, self._lines, lines, self._findings)
         chosen = chosen or Convention.STANDARD
@@ -257,15 +274,23 @@ class _Reader:
             )
 
     def _spec(self, name: str, rows: tuple[Row, ...], convention: Convention, length: LengthUnit) -> RobotSpec:
-        table, printout, findings = self._table, self._printout, self._findings
-        around = self._around()
-        poses = find_poses(self._lines, table.lines, around, length, findings)
-        following = [grid for grid in self._located.pipes if grid.lines.start in around and grid is not table.grid]
-        configurations = dict(find_configurations(following, rows, findings))
+        table, printout, given, findings = self._table, self._printout, self._given, self._findings
+        if given is None:
+            around = self._around()
+            poses = find_poses(self._lines, table.lines, around, length, findings)
+            following = [
+                grid for grid in self._located.pipes if grid.lines.start in around and grid is not table.grid
+            ]
+            configurations = dict(find_configurations(following, rows, findings))
+        else:
+            units = Units(length=length)
+            matrices = (("base", given.base), ("tool", given.tool))
+            poses = {key: pose_of(matrix, units) for key, matrix in matrices if matrix is not None}
+            configurations = given_configurations(given.configurations, rows, units, findings)
         return RobotSpec(
             name=name,
             rows=rows,
-            description=printout.name if printout else "",
+            description=printout.name if printout else given.description if given else "",
             source=f"{PurePath(findings.file).name}, line {table.header[0].line}",
             convention=convention,
             base=BaseSpec(pose=poses.get("base", Pose())),
@@ -291,7 +316,7 @@ class _Reader:
         behind = range(table.lines.stop, self._around().stop)
         texts = [self._lines[number - 1] for number in behind]
         if (
-            table.grid.separator != "|"
+            table.grid.separator not in ("|", "")
             and self._printout is None
             and any(t.strip() and not is_comment(t) for t in texts)
         ):

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from dh2sim.formats.table.cells import CellError, Constant, Unit, read_cell
+from dh2sim.formats.table.dh_table import Table
 from dh2sim.formats.table.grid import Cell, Cells, Findings
 from dh2sim.formats.table.headers import Columns, Quantity, is_no_variable, variable_in
-from dh2sim.formats.table.locate import Table
 from dh2sim.formats.table.motion import COORDINATES, LimitReader, TableRow, decide_motion
 from dh2sim.formats.table.notation import plain
 from dh2sim.formats.table.units import ANGLES, LENGTHS, Kind, Number, to_si
