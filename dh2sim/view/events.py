@@ -164,6 +164,27 @@ class SelectRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PlayRow:
+    """Run or pause the animation of the selected row."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeekRow:
+    """Show the selected row as far as some of its elementary steps are done, and pause there."""
+
+    steps: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdvanceRow:
+    """Let the animation of the selected row go on."""
+
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Show:
     """Show or hide a part of the scene."""
 
@@ -257,6 +278,9 @@ Event: TypeAlias = (
     | OpenText
     | Undo
     | SelectRow
+    | PlayRow
+    | SeekRow
+    | AdvanceRow
     | Show
     | SetOpacity
     | ShowAngles

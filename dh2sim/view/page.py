@@ -11,6 +11,7 @@ from dh2sim.errors import Dh2simError
 from dh2sim.view.events import Event, Notify
 from dh2sim.view.motion.dragging import LinkGrabs, ToolHandle
 from dh2sim.view.motion.motion_source import MotionControl
+from dh2sim.view.motion.row_animation import RowAnimation
 from dh2sim.view.panel.panel import Panel
 from dh2sim.view.reduce import reduce
 from dh2sim.view.robot_files import RobotFiles
@@ -53,6 +54,7 @@ class Page:
         self._files = RobotFiles(lambda: self.state, self.apply, self._download, self._on_open)
         self._queue: queue.SimpleQueue[tuple[Task, Callable[[], None] | None] | None] = queue.SimpleQueue()
         self._closed = threading.Event()
+        self._row_animation = RowAnimation(lambda: self.state, self.apply)
         self._painter = Painter(client.scene)
         self._handle = ToolHandle(client.scene, self.send, lambda: self.state, self.apply)
         self._camera = CameraWatch(client.camera, lambda: self.state.model, self.send)
@@ -103,18 +105,27 @@ class Page:
     def _take(self) -> bool:
         """Work through the queue, or advance the motion; return False once the page is closed."""
         try:
-            task = self._queue.get(timeout=self.motion.tick_interval)
+            task = self._queue.get(timeout=self._tick_interval)
         except queue.Empty:
-            self.motion.tick()
+            self._tick()
             return True
         while task is not None and not self._closed.is_set():
             self._do(*task)
             try:
                 task = self._queue.get_nowait()
             except queue.Empty:
-                self.motion.tick()
+                self._tick()
                 return True
         return False
+
+    @property
+    def _tick_interval(self) -> float | None:
+        """Time until the next frame, s; None while nothing moves by itself."""
+        return self.motion.tick_interval or self._row_animation.tick_interval
+
+    def _tick(self) -> None:
+        self.motion.tick()
+        self._row_animation.tick()
 
     def _do(self, task: Task, on_start: Callable[[], None] | None) -> None:
         if on_start is not None:

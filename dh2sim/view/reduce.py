@@ -16,6 +16,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.view import events
 from dh2sim.view.events import EditCell, Event, OpenText, Undo
 from dh2sim.view.initial_state import open_text
+from dh2sim.view.motion.row_animation import advanced, played, step_count
 from dh2sim.view.scene.items import Vector
 from dh2sim.view.scene.solids import position_of
 from dh2sim.view.state import IDENTITY, Goal, LinkDrag, Matrix, Mode, Part, ViewState, configurations, within
@@ -123,7 +124,15 @@ def _reduced(state: ViewState, event: events.Event) -> ViewState:
         case events.ShowAngles(unit=unit):
             return replace(state, angle=unit)
         case events.SelectRow(row=row):
-            return replace(state, selected_row=row) if 0 <= row < len(state.table.rows) else state
+            known = 0 <= row < len(state.table.rows) and row != state.selected_row
+            return replace(state, selected_row=row, row_progress=None, row_playing=False) if known else state
+        case events.PlayRow(on=on):
+            return played(state, on=on)
+        case events.SeekRow(steps=steps):
+            inside = 0.0 <= steps <= step_count(state)
+            return replace(state, row_progress=steps, row_playing=False) if inside else state
+        case events.AdvanceRow(seconds=seconds):
+            return advanced(state, seconds)
         case events.ChooseFrame(name=name):
             return replace(state, frame=name) if name in frame_names(state.model.chain) else state
         case events.ChooseReference(name=name):

@@ -153,6 +153,10 @@ class ViewState:
     """Of the robot's shapes, from 0 to 1, so that frames inside them are seen."""
     selected_row: int = 0
     """Row of the table that is edited and explained, from 0."""
+    row_progress: float | None = None
+    """How many of that row's elementary steps are drawn, such as 1.5; None for all, without an animation."""
+    row_playing: bool = False
+    """Whether its animation is running."""
     angle: AngleUnit = AngleUnit.DEG
     """Unit of angles outside of the table."""
     frame: str = "tool0"

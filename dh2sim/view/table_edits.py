@@ -42,7 +42,11 @@ def table_changed(state: ViewState, event: TableEvent) -> ViewState:
                 known = row == PARAMETERS and column in state.table.parameters
                 return _edited(state, {(row, column): text}) if known else state
             known = 0 <= row < len(state.table.rows) and column in (*COLUMNS, CONVENTION)
-            return replace(_edited(state, {(row, column): text}), selected_row=row) if known else state
+            if not known:
+                return state
+            same = row == state.selected_row
+            chosen = state if same else replace(state, selected_row=row, row_progress=None, row_playing=False)
+            return _edited(chosen, {(row, column): text})
         case SetConvention(row=row, convention=convention):
             known = row is None or 0 <= row < len(state.table.rows)
             return _edited(state, _in_convention(state, row, convention)) if known else state
@@ -132,6 +136,8 @@ def _with_robot(
         frame=state.frame if state.frame in frame_names(model.chain) else "tool0",
         reference=state.reference if state.reference in frame_names(model.chain) else "base_link",
         selected_row=min(state.selected_row, rows - 1),
+        row_progress=None,
+        row_playing=False,
         ghost=misread_ghost(model) if state.ghost is not None and state.ghost.misread else state.ghost,
         goal=None,
         notice=notice,

@@ -7,8 +7,19 @@ from typing import TYPE_CHECKING, Any, Final
 
 from dh2sim.robot.edit import PARAMETERS
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
-from dh2sim.view.events import ConvertTable, EditCell, SelectRow, SetConvention, SetUnits, Show, Undo
+from dh2sim.view.events import (
+    ConvertTable,
+    EditCell,
+    PlayRow,
+    SeekRow,
+    SelectRow,
+    SetConvention,
+    SetUnits,
+    Show,
+    Undo,
+)
 from dh2sim.view.frame_readout import relative_pose
+from dh2sim.view.motion.row_animation import step_count, step_text
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
 from dh2sim.view.panel.cells import CellGrid, identity_of
@@ -19,6 +30,7 @@ from dh2sim.view.state import CONVENTION, CellError, Part, TableState, ViewState
 if TYPE_CHECKING:
     import viser
 
+_PLAY: Final = "Play the row's steps"
 _PRODUCTS: Final = {
     Convention.STANDARD: "standard: Rz(θ) Tz(d) Tx(a) Rx(α)",
     Convention.MODIFIED: "modified: Tx(a) Rx(α) Rz(θ) Tz(d), a and α of index i − 1",
@@ -41,7 +53,7 @@ class TableTab:
         self._rows = _names(state)
         chooser = self._gui.add_dropdown("Row", self._rows, hint="The row that is explained in the scene")
         self._chooser = bind(chooser, send, self._selected)
-        self._convention = self._convention_of_row(state)
+        self._row = RowFields(self._gui, send, state, chooser.order)
         self._explain = bind(
             self._gui.add_checkbox("Explain in scene", Part.ANNOTATIONS in state.shown),
             send,
@@ -55,18 +67,19 @@ class TableTab:
             self._add_whole(state)
 
     def show(self, state: ViewState) -> None:
-        """Show a state, unless only the joints have moved."""
+        """Show a state."""
         shown = (state.table, state.model, state.selected_row, state.shown, bool(state.undo_texts))
         if shown == self._shown:
+            self._row.show(state)
             return
         self._shown = shown
         with self._tab:
             if identity_of(state) != self._cells.identity:
                 self._cells.remove()
                 self._cells = CellGrid(self._gui, self._send, state, self._cells.order)
-            if self._row_of_convention != (state.spec.name, state.selected_row):
-                self._convention.handle.remove()
-                self._convention = self._convention_of_row(state)
+            if not self._row.belongs_to(state):
+                self._row.remove()
+                self._row = RowFields(self._gui, self._send, state, self._chooser.handle.order)
             if not self._parameters.belongs_to(state):
                 self._parameters.remove()
                 self._parameters = ParameterFields(self._gui, self._send, state, self._parameters.order)
@@ -75,7 +88,7 @@ class TableTab:
         if _names(state) != self._rows:
             self._rows = self._chooser.handle.options = _names(state)
         self._chooser.show(self._rows[state.selected_row])
-        self._convention.show(state.table.rows[state.selected_row].convention.value)
+        self._row.show(state)
         self._parameters.show(state)
         if self._undo.disabled == bool(state.undo_texts):
             self._undo.disabled = not state.undo_texts
@@ -89,19 +102,6 @@ class TableTab:
         if shown != self._shown_slow:
             self._shown_slow = shown
             self._matrix.content = row_matrix(state)
-
-    def _convention_of_row(self, state: ViewState) -> Bound[str]:
-        """Add the convention of the selected row, which gets a field of its own, as its label names it."""
-        row = state.selected_row
-        self._row_of_convention = (state.spec.name, row)
-        field = self._gui.add_dropdown(
-            f"convention{subscript(row + 1)}",
-            [convention.value for convention in Convention],
-            initial_value=state.table.rows[row].convention.value,
-            hint="Reads the same numbers in another way, which makes another robot",
-            order=self._chooser.handle.order + 0.5,  # viser's own orders are whole numbers
-        )
-        return bind(field, self._send, lambda name: SetConvention(row=row, convention=Convention(name)))
 
     def _selected(self, label: str) -> SelectRow:
         """Return the event of a choice; one of a robot no longer shown selects no row."""
@@ -127,6 +127,62 @@ class TableTab:
 
     def _units_event(self) -> SetUnits:
         return SetUnits(angle=AngleUnit(self._angle.handle.value), length=LengthUnit(self._length.handle.value))
+
+
+class RowFields:
+    """The convention and the animation of a row; another row gets fields of its own, as their label names it."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send, state: ViewState, order: float) -> None:
+        """Add the widgets to viser's current container.
+
+        Args:
+            gui: The page's widgets.
+            send: Queues events.
+            state: Its selected row is the one.
+            order: Of the widget that they are placed below.
+        """
+        row = state.selected_row
+        self._identity = _row_identity(state)
+        field = gui.add_dropdown(
+            f"convention{subscript(row + 1)}",
+            [convention.value for convention in Convention],
+            initial_value=state.table.rows[row].convention.value,
+            hint="Reads the same numbers in another way, which makes another robot",
+            order=order + 0.2,  # viser's own orders are whole numbers
+        )
+        self._convention = bind(field, send, lambda name: SetConvention(row=row, convention=Convention(name)))
+        count = step_count(state)
+        self._playing = state.row_playing
+        self._play = gui.add_button(
+            _PLAY, hint="Moves a frame through the row's product, step by step", order=order + 0.4
+        )
+        on_click(self._play, send, lambda: PlayRow(on=not self._playing))
+        steps = gui.add_slider("Steps", min=0.0, max=float(count), step=0.01, initial_value=count, order=order + 0.6)
+        self._steps = bind(steps, send, lambda value: SeekRow(steps=value))
+        self._text = gui.add_html("", order=order + 0.8)
+
+    def belongs_to(self, state: ViewState) -> bool:
+        """Return whether the fields are those of the selected row."""
+        return self._identity == _row_identity(state)
+
+    def show(self, state: ViewState) -> None:
+        """Show a state with the same row selected."""
+        self._convention.show(state.table.rows[state.selected_row].convention.value)
+        if state.row_playing != self._playing:
+            self._playing = state.row_playing
+            self._play.label = "Pause" if self._playing else _PLAY
+        done = float(step_count(state)) if state.row_progress is None else state.row_progress
+        self._steps.show(round(done, 2))
+        self._text.content = markup.note(markup.text(step_text(state)), name="step")
+
+    def remove(self) -> None:
+        """Remove the widgets from the page."""
+        for widget in (self._convention.handle, self._play, self._steps.handle, self._text):
+            widget.remove()
+
+
+def _row_identity(state: ViewState) -> object:
+    return state.spec.name, state.selected_row, step_count(state)
 
 
 class ParameterFields:

@@ -90,7 +90,8 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
             yield from _names(places, triad_length(state.model))
     if Part.ANNOTATIONS in state.shown:
         size = triad_length(state.model)
-        row = row_annotations(state.spec, state.model.chain, state.selected_row, state.q, size, state.angle)
+        number, done = state.selected_row, state.row_progress
+        row = row_annotations(state.spec, state.model.chain, number, state.q, size, state.angle, done)
         yield from row.items()
     if Part.GHOST in state.shown and state.ghost is not None:
         configuration = ghost_configuration(state.ghost.model, state.model, state.q)
