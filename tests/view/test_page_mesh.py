@@ -65,7 +65,7 @@ def test_the_mesh_of_a_link_is_sent_to_the_browser_and_seen(serve: Serve, tmp_pa
     assert served.client.scene.get_handle_by_name("/robot/link_1/shape_0") is None
 
     open_tab(page, "Show")
-    hidden = {"DH frames": Part.FRAMES, "Grid": Part.GRID, "Explained row": Part.ANNOTATIONS}
+    hidden = {"DH frames": Part.FRAMES, "Floor": Part.GRID, "Explained row": Part.ANNOTATIONS}
     for label in (*hidden, "Handle to drag tool0"):
         page.get_by_text(label, exact=True).click()
     wait_until(lambda: served.state.shown.isdisjoint(hidden.values()), "nothing but the robot is shown")

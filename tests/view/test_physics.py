@@ -17,12 +17,14 @@ from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian, jo
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators
+from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import ActuatorType, Convention, Dynamics, JointType, LinkSpec, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 from dh2sim.validate.motion.free_motion import frictionless, without_contacts
 from dh2sim.validate.motion.mechanics import energy
 from dh2sim.view.motion.applied_force import LinkPoint, drag_spring, find_point
 from dh2sim.view.motion.physics import STEPS_PER_CLOCK_READING, Drive, Physics
+from dh2sim.view.scene.ground import ground_of
 from tests.sample_robots import model as robot
 
 PATIENT = 600.0
@@ -390,3 +392,39 @@ def test_an_unknown_drive_is_refused() -> None:
     drive: Drive = "fast"  # type: ignore[assignment]
     with pytest.raises(ValueError, match=r"^drive must be 'position' or 'free', got 'fast'$"):
         Physics(pendulum(), [0.0], drive=drive)
+
+
+@cache
+def falling() -> RobotModel:
+    """A rod of 0.5 m that turns about y, 0.3 m above the floor; at home it is upright."""
+    text = (
+        "name: falling\nconvention: standard\nunits: {angle: deg}\nbase: {xyz: [0, 0, 0.3], rpy: [-90, 0, 0]}\n"
+        "joints:\n"
+        "  - {type: revolute, a: 0.5, limits: {position: [-360, 360]}, dynamics: {damping: 0.2}}\n"
+        "configurations: {home: [-90], zero: [-45]}\n"
+    )
+    return build_model(parse_robot(text))
+
+
+def lowest(model: RobotModel, q: Array) -> float:
+    """The lowest point of link 1, m: of its capsules and cylinders, out of their axes."""
+    T = joint_poses(model.chain, q)[0]
+    ends = [T[:3, :3] @ end + T[:3, 3] for shape in model.links[0].shapes for end in shape.ends]
+    return float(min(end[2] for end in ends))
+
+
+def test_a_link_that_falls_is_stopped_by_the_floor_of_the_scene() -> None:
+    model = falling()
+    physics = Physics(model, [-math.pi / 2 + 0.2], drive="free")
+    simulated(physics, 4.0)
+    height = ground_of(model).height
+    assert lowest(model, physics.q) > height - 0.01
+    assert np.abs(physics.qvel).max() < 0.05, "it lies there"
+    assert physics.q[0] < math.pi / 2 - 0.3, "without the floor it would hang"
+
+
+def test_a_link_that_starts_in_the_floor_is_not_thrown_out_of_it() -> None:
+    model = falling()
+    physics = Physics(model, [math.pi / 2], drive="free")
+    simulated(physics, 0.5)
+    assert physics.q == pytest.approx([math.pi / 2], abs=1e-6), "it hangs through the floor"

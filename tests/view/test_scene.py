@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from dh2sim import Robot
+from dh2sim.formats.mjcf.scene import to_scene
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.kinematics.forward import joint_poses
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.model.variants import without_meshes
+from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
@@ -59,6 +65,29 @@ def test_a_move_changes_poses_and_no_solid() -> None:
     assert "/robot/base_link" not in changed
 
 
+@pytest.mark.parametrize("name", builtin_robots())
+def test_the_floor_and_the_pedestal_are_where_the_exported_scene_has_them(name: str) -> None:
+    robot = Robot.load(name)
+    assets = {f"{name}.xml": to_mjcf(without_meshes(robot.model)).encode()}
+    compiled = mujoco.MjModel.from_xml_string(to_scene(robot.model), assets)
+    scene = scene_of(open_state(load_robot(name)))
+    assert scene["/grid"].position == tuple(compiled.geom("floor").pos)
+    names = [compiled.geom(i).name for i in range(compiled.ngeom)]
+    assert ("/pedestal" in scene) is ("pedestal" in names)
+    if "pedestal" in names:
+        data, geom = mujoco.MjData(compiled), compiled.geom("pedestal")
+        mujoco.mj_kinematics(compiled, data)
+        drawn = scene["/pedestal"]
+        assert isinstance(drawn, Solid)
+        placed = np.array(drawn.vertices) @ matrix(drawn)[:3, :3].T + drawn.position
+        turned = (placed - data.geom_xpos[geom.id]) @ data.geom_xmat[geom.id].reshape(3, 3)
+        radius, half = geom.size[:2]
+        assert np.abs(turned[:, 2]).max() == pytest.approx(half)
+        assert np.linalg.norm(turned[:, :2], axis=1).max() == pytest.approx(radius)
+    hidden = scene_of(after(open_state(load_robot(name)), Show(part=Part.GRID, on=False)))
+    assert not {"/grid", "/pedestal"} & hidden.keys()
+
+
 @pytest.mark.parametrize(
     ("part", "kind", "root"),
     [
@@ -88,7 +117,8 @@ def test_the_first_page_shows_frames_and_an_explained_row_inside_a_robot_that_ca
     scene = scene_of(STANFORD)
     assert {Part.FRAMES, Part.FRAME_NAMES, Part.ANNOTATIONS, Part.HANDLE} <= STANFORD.shown
     assert sum(isinstance(item, Triad) for item in scene.values()) == 8
-    assert all(0.0 < item.opacity < 0.5 for item in scene.values() if isinstance(item, Solid))
+    robot = [item for name, item in scene.items() if isinstance(item, Solid) and name.startswith("/robot/")]
+    assert all(0.0 < item.opacity < 0.5 for item in robot)
 
 
 def test_the_row_that_is_chosen_is_explained() -> None:
@@ -117,7 +147,7 @@ def test_without_soft_shading_surfaces_are_plain_and_nothing_else_changes() -> N
     compared = after(STANFORD, CompareMisread())
     soft, plain = scene_of(compared), scene_of(after(compared, Show(part=Part.SHADING, on=False)))
     solids = {name for name, item in soft.items() if isinstance(item, Solid)}
-    assert {name.split("/")[1] for name in solids} == {"robot", "ghost"}
+    assert {name.split("/")[1] for name in solids} == {"robot", "ghost", "pedestal"}
     assert {name for name in soft if soft[name] != plain[name]} == solids
     assert all(item.plain for item in plain.values() if isinstance(item, Solid))
     assert not any(item.plain for item in soft.values() if isinstance(item, Solid))

@@ -75,14 +75,21 @@ def free_model(model: RobotModel, *, floating_base: bool = False, integrator: st
     return compiled
 
 
-def compile_model(model: RobotModel, options: MjcfOptions = EXPORTED) -> mujoco.MjModel:
+def compile_model(model: RobotModel, options: MjcfOptions = EXPORTED, *, surroundings: str = "") -> mujoco.MjModel:
     """Compile a robot without meshes.
+
+    Args:
+        model: The robot.
+        options: Of its MJCF.
+        surroundings: What else is in the world body, MJCF.
 
     Raises:
         EngineError: MuJoCo refuses the model.
     """
+    scene = f'<mujoco><include file="robot.xml"/><worldbody>{surroundings}</worldbody></mujoco>'
+    text = to_mjcf(without_meshes(model), options)
     try:
-        compiled = mujoco.MjModel.from_xml_string(to_mjcf(without_meshes(model), options))
+        compiled = mujoco.MjModel.from_xml_string(scene, {"robot.xml": text.encode()})
     except ValueError as error:
         raise EngineError(f"MuJoCo refuses the model: {' '.join(str(error).split())}") from error
     keep_centers_of_mass(compiled)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from typing import Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 import mujoco
 import numpy as np
@@ -24,6 +24,7 @@ from dh2sim.view.motion.applied_force import (
     finite_vector,
     joint_forces,
 )
+from dh2sim.view.scene.ground import ground_of
 
 Drive: TypeAlias = Literal["position", "free"]
 """'position': actuators hold the joints at their targets; 'free': nothing drives them."""
@@ -66,11 +67,47 @@ class SpeedLimit:
         )
 
 
-class Physics:
-    """The simulation of one robot; not thread-safe.
+_STOPPED_BY_FLOOR: Final = 2
+"""Bit of the links, and of the floor, in MuJoCo's filter of contacts."""
 
-    The robot is the exported MJCF without its meshes. Joints whose actuators are not of type ``position`` get such
-    actuators, with dh2sim's default gains where the robot file gives none.
+
+def compile_on_floor(model: RobotModel, start: ArrayLike) -> mujoco.MjModel:
+    """Compile a robot without meshes on the floor of its scene.
+
+    A link that is in the floor at the start is not stopped by it: it would be thrown out.
+
+    Args:
+        model: The robot.
+        start: Joint positions, rad or m, shape (n,).
+
+    Raises:
+        ConfigurationError: ``start`` has the wrong shape or is not finite.
+        ModelError: An MJCF cannot hold the robot.
+        EngineError: MuJoCo refuses the model.
+    """
+    height = ground_of(model).height
+    plane = f'<geom type="plane" pos="0 0 {height!r}" size="0 0 0.05" contype="0" conaffinity="{_STOPPED_BY_FLOOR}"/>'
+    compiled = compile_model(model, surroundings=plane)
+    collide = compiled.geom_contype != 0
+    compiled.geom_contype[collide] |= _STOPPED_BY_FLOOR
+    compiled.body_contype[compiled.geom_bodyid[collide]] |= _STOPPED_BY_FLOOR
+    data, world = mujoco.MjData(compiled), 0
+    places = [compiled.joint(joint.name).qposadr[0] for joint in model.moving_joints]
+    data.qpos[places] = joint_vector(model.chain, start)
+    mujoco.mj_fwdPosition(compiled, data)
+    pairs = compiled.geom_bodyid[data.contact.geom]
+    in_floor = pairs[(pairs == world).any(axis=1)].max(axis=1, initial=world)
+    compiled.geom_contype[np.isin(compiled.geom_bodyid, in_floor)] &= ~_STOPPED_BY_FLOOR
+    compiled.body_contype[in_floor] &= ~_STOPPED_BY_FLOOR
+    return compiled
+
+
+class Physics:
+    """The simulation of one robot on the floor of its scene; not thread-safe.
+
+    The robot is the exported MJCF without its meshes. Links that are in the floor at the start pass through it. Joints
+    whose actuators are not of type ``position`` get such actuators, with dh2sim's default gains where the robot file
+    gives none.
     """
 
     def __init__(self, model: RobotModel, q: ArrayLike, *, gravity: bool = True, drive: Drive = "position") -> None:
@@ -89,7 +126,7 @@ class Physics:
         """
         driven = with_actuators(model, ActuatorType.POSITION)
         self._chain = model.chain
-        self._model = compile_model(driven)
+        self._model = compile_on_floor(driven, q)
         self._model.opt.disableflags |= int(
             mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_SENSOR
         )

@@ -40,7 +40,7 @@ _PART_LABELS: Final = {
     Part.GHOST: "Show ghost",
     Part.HANDLE: "Handle to drag tool0",
     Part.ELLIPSOID: "Velocity ellipsoid",
-    Part.GRID: "Grid",
+    Part.GRID: "Floor",
     Part.SHADING: "Soft shading",
 }
 _HINTS: Final = {Part.SHADING: "A browser without a graphics card draws twice as fast without it"}

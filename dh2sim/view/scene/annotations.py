@@ -276,7 +276,7 @@ COLORS: Final[Mapping[Quantity, Color]] = MappingProxyType(
 """Of the table's columns."""
 AXIS_COLOR: Final[Color] = (0.35, 0.40, 0.50)
 """Of joint axes and of the common normal."""
-_AXIS = 3.0
+_AXIS = 1.8
 """Length of axes beyond frames and offsets; like the next a share of the ``size`` argument."""
 _NORMAL = 0.6
 """Length of the common normal beyond the axes."""

@@ -10,17 +10,15 @@ from itertools import product
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from dh2sim.draw.projection import Pinhole
-from dh2sim.kinematics.transforms import compose
-from dh2sim.model.meshes import MeshAsset
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.view.events import SetCamera
-from dh2sim.view.scene.items import Vector, vector
-from dh2sim.view.scene.link_poses import frame_origins, poses_at, robot_size
-from dh2sim.view.scene.solids import mesh_triangles
+from dh2sim.view.scene.ground import ground_of
+from dh2sim.view.scene.items import Placed, Solid, Vector, vector
+from dh2sim.view.scene.link_poses import frame_origins, robot_size, triad_length
+from dh2sim.view.scene.solids import robot_solids, rotation_matrix
 
 if TYPE_CHECKING:
     import viser
@@ -31,6 +29,12 @@ _NARROWEST: Final = 0.2
 """Aspect ratio of the narrowest picture that the robot is fitted into."""
 _DIRECTION: Final = (0.62, -0.68, 0.42)
 """From the robot to the camera."""
+_MARGIN: Final = 0.06
+"""At each edge of the picture, as a share of it."""
+_FRAME: Final = 1.2
+"""Radius of a ball around a frame's axes and its name, as a share of their length."""
+_HANDLE: Final = 1.5
+"""Likewise, around the handle of tool0."""
 _SAME_ASPECT: Final = 0.01
 _SAME_PINHOLE: Final = 0.02
 """Rotation, rad, and relative change of distance or scale below which labels stay where they are."""
@@ -47,20 +51,33 @@ class Viewpoint:
 
 
 def viewpoint_of(model: RobotModel, aspect: float = 1.0) -> Viewpoint:
-    """Return a viewpoint that shows the whole robot at home, with a margin.
+    """Return the nearest viewpoint from which the whole robot at home is seen, with its frames and its handle.
+
+    A ball at (x, y, z) along right, up and towards the camera, of radius r, is inside a picture whose edge rises by k
+    a metre if the camera, at distance D and moved sideways by s, has |x - s| + r sqrt(1 + k²) <= k (D - z). The least
+    D with its s follows from the two balls that limit it on either side.
 
     Args:
         model: The robot.
-        aspect: Width of the picture over its height; for a narrow one the camera is farther away.
+        aspect: Width of the picture over its height.
     """
-    corners = np.vstack([frame_origins(model), _shape_corners(model)])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    centre = 0.5 * (low + high)
-    radius = max(0.55 * float(np.linalg.norm(high - low)), 0.5 * robot_size(model))
-    direction = np.array(_DIRECTION) / np.linalg.norm(_DIRECTION)
-    half = math.atan(math.tan(0.5 * FIELD_OF_VIEW) * min(max(aspect, _NARROWEST), 1.0))
-    position = centre + radius / math.sin(half) * direction
-    return Viewpoint(position=vector(position), look_at=vector(centre))
+    balls = _balls(model)
+    back = np.array(_DIRECTION) / np.linalg.norm(_DIRECTION)
+    right = np.cross((0.0, 0.0, 1.0), back)
+    right /= np.linalg.norm(right)
+    up = np.cross(back, right)
+    centre = 0.5 * (balls[:, :3].min(axis=0) + balls[:, :3].max(axis=0))
+    offsets, radii = balls[:, :3] - centre, balls[:, 3]
+    towards = offsets @ back
+    vertical = (1.0 - _MARGIN) * math.tan(0.5 * FIELD_OF_VIEW)
+    distance, look_at = 0.5 * robot_size(model), centre.copy()
+    for axis, k in ((right, vertical * max(aspect, _NARROWEST)), (up, vertical)):
+        sideways, widths = offsets @ axis, radii * math.hypot(1.0, k)
+        above = float(((sideways + widths) / k + towards).max())
+        below = float(((widths - sideways) / k + towards).max())
+        distance = max(distance, 0.5 * (above + below))
+        look_at += 0.5 * k * (above - below) * axis
+    return Viewpoint(position=vector(look_at + distance * back), look_at=vector(look_at))
 
 
 def aim(camera: viser.CameraHandle | viser.InitialCameraConfig, model: RobotModel, aspect: float = 1.0) -> None:
@@ -151,27 +168,34 @@ class CameraWatch:
             self._send(SetCamera(pinhole=pinhole))
 
 
-def _shape_corners(model: RobotModel) -> Array:
-    """Return points around the shapes and meshes of the links at home, m, shape (count, 3)."""
-    poses = poses_at(model, model.home)
-    points = [np.empty((0, 3))]
-    for link, T_base_link, T_base_dh in zip(model.all_links, poses.links, poses.frames, strict=True):
-        if link.mesh is None:
-            points += [_transformed(T_base_link, shape.ends) for shape in link.shapes]
-        else:
-            points.append(_transformed(compose(T_base_dh, link.mesh.T_dh_mesh), _box(link.mesh)))
-    return np.vstack(points)
+@lru_cache(maxsize=8)  # asked for whenever the camera moves
+def _balls(model: RobotModel) -> Array:
+    """Return balls around what is drawn of a robot at home: centres and radii, m, shape (count, 4)."""
+    length, items = triad_length(model), robot_solids(model, model.home, "")
+    balls = [[*origin, _FRAME * length] for origin in frame_origins(model)]
+    balls[-1][3] = _HANDLE * length  # tool0
+    for name, item in items.items():
+        if isinstance(item, Solid):
+            carrier = items[name.rpartition("/")[0]]
+            low, high = _box(item.vertices)
+            corners = _placed(carrier, _placed(item, np.array(list(product(*zip(low, high, strict=True))))))
+            balls += [[*corner, 0.0] for corner in corners]
+    pedestal = ground_of(model).pedestal
+    if pedestal is not None:
+        balls += [[*corner, 0.0] for corner in _placed(pedestal, np.array(_box(pedestal.vertices)))]
+    return np.array(balls)
 
 
 @lru_cache(maxsize=64)
-def _box(mesh: MeshAsset) -> Array:
-    """Return the corners of the box around a mesh in its own frame, m, shape (8, 3)."""
-    vertices = np.array(mesh_triangles(mesh)[0])
-    return np.array(list(product(*np.stack([vertices.min(axis=0), vertices.max(axis=0)], axis=1))))
+def _box(vertices: tuple[Vector, ...]) -> tuple[Vector, Vector]:
+    """Return the lowest and the highest coordinates of points."""
+    points = np.array(vertices)
+    return vector(points.min(axis=0)), vector(points.max(axis=0))
 
 
-def _transformed(T: Array, points: ArrayLike) -> Array:
-    return np.asarray(points) @ T[:3, :3].T + T[:3, 3]
+def _placed(item: Placed, points: Array) -> Array:
+    """Return points in an item's frame in that of its carrier, shape (count, 3)."""
+    return np.asarray(points @ rotation_matrix(item.orientation).T + item.position)
 
 
 def _rotated(wxyz: Array, x: Vector) -> Array:

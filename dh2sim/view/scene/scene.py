@@ -18,6 +18,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.view.scene.annotations import row_annotations
 from dh2sim.view.scene.ghost import ToolOffset, ghost_configuration, ghost_scene
+from dh2sim.view.scene.ground import ground_of
 from dh2sim.view.scene.items import (
     Arrow,
     Color,
@@ -44,6 +45,8 @@ GHOST: Final = "/ghost"
 DRAG: Final = "/drag"
 GOAL: Final = "/goal"
 ELLIPSOID: Final = "/ellipsoid"
+GRID: Final = "/grid"
+PEDESTAL: Final = "/pedestal"
 IN_BASE_LINK: Final = (ROBOT, NAMES, ROW, GHOST, ELLIPSOID)
 """Items below these are given in base_link, all others, such as the trace and the grid, in the world."""
 _TRACE_COLOR: Final[Color] = (0.10, 0.45, 0.85)
@@ -105,7 +108,11 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
     if Part.TRACE in state.shown and len(state.trace) > 1:
         yield "/trace", Polyline(points=state.trace, color=_TRACE_COLOR, width=3.0)
     if Part.GRID in state.shown:
+        ground = ground_of(state.model)
+        yield GRID, Placed(position=(0.0, 0.0, ground.height))
         yield from _grid(robot_size(state.model)).items()
+        if ground.pedestal is not None and not state.floats:
+            yield PEDESTAL, ground.pedestal
 
 
 def _ellipsoid(state: ViewState) -> Iterator[tuple[str, Item]]:
@@ -259,8 +266,8 @@ def _grid(size: float) -> Mapping[str, Item]:
     places = [-half + k * cell for k in range(_CELLS + 1)]
     middle = places.pop(_CELLS // 2)
     return {
-        "/grid/cells": Lines(segments=tuple(_crosses(places, half)), color=_GRID_COLOR, width=1.0),
-        "/grid/axes": Lines(segments=tuple(_crosses([middle], half)), color=_AXIS_COLOR, width=1.0),
+        f"{GRID}/cells": Lines(segments=tuple(_crosses(places, half)), color=_GRID_COLOR, width=1.0),
+        f"{GRID}/axes": Lines(segments=tuple(_crosses([middle], half)), color=_AXIS_COLOR, width=1.0),
     }
 
 
