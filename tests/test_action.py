@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +56,38 @@ def repository(tmp_path: Path) -> Path:
         shutil.copy(ROOT / "robots" / f"{name}.yaml", tmp_path / "arms")
         shutil.copytree(ROOT / "generated" / name, tmp_path / "models" / name)
     return tmp_path
+
+
+def test_no_step_runs_code_of_the_callers_checkout(action: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "pip.py").write_text("print('owned')\n")
+    calls = [words for step in action["runs"]["steps"] for words in [str(step.get("run", "")).split()] if words]
+    installing = [words for words in calls if "pip" in words]
+    assert [words[:4] for words in installing] == [["python", "-I", "-m", "pip"]]
+    run = subprocess.run(
+        [sys.executable, *installing[0][1:4], "--version"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert run.stdout.startswith("pip ")
+
+
+@pytest.mark.parametrize("file", ["action.yml", ".github/workflows/ci.yml"])
+def test_actions_of_others_are_pinned_to_a_commit(file: str) -> None:
+    used = re.findall(r"uses: (\S+)(.*)", (ROOT / file).read_text(encoding="utf-8"))
+    assert used
+    for name, version in used:
+        assert name == "./" or (re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", name) and re.match(r" # v\d", version))
+
+
+def test_what_the_action_installs_is_pinned() -> None:
+    lines = (ROOT / ".github/constraints.txt").read_text(encoding="utf-8").splitlines()
+    pins = [line for line in lines if not line.startswith("#")]
+    assert all(re.fullmatch(r"[a-z0-9-]+==[0-9][0-9a-z.]*", line) for line in pins)
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        project = tomllib.load(file)["project"]
+    names = {line.partition("==")[0] for line in pins}
+    for requirement in (*project["dependencies"], *project["optional-dependencies"]["engines"]):
+        name = re.match(r"[A-Za-z0-9._-]+", requirement)
+        assert name is not None
+        assert re.sub(r"[._]", "-", name[0].lower()) in names or ";" in requirement
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ import urllib.request
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -341,4 +342,8 @@ def test_every_built_in_robot_opens_at_home_where_its_table_has_it(robot: str) -
     scene = scene_of(state)
     assert {f"/robot/link_{i}" for i in range(1, len(spec.rows) + 1)} <= set(scene)
     expected = table_tool_pose(spec, state.model.home)
-    assert np.allclose(scene["/frames/tool0"].position, expected[:3, 3], rtol=0, atol=1e-12)
+    link = scene[f"/robot/link_{len(spec.rows)}"]
+    tool = scene[f"/robot/link_{len(spec.rows)}/tool0"]
+    turned = np.empty(3)
+    mujoco.mju_rotVecQuat(turned, np.asarray(tool.position), np.asarray(link.orientation))
+    assert np.allclose(turned + link.position, expected[:3, 3], rtol=0, atol=1e-12)
