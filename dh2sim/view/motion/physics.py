@@ -105,9 +105,9 @@ def compile_on_floor(model: RobotModel, start: ArrayLike) -> mujoco.MjModel:
 class Physics:
     """The simulation of one robot on the floor of its scene; not thread-safe.
 
-    The robot is the exported MJCF without its meshes. Links that are in the floor at the start pass through it. Joints
-    whose actuators are not of type ``position`` get such actuators, with dh2sim's default gains where the robot file
-    gives none.
+    The robot is the exported MJCF without its meshes. Links that are in the floor at the start pass through it.
+    Joints whose actuators are not of type ``position`` get such actuators, with dh2sim's default gains where the
+    robot file gives none.
     """
 
     def __init__(self, model: RobotModel, q: ArrayLike, *, gravity: bool = True, drive: Drive = "position") -> None:
