@@ -196,7 +196,7 @@ def verify(model: RobotModel, folder: Path, formats: Collection[Format]) -> list
         result = Verified(
             format=format_, position_error=float(np.max(position)), rotation_error=float(np.max(rotation))
         )
-        allowed = TOLERANCE * max(1.0, model.reach)
+        allowed = TOLERANCE * max(1.0, model.extent)
         if not (result.position_error <= allowed and result.rotation_error <= TOLERANCE):
             raise MismatchError(
                 f"{model.name}: the {format_.value.upper()} differs from the table by {result.position_error:.3g} m "

@@ -18,7 +18,7 @@ from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.kinematics.table_oracle import table_tool_errors, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
 from dh2sim.messages import member
-from dh2sim.model.limits import reach_bound
+from dh2sim.model.limits import frame_extent, travels_of
 from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import AngleUnit, Convention, RobotSpec, Units
 from dh2sim.robot.write import robot_file_text
@@ -106,8 +106,9 @@ def convert_robot(spec: SpecLike, to: TableFormLike, *, folder: Path | None = No
     count = EXACT_CONFIGURATIONS if compact else CONFIGURATIONS
     q = _configurations(spec, count)
     position, rotation = table_tool_errors(read, spec, q) if compact else _errors(spec, read, q)
-    reach = reach_bound(build_chain(conversion.spec), spec.rows)
-    if not (position <= TOLERANCE * max(1.0, reach) and rotation <= TOLERANCE):
+    chain = build_chain(conversion.spec)
+    extent = frame_extent(chain, travels_of(chain, spec.rows))
+    if not (position <= TOLERANCE * max(1.0, extent) and rotation <= TOLERANCE):
         raise MismatchError(
             f"{spec.name}: tool0 of the converted table is off by {position:.1e} m and {rotation:.1e} rad; "
             "nothing was written"

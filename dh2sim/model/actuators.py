@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import reference_joint_poses
-from dh2sim.model.link_shapes import neat
 from dh2sim.model.mass import MassProperties, in_frame, shift_inertia
-from dh2sim.model.shapes import cross
+from dh2sim.model.shapes import cross, neat
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType
 from dh2sim.typing import Array
 
@@ -78,6 +77,8 @@ def seen_inertias(chain: KinematicChain, bodies: Sequence[MassProperties | None]
             terms = []
             for body in carried:
                 arm = [float(body.com[k]) - origin[k] for k in range(3)]
+                along = _dot(arm, axis)  # of no account, and much where a frame is far along its axis
+                arm = [arm[k] - along * axis[k] for k in range(3)]
                 about = shift_inertia(body.inertia, body.mass, arm)
                 terms.append(_dot(axis, [_dot([float(x) for x in about[k]], axis) for k in range(3)]))
         else:

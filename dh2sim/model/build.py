@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from dh2sim.errors import ModelError
-from dh2sim.kinematics.chain import HasChain, Joint, KinematicChain, SpecLike, build_chain, spec_of
+from dh2sim.kinematics.chain import HasChain, Joint, SpecLike, build_chain, spec_of
+from dh2sim.kinematics.skeleton import build_skeleton
 from dh2sim.model.actuators import actuator_model, seen_inertias
 from dh2sim.model.collision_exclusions import excluded_pairs
-from dh2sim.model.limits import Range, filled_limits, load_bound, position_ranges, reach_bound
-from dh2sim.model.link_shapes import lay_out, link_scale, neat
+from dh2sim.model.limits import filled_limits, frame_extent, load_bound, position_ranges, reach_bound, travels_of
+from dh2sim.model.link_shapes import arm_length, lay_out, link_radii
 from dh2sim.model.mass import link_inertial
 from dh2sim.model.meshes import load_mesh
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape
-from dh2sim.robot.spec import JointType, RobotSpec, Row
+from dh2sim.robot.spec import RobotSpec, Row
+from dh2sim.typing import Array
 
 LARGEST = 1e20
 """Size of the largest number that a model is built from, and one over the least mass, density or radius."""
-SLENDERNESS = 0.16
-"""Radius of the base's shapes as a share of the mean segment."""
-TAPER = 0.45
-"""Share by which the last link is thinner than the base."""
 PALETTE: tuple[Color, ...] = (
     (0.90, 0.45, 0.13, 1.0),
     (0.93, 0.60, 0.18, 1.0),
@@ -76,10 +74,14 @@ def build_model(spec: SpecLike) -> RobotModel:
     spec = spec_of(spec)
     _check_sizes(spec)
     chain = build_chain(spec)
-    ranges = position_ranges(chain, spec.rows)
-    shapes = _shapes(spec, chain, ranges)
+    travels = travels_of(chain, spec.rows)
+    ranges = position_ranges(spec.rows, travels)
+    skeleton = build_skeleton(chain, travels)
+    length = arm_length(skeleton)
+    radii = link_radii(length, [row.link.radius for row in spec.rows])
+    shapes = lay_out(chain, skeleton, radii, length)
     links = tuple(
-        _link(row, joint, own, i)
+        _link(row, joint, own, skeleton.leaving(i), i)
         for i, (row, joint, own) in enumerate(zip(spec.rows, chain.joints, shapes[1:], strict=True), start=1)
     )
     base = LinkModel(
@@ -98,7 +100,7 @@ def build_model(spec: SpecLike) -> RobotModel:
     joints = []
     for i, (row, joint, position) in enumerate(zip(spec.rows, chain.joints, ranges, strict=True)):
         inertia = next(seen) if row.type.moves else 0.0
-        limits, assumed = filled_limits(row, position, load_bound(i, chain, ranges, bodies, spec.gravity), inertia)
+        limits, assumed = filled_limits(row, position, load_bound(i, skeleton, bodies, spec.gravity), inertia)
         actuator = actuator_model(row.actuator, inertia + row.dynamics.armature)
         placed = {field.name: getattr(joint, field.name) for field in fields(Joint)}
         joints.append(JointModel(**placed, limits=limits, assumed=assumed, dynamics=row.dynamics, actuator=actuator))
@@ -109,7 +111,8 @@ def build_model(spec: SpecLike) -> RobotModel:
         links=links,
         joints=tuple(joints),
         excluded=excluded_pairs(chain, [base.name, *(link.name for link in links)], shapes, (zero, home)),
-        reach=reach_bound(chain, spec.rows),
+        reach=reach_bound(skeleton),
+        extent=frame_extent(chain, travels),
         home=home,
     )
 
@@ -142,28 +145,9 @@ def _numbers(path: str, value: object) -> Iterator[tuple[str, float]]:
                 yield from _numbers(f"{path}.{field.name}", getattr(value, field.name))
 
 
-def _shapes(spec: RobotSpec, chain: KinematicChain, ranges: Sequence[Range | None]) -> tuple[tuple[Shape, ...], ...]:
-    travels = [
-        _travel(joint, span) if joint.type is JointType.PRISMATIC and span is not None else (0.0, 0.0)
-        for joint, span in zip(chain.joints, ranges, strict=True)
-    ]
-    scale = link_scale(chain, travels)
-    n = len(spec.rows)
-    radii = [neat(SLENDERNESS * scale)]
-    for i, row in enumerate(spec.rows, start=1):
-        radii.append(row.link.radius or neat(SLENDERNESS * scale * (1.0 - TAPER * i / n)))
-    return lay_out(chain, travels, radii, scale)
-
-
-def _travel(joint: Joint, span: Range) -> Range:
-    """Return the lowest and highest displacement along the joint frame's +z, m."""
-    ends = (joint.sign * span[0], joint.sign * span[1])
-    return min(ends), max(ends)
-
-
-def _link(row: Row, joint: Joint, shapes: tuple[Shape, ...], i: int) -> LinkModel:
+def _link(row: Row, joint: Joint, shapes: tuple[Shape, ...], anchor: Array, i: int) -> LinkModel:
     name = f"link_{i}"
-    inertial, estimated = link_inertial(row.link, joint, shapes)
+    inertial, estimated = link_inertial(row.link, joint, shapes, anchor)
     return LinkModel(
         name=name,
         shapes=shapes,

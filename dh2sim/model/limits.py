@@ -7,8 +7,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
-from dh2sim.kinematics.chain import KinematicChain
+from dh2sim.kinematics.chain import Joint, KinematicChain
+from dh2sim.kinematics.skeleton import Skeleton, build_skeleton
 from dh2sim.model.mass import MassProperties
+from dh2sim.model.shapes import neat
 from dh2sim.robot.spec import JointType, Limits, Row
 from dh2sim.typing import Array
 
@@ -30,45 +32,61 @@ def clamped(value: float, allowed: Range | None) -> float:
     return value if allowed is None else min(max(value, allowed[0]), allowed[1])
 
 
-def reach_bound(chain: KinematicChain, rows: Sequence[Row]) -> float:
+def travels_of(chain: KinematicChain, rows: Sequence[Row]) -> list[Range]:
+    """Return the lowest and highest displacement along +z of every joint, m; (0, 0) of those that do not slide.
+
+    A slide without limits is assumed to move to either side as far as the rest of the robot reaches, or 1 m if that
+    is nothing.
+    """
+    given = [_displacements(joint, row.limits.position) for joint, row in zip(chain.joints, rows, strict=True)]
+    rest = reach_bound(build_skeleton(chain, [travel or (0.0, 0.0) for travel in given]))
+    assumed = neat(rest) if rest > NO_LENGTH else 1.0
+    return [travel or (-assumed, assumed) for travel in given]
+
+
+def _displacements(joint: Joint, span: Range | None) -> Range | None:
+    if joint.type is not JointType.PRISMATIC:
+        return 0.0, 0.0
+    if span is None:
+        return None
+    ends = (joint.sign * span[0], joint.sign * span[1])
+    return min(ends), max(ends)
+
+
+def reach_bound(skeleton: Skeleton) -> float:
+    """Return an upper bound, m, on the distance of tool0 from base_link's origin: the length of the arm, stretched.
+
+    DH frames do not count: a table may put them anywhere along parallel axes.
+    """
+    return skeleton.taut_length
+
+
+def frame_extent(chain: KinematicChain, travels: Sequence[Range]) -> float:
     """Return an upper bound, m, on the distance of any joint, DH frame or tool0 from base_link's origin.
 
-    The sum of all distances between neighbouring frames; a prismatic joint counts with its largest displacement.
+    Rounding errors of poses grow with it. It is more than the reach where a table puts its frames far away.
     """
-    free = sum(row.type is JointType.PRISMATIC and row.limits.position is None for row in rows)
-    return _limited_reach(chain, rows) + free * _assumed_travel(chain, rows)
-
-
-def _assumed_travel(chain: KinematicChain, rows: Sequence[Row]) -> float:
-    """How far, m, a prismatic joint without limits is assumed to move to either side.
-
-    It is what the rest of the robot reaches, or 1 m if that is nothing.
-    """
-    reach = _limited_reach(chain, rows)
-    return reach if reach > NO_LENGTH else 1.0
-
-
-def _limited_reach(chain: KinematicChain, rows: Sequence[Row]) -> float:
     lengths: list[float] = []  # from base_link to the joint at hand
     reached = [_length(chain.T_base_link_dh0[:3, 3])]
-    for joint, row in zip(chain.joints, rows, strict=True):
-        lengths.append(_length(joint.T_parent_joint[:3, 3]))
-        if row.type is JointType.PRISMATIC and row.limits.position is not None:
-            lengths.append(_greatest(row.limits.position))
+    for joint, travel in zip(chain.joints, travels, strict=True):
+        lengths += [_length(joint.T_parent_joint[:3, 3]), max(abs(travel[0]), abs(travel[1]))]
         # a DH frame may be farther out than the next joint, where conventions are mixed
         reached.append(math.fsum([*lengths, _length(joint.T_joint_dh[:3, 3])]))
     tool = [_length(chain.joints[-1].T_joint_dh[:3, 3]), _length(chain.T_dhn_tool0[:3, 3])]
     return max(*reached, math.fsum([*lengths, *tool]))
 
 
-def position_ranges(chain: KinematicChain, rows: Sequence[Row]) -> list[Range | None]:
+def position_ranges(rows: Sequence[Row], travels: Sequence[Range]) -> list[Range | None]:
     """Return the range of every row's coordinate, rad or m; None for continuous and fixed rows.
 
-    Assumed where the file gives none: ±π, and for prismatic joints ± what the rest of the robot reaches.
+    Assumed where the file gives none: ±π, and the travel of prismatic joints (see ``travels_of``), which is the same
+    to both sides.
     """
-    travel = _assumed_travel(chain, rows)
-    assumed = {JointType.REVOLUTE: (-math.pi, math.pi), JointType.PRISMATIC: (-travel, travel)}
-    return [row.limits.position or assumed[row.type] if row.type in assumed else None for row in rows]
+    assumed = {JointType.REVOLUTE: (-math.pi, math.pi)}
+    return [
+        row.limits.position or (travel if row.type is JointType.PRISMATIC else assumed.get(row.type))
+        for row, travel in zip(rows, travels, strict=True)
+    ]
 
 
 def filled_limits(row: Row, position: Range | None, load: float, inertia: float) -> tuple[Limits, tuple[str, ...]]:
@@ -98,37 +116,25 @@ def filled_limits(row: Row, position: Range | None, load: float, inertia: float)
     return filled, tuple(assumed) if row.type.moves else ()
 
 
-def load_bound(
-    i: int,
-    chain: KinematicChain,
-    ranges: Sequence[Range | None],
-    bodies: Sequence[MassProperties | None],
-    gravity: Array,
-) -> float:
+def load_bound(i: int, skeleton: Skeleton, bodies: Sequence[MassProperties | None], gravity: Array) -> float:
     """Return an upper bound of what gravity asks of joint ``i``, counted from 0, in any pose, N·m or N.
 
     Args:
         i: The joint.
-        chain: The chain, n rows.
-        ranges: Of the n coordinates, rad or m.
+        skeleton: Of the arm, n rows.
         bodies: Mass properties of the n links in their joint frames; None for a massless one.
         gravity: m/s² in base_link, shape (3,); where it is zero, the earth's counts.
     """
     g = _length(gravity) or 9.81
+    turns = skeleton.slides[i] is None
     terms, distance = [], 0.0
-    for joint, span, body in zip(chain.joints[i:], ranges[i:], bodies[i:], strict=True):
-        if joint is not chain.joints[i]:
-            distance += _length(joint.T_parent_joint[:3, 3])
-            if joint.type is JointType.PRISMATIC and span is not None:
-                distance += _greatest(span)
+    for k, body in enumerate(bodies[i:], start=i):
+        if k > i:
+            distance += skeleton.steps[k]
         if body is not None:
-            arm = distance + _length(body.com) if chain.joints[i].type.turns else 1.0
+            arm = distance + math.dist(body.com, skeleton.leaving(k + 1)) if turns else 1.0
             terms.append(body.mass * g * arm)
     return math.fsum(terms)
-
-
-def _greatest(span: Range) -> float:
-    return max(abs(span[0]), abs(span[1]))
 
 
 def _length(vector: Iterable[float]) -> float:

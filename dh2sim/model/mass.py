@@ -26,6 +26,8 @@ THIN = 1e-12
 """Share of its trace below which a moment of inertia is zero but for rounding."""
 THICKNESS = 1e-9
 """Share of its trace by which the inertia of a thin rod is made greater."""
+NOTHING = 1e-15
+"""Share of its trace below which an entry of a combined inertia is rounding: a zero lets MuJoCo keep its axes."""
 MIN_MASS = 1e-9
 """kg: estimates are no smaller."""
 MIN_INERTIA = 1e-14
@@ -74,6 +76,8 @@ def combine(parts: Iterable[MassProperties]) -> MassProperties:
         shift_inertia(part.inertia, part.mass, [float(part.com[i]) - com[i] for i in range(3)]) for part in parts
     ]
     inertia = [[math.fsum(float(tensor[i][j]) for tensor in moved) for j in range(3)] for i in range(3)]
+    least = NOTHING * (inertia[0][0] + inertia[1][1] + inertia[2][2])
+    inertia = [[0.0 if abs(inertia[i][j]) < least else inertia[i][j] for j in range(3)] for i in range(3)]
     return MassProperties(mass=mass, com=read_only(com), inertia=read_only(inertia))
 
 
@@ -160,7 +164,7 @@ def in_frame(T: Array, body: MassProperties) -> MassProperties:
 
 
 def link_inertial(
-    link: LinkSpec, joint: Joint, shapes: tuple[Shape, ...]
+    link: LinkSpec, joint: Joint, shapes: tuple[Shape, ...], anchor: Array
 ) -> tuple[MassProperties | None, tuple[str, ...]]:
     """Return the mass properties of a link; what the robot file gives wins over estimates from the shapes.
 
@@ -168,6 +172,7 @@ def link_inertial(
         link: As in the file; centre of mass and inertia in DH frame i.
         joint: The link's joint.
         shapes: Of the link, solid. A given mass scales their inertia, a given centre of mass moves it.
+        anchor: Where a link without shapes counts as a ball, in the joint frame, m, shape (3,).
 
     Returns:
         The properties in the joint frame, and which of 'mass', 'com' and 'inertia' were estimated; None for a link
@@ -176,7 +181,7 @@ def link_inertial(
     given = {"mass": link.mass, "com": link.com, "inertia": link.inertia}
     if not shapes and all(value is None for value in given.values()):
         return None, ()
-    estimate = _estimate(link, shapes)
+    estimate = _estimate(link, shapes, anchor)
     estimate = _of_mass(estimate, max(estimate.mass, MIN_MASS) if link.mass is None else link.mass)
     mass, com, inertia = estimate.mass, estimate.com, estimate.inertia
     in_dh = in_frame(
@@ -207,10 +212,10 @@ def _of_mass(body: MassProperties, mass: float) -> MassProperties:
     return replace(body, mass=mass, inertia=at_least(read_only(body.inertia * (mass / body.mass)), MIN_INERTIA))
 
 
-def _estimate(link: LinkSpec, shapes: tuple[Shape, ...]) -> MassProperties:
-    """Estimate from the shapes; a fixed link without any, but with a mass, counts as a small ball at its joint."""
+def _estimate(link: LinkSpec, shapes: tuple[Shape, ...], anchor: Array) -> MassProperties:
+    """Estimate from the shapes; a fixed link without any, but with a mass, counts as a small ball."""
     if shapes:
         return combine(of_shape(shape, link.density or ASSUMED_DENSITY) for shape in shapes)
     mass, r = link.mass or 1.0, link.radius or 0.01
     I = 2 / 5 * mass * r * r  # noqa: E741
-    return MassProperties(mass=mass, com=read_only([0, 0, 0]), inertia=read_only([[I, 0, 0], [0, I, 0], [0, 0, I]]))
+    return MassProperties(mass=mass, com=anchor, inertia=read_only([[I, 0, 0], [0, I, 0], [0, 0, I]]))

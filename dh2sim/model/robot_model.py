@@ -135,7 +135,9 @@ class RobotModel:
     excluded: tuple[ExcludedPair, ...]
     """Pairs of links that do not collide."""
     reach: float
-    """Upper bound of the distance from base_link's origin to any frame, m."""
+    """Upper bound of the distance from base_link's origin to tool0, m."""
+    extent: float
+    """The same to any joint or DH frame, which a table may put far from the arm, m; rounding errors grow with it."""
     home: Array
     """The configuration 'home', or zero moved inside the limits; rad or m, shape (m,)."""
 

@@ -98,3 +98,11 @@ def pose_with_z(origin: list[float], z: list[float]) -> Array:
 def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
     """Return the cross product of two vectors."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def neat(size: float) -> float:
+    """Round to three significant digits, which are enough for a size that was chosen.
+
+    By way of ten digits, so that sizes which differ by rounding alone do not end on both sides of a tie.
+    """
+    return float(f"{float(f'{size:.10g}'):.3g}")

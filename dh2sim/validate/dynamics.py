@@ -40,7 +40,7 @@ def check_inertias(engine: MujocoEngine, model: RobotModel) -> Check:
             continue
         errors += [
             (abs(found.mass - body.mass) / body.mass, link.name),
-            (float(np.max(np.abs(found.com - body.com))) / max(1.0, model.reach), link.name),
+            (float(np.max(np.abs(found.com - body.com))) / max(1.0, model.extent), link.name),
             (float(np.max(np.abs(found.inertia - body.inertia))) / float(np.trace(body.inertia)), link.name),
         ]
     worst, where = errors[int(np.argmax([error for error, _ in errors]))]  # a NaN is worse than any number

@@ -91,7 +91,7 @@ def check_poses(
     spec: RobotSpec,
     q: Array,
     tolerance: float,
-    reach: float,
+    extent: float,
     *,
     threads: int = 1,
     advance: Callable[[int], None] | None = None,
@@ -102,8 +102,8 @@ def check_poses(
         engine: The engine.
         spec: The robot, whose table is the reference.
         q: Joint vectors, rad and m, shape (N, n).
-        tolerance: Allowed angle, rad, and distance as a share of max(1 m, reach).
-        reach: m.
+        tolerance: Allowed angle, rad, and distance as a share of max(1 m, extent).
+        extent: Of the frames from base_link, m.
         threads: Number of chunks that are compared at once, 0 for one a processor; the engine must allow it.
         advance: Called after each chunk with the number of configurations in it.
 
@@ -112,7 +112,7 @@ def check_poses(
     """
     started = time.perf_counter()
     size = max(1, CHUNK_NUMBERS // (16 * len(engine.frames)))
-    scale = max(1.0, reach)
+    scale = max(1.0, extent)
 
     def compare(start: int) -> tuple[float, float, float, int, int]:
         part = q[start : start + size]
@@ -162,9 +162,9 @@ def _reference(spec: RobotSpec, q: Array, frames: Sequence[str]) -> Array:
 
 
 DIFFERENCE_STEP = 1e-5
-"""rad or m; rounding and truncation are then both about 1e-11 of the reach."""
+"""rad or m; rounding and truncation are then both about 1e-11 of the extent."""
 DIFFERENCE_TOLERANCE = 1e-8
-"""Of the Jacobian by differences; multiplied by the reach for its linear part."""
+"""Of the Jacobian by differences; multiplied by the extent for its linear part."""
 
 
 class JacobianEngine(Protocol):
@@ -207,7 +207,7 @@ def check_jacobian(
     reference: Array,
     q: Array,
     tolerance: float,
-    reach: float,
+    extent: float,
     joints: Sequence[str],
     *,
     differences: bool = False,
@@ -218,13 +218,13 @@ def check_jacobian(
         engine: The engine.
         reference: The Jacobians to compare with.
         q: Joint vectors, rad and m, shape (N, n).
-        tolerance: Allowed error of an angular entry, and of a linear one as a share of max(1 m, reach).
-        reach: m.
+        tolerance: Allowed error of an angular entry, and of a linear one as a share of max(1 m, extent).
+        extent: Of the frames from base_link, m.
         joints: Names of the n joints, for the report.
         differences: Whether the reference was computed by central differences.
     """
     error = np.abs(engine.jacobian(q) - reference)
-    error[:, :3] /= max(1.0, reach)
+    error[:, :3] /= max(1.0, extent)
     by_joint = error.max(axis=1)  # (N, n)
     worst, joint = divmod(int(np.argmax(by_joint)), len(joints))  # a NaN is worse than any number
     largest = float(by_joint[worst, joint])

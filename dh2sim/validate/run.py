@@ -104,9 +104,9 @@ def _validate(
     def poses(engine: Mover | YourdfpyEngine) -> list[Check]:
         quick = isinstance(engine, MujocoEngine)
         some, threads = (q, 0) if quick else (q[: slow_samples(len(q), len(model.joints))], 1)
-        return [check_poses(engine, model.spec, some, tolerance, model.reach, threads=threads, advance=advance)]
+        return [check_poses(engine, model.spec, some, tolerance, model.extent, threads=threads, advance=advance)]
 
-    checks = [check_poses(library, model.spec, q, tolerance, model.reach, threads=0, advance=advance)]
+    checks = [check_poses(library, model.spec, q, tolerance, model.extent, threads=0, advance=advance)]
     for engine in engines:
         checks += _checks_of(engine, Quantity.POSE, poses)
     if any(engine.name == "mujoco-mjcf" for engine in engines):
@@ -169,14 +169,14 @@ def _jacobians(
             table_jacobian(model.spec, q),
             q,
             DIFFERENCE_TOLERANCE,
-            model.reach,
+            model.extent,
             names,
             differences=True,
         )
     ]
     for engine in engines:
         checks += _checks_of(
-            engine, Quantity.JACOBIAN, lambda engine: [check_jacobian(engine, own, q, tolerance, model.reach, names)]
+            engine, Quantity.JACOBIAN, lambda engine: [check_jacobian(engine, own, q, tolerance, model.extent, names)]
         )
     return checks
 

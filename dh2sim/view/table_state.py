@@ -75,9 +75,9 @@ def read(text: str | bytes, source: Source) -> RobotModel | Invalid:
         return Invalid(messages={"": str(error)})
     except (OverflowError, ZeroDivisionError, ValueError):
         return Invalid(messages={"": "the numbers are too large to compute with"})
-    if not model.reach <= MAX_REACH:
+    if not model.extent <= MAX_REACH:
         return Invalid(
-            messages={"": f"the robot's reach is {model.reach:.3g} m; at most {MAX_REACH:g} m can be shown"}
+            messages={"": f"the robot's frames reach {model.extent:.3g} m; at most {MAX_REACH:g} m can be shown"}
         )
     return model
 

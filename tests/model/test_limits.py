@@ -12,7 +12,7 @@ from dh2sim.model.build import build_model
 from dh2sim.model.limits import ASSUMED_SLIDE_RATE, ASSUMED_TURN_RATE
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import BaseSpec, JointType, Limits, Pose, RobotSpec, Row
-from dh2sim.typing import read_only
+from dh2sim.typing import Array, read_only
 from tests.sample_robots import (
     CONTINUOUS,
     FIXED,
@@ -93,9 +93,8 @@ def test_home_is_zero_moved_inside_the_limits_where_the_file_has_none() -> None:
     np.testing.assert_array_equal(build_model(RobotSpec(name="r", rows=rows)).home, [0.2, 0.0, -0.1])
 
 
-def farthest(built: RobotModel, count: int) -> float:
+def farthest_frame(built: RobotModel, q: Array) -> float:
     """Greatest distance of any joint, DH frame or tool0 from base_link's origin."""
-    q = in_limits(built, count, seed=5)
     poses = [
         joint_poses(built.chain, q),
         table_frame_poses(built.spec, q),
@@ -105,23 +104,41 @@ def farthest(built: RobotModel, count: int) -> float:
     return float(np.linalg.norm(positions, axis=-1).max())
 
 
+def farthest_tool(built: RobotModel, q: Array) -> float:
+    """Greatest distance of tool0 from base_link's origin."""
+    return float(np.linalg.norm(table_tool_pose(built.spec, q)[:, :3, 3], axis=-1).max())
+
+
 @pytest.mark.parametrize("name", [*NAMES, "odd"])
 def test_nothing_is_farther_away_than_the_reach(name: str) -> None:
     built = model(name)
-    assert farthest(built, 500) <= built.reach * (1 + 1e-12)
+    q = in_limits(built, 500, seed=5)
+    assert farthest_tool(built, q) <= built.reach * (1 + 1e-12)
+    assert farthest_frame(built, q) <= built.extent * (1 + 1e-12)
 
 
 @settings(max_examples=60)
 @given(robot_specs(must_move=False))
 def test_nothing_of_any_robot_is_farther_away_than_its_reach(spec: RobotSpec) -> None:
     built = build_model(spec)
-    assert farthest(built, 50) <= built.reach * (1 + 1e-12) + 1e-15
+    q = in_limits(built, 50, seed=5)
+    rounding = 1e-14 * max(1.0, built.extent)
+    assert farthest_tool(built, q) <= built.reach + rounding
+    assert farthest_frame(built, q) <= built.extent + rounding
 
 
-def test_the_reach_counts_dh_frames_that_are_farther_out_than_their_neighbours() -> None:
+def test_the_extent_counts_dh_frames_that_are_farther_out_than_their_neighbours() -> None:
     out = Row(name="out", type=REVOLUTE, convention=STANDARD, a=1.0)
     back = Row(name="back", type=REVOLUTE, convention=MODIFIED, a=-1.0)
-    assert build_model(RobotSpec(name="r", rows=(out, back))).reach == 1.0
+    assert build_model(RobotSpec(name="r", rows=(out, back))).extent == 1.0
     base = BaseSpec(pose=Pose(xyz=read_only([0, 0, 2.0])))
     down = Row(name="down", type=REVOLUTE, convention=STANDARD, d=-2.0)
-    assert build_model(RobotSpec(name="r", rows=(down,), base=base)).reach == 2.0
+    assert build_model(RobotSpec(name="r", rows=(down,), base=base)).extent == 2.0
+
+
+def test_the_reach_counts_no_frames_that_are_away_from_the_arm() -> None:
+    up = Row(name="up", type=REVOLUTE, convention=STANDARD, a=0.3, d=500.0)
+    down = Row(name="down", type=REVOLUTE, convention=STANDARD, a=0.2, d=-500.0)
+    built = build_model(RobotSpec(name="r", rows=(up, down)))
+    assert built.reach == 0.5
+    assert built.extent > 1000.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -64,7 +65,7 @@ def test_a_base_that_floats_weighs_what_its_shapes_do(name: str) -> None:
     base = compiled.body("base_link")
     assert base.mass[0] == heavy.base.inertial.mass > 0.0
     # MuJoCo computes the mass of shapes itself, given their density instead
-    plain = to_mjcf(model(name)).replace('mass="0.0"', 'density="1000"')
+    plain = re.sub(r'(<geom [^>]*)mass="0.0"', r'\1density="1000"', to_mjcf(model(name)))
     weighed = mujoco.MjModel.from_xml_string(plain)
     geoms = [i for i in range(weighed.ngeom) if weighed.geom_bodyid[i] == weighed.body("base_link").id]
     assert geoms
