@@ -11,6 +11,7 @@ import pytest
 
 from dh2sim import Robot, build_chain, forward_kinematics
 from dh2sim.typing import Array
+from scripts.real_arms.packages import EXAMPLES, PYBULLET, Package, installed
 from tests.sample_robots import ROBOTS_DIR, robot
 
 from .makers import ARMS, Described
@@ -19,6 +20,17 @@ from .samples import random_configurations
 pin: Any = pytest.importorskip(
     "pinocchio", reason="the makers' descriptions are computed by pinocchio (pip install pin)"
 )
+
+ROUNDED = 3e-5
+"""By which poses may differ from files that have 1.5708 for π/2."""
+
+URDFS = [
+    ("franka_panda", EXAMPLES, "panda_description/urdf/panda.urdf", "panda_link0", "panda_link8", 0.0, 1e-9),
+    ("kuka_iiwa14", PYBULLET, "kuka_iiwa/model.urdf", "lbr_iiwa_link_0", "lbr_iiwa_link_7", 0.045, 1e-9),
+    ("so101", EXAMPLES, "so_arm_description/urdf/so101.urdf", "base_link", "gripper_frame_link", 0.0, ROUNDED),
+    ("xarm7", EXAMPLES, "xarm_description/urdf/xarm7.urdf", "link_base", "link7", 0.0, ROUNDED),
+]
+"""Robot, package, file, base, tip, where tool0 is along the tip's z (m), tolerance (m and entries of a rotation)."""
 
 WEIGHED = [name for name, arm in ARMS.items() if arm.weighed]
 
@@ -58,3 +70,19 @@ def test_mass_matrix_and_gravity_torques_are_those_of_the_makers_inertials(name:
 @pytest.mark.parametrize("name", WEIGHED)
 def test_no_mass_of_a_described_arm_is_estimated(name: str) -> None:
     assert not Robot.load(ROBOTS_DIR / f"{name}.yaml").model.estimates
+
+
+@pytest.mark.parametrize(("name", "package", "file", "base", "tip", "along", "tolerance"), URDFS)
+def test_tool_is_where_a_urdf_of_others_has_it(
+    name: str, package: Package, file: str, base: str, tip: str, along: float, tolerance: float
+) -> None:
+    root = installed(package)
+    if root is None:
+        pytest.skip(f"{package.name} {package.version} is not installed")
+    model = pin.buildModelFromUrdf(str(root / file))
+    data, T_tip_tool = model.createData(), pin.SE3(np.eye(3), np.array([0.0, 0.0, along]))
+    for q in _configurations(name):
+        pin.framesForwardKinematics(model, data, np.concatenate([q, np.zeros(model.nq - len(q))]))
+        T_base_tip = data.oMf[model.getFrameId(base)].inverse() * data.oMf[model.getFrameId(tip)]
+        tool = forward_kinematics(build_chain(robot(name)), q)
+        np.testing.assert_allclose(tool, (T_base_tip * T_tip_tool).homogeneous, rtol=0, atol=tolerance)
