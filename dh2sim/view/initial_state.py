@@ -112,7 +112,15 @@ def state_of(model: RobotModel, text: str, source: Source) -> ViewState:
         folder=source.folder,
         table=table_state_of(text, model.spec),
         q=configurations(model)["home"],
+        selected_row=telling_row(model.spec),
     )
+
+
+def telling_row(spec: RobotSpec) -> int:
+    """Return the row, from 0, that shows most of what a row is: the first with the fewest zeros."""
+    zeros = [sum(value == 0.0 for value in (row.a, row.alpha, row.beta, row.d, row.theta)) for row in spec.rows]
+    moving = [row.type.moves for row in spec.rows]
+    return min(range(len(zeros)), key=lambda row: (not moving[row], zeros[row]))
 
 
 def is_same_file(state: ViewState, other: ViewState) -> bool:

@@ -90,6 +90,9 @@ def test_fields_are_labelled_for_the_convention_of_the_row(speaker: Speaker) -> 
     served, _say = speaker
     assert fields(served, 0) == ["a₀", "α₀", "d₁", "θ₁", "β₁"]
     assert fields(served, 1) == ["a₂", "α₂", "d₂", "θ₂", "β₂"]
+    assert served.state.selected_row == 1, "the first row with the fewest zeros"
+    set_value(speaker, "Row", "1: joint_1")
+    wait_until(lambda: "convention₁" in widgets(served), "its convention")
     set_value(speaker, "convention₁", "hayati")
     wait_until(lambda: fields(served, 0) == ["a₁", "α₁", "d₁", "θ₁", "β₁"], "the new convention")
     set_value(speaker, "Row", "2: joint_2")

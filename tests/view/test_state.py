@@ -123,6 +123,11 @@ def test_a_page_starts_at_home() -> None:
     assert STANFORD.q == tuple(load_robot("stanford").configurations["home"].tolist())
 
 
+@pytest.mark.parametrize(("robot", "row"), [("stanford", 0), ("puma560", 3), ("planar_2r", 0)])
+def test_the_row_that_is_explained_at_first_has_the_fewest_zeros(robot: str, row: int) -> None:
+    assert open_state(load_robot(robot)).selected_row == row
+
+
 def test_the_robot_file_is_shown_as_it_was_written() -> None:
     assert STANFORD.text == load_robot("stanford").source_file.text  # type: ignore[union-attr]
     assert STANFORD.table.rows[0].cells == ("0", "-90", "d1", "0", "0")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from dh2sim.robot.spec import AngleUnit, Convention
 from dh2sim.view.events import EditCell, SelectRow
+from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click
 from dh2sim.view.scene.annotations import LETTERS, Quantity, is_indexed_before, subscript, symbol
 from dh2sim.view.state import TableRow, ViewState
@@ -21,8 +22,7 @@ if TYPE_CHECKING:
 ROWS_SHOWN: Final = 12
 """At a time; longer tables are shown in parts."""
 _NAME: Final = "cells"
-_GRID: Final = f'div:has(> div > [data-dh2sim="{_NAME}"])'
-"""Selects what holds the fields."""
+_GRID: Final = markup.holder(_NAME)
 _HIDDEN: Final = (
     "position:absolute!important;width:1px!important;height:1px;padding:0!important;overflow:hidden;"
     "clip-path:inset(50%)"
@@ -55,7 +55,7 @@ class CellGrid:
         self._cells: dict[tuple[int, Quantity], Bound[str]] = {}
         self._conventions: dict[int, Convention] = {}
         with self._folder:
-            self._style = gui.add_html(_named(style_of(state)))
+            self._style = gui.add_html(style_of(state))
             self._heads = [gui.add_html(head) for head in heads_of(state)]
             for row in rows_shown(state):
                 on_click(gui.add_button(str(row + 1)), send, partial(SelectRow, row=row))
@@ -68,7 +68,7 @@ class CellGrid:
 
     def show(self, state: ViewState) -> None:
         """Show a state with the same identity."""
-        self._style.content = _named(style_of(state))
+        self._style.content = style_of(state)
         for head, content in zip(self._heads, heads_of(state), strict=True):
             head.content = content
         for (row, quantity), cell in self._cells.items():
@@ -133,7 +133,7 @@ def heads_of(state: ViewState) -> list[str]:
 
 
 def style_of(state: ViewState) -> str:
-    """Return the style sheet of the grid.
+    """Return the style sheet of the grid, HTML.
 
     It arranges the fields, hides their labels, which screen readers read, puts each joint variable before its offset,
     and marks the selected row and cells with errors.
@@ -158,7 +158,7 @@ def style_of(state: ViewState) -> str:
                 rules[f"{cell}>div::before"] = f'content:"{variable}+";{_VARIABLE}'
             if state.table.error(row, quantity.value):
                 rules[f"{cell} input"] = _ERROR
-    return "".join(f"{selector}{{{rule}}}" for selector, rule in rules.items())
+    return markup.style(rules, name=_NAME)
 
 
 def variable_of(state: ViewState, row: int, quantity: Quantity) -> str:
@@ -168,7 +168,3 @@ def variable_of(state: ViewState, row: int, quantity: Quantity) -> str:
     if not kind.moves or quantity is not moved:
         return ""
     return f"{'−' if state.spec.rows[row].flip else ''}q{subscript(row + 1)}"
-
-
-def _named(style: str) -> str:
-    return f'<div data-dh2sim="{_NAME}"><style>{style}</style></div>'

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 _CELL = "padding:0.1em 0.4em;white-space:nowrap"
@@ -48,6 +48,17 @@ def banner(content: str, *, error: bool = False, name: str = "") -> str:
         f"overflow:auto;background:#fff;border:1px solid #d5dae1;border-left:4px solid {border};border-radius:4px"
     )
     return f'<div style="{style}">{note(content, error=error, name=name)}</div>'
+
+
+def style(rules: Mapping[str, str], *, name: str) -> str:
+    """Return a style sheet by selectors, in an element that ``holder`` finds."""
+    sheet = "".join(f"{selector}{{{rule}}}" for selector, rule in rules.items())
+    return f'<div data-dh2sim="{escape(name)}"><style>{sheet}</style></div>'
+
+
+def holder(name: str) -> str:
+    """Return the selector of the container of widgets that holds the style sheet of a name."""
+    return f'div:has(>div>[data-dh2sim="{name}"])'
 
 
 def lines(pairs: Iterable[tuple[str, str]], *, name: str = "") -> str:

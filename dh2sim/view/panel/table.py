@@ -30,6 +30,12 @@ from dh2sim.view.state import CONVENTION, CellError, Part, TableState, ViewState
 if TYPE_CHECKING:
     import viser
 
+_PARAMETERS: Final = "parameters"
+_TWO_COLUMNS: Final = {
+    markup.holder(_PARAMETERS): "display:grid;grid-template-columns:1fr 1fr",
+    f"{markup.holder(_PARAMETERS)}>div:has(>[data-dh2sim])": "display:none",
+    f"{markup.holder(_PARAMETERS)}>div>div>div:has(label)": "width:auto!important;min-width:2.5em",
+}
 _PLAY: Final = "Play the row's steps"
 _PRODUCTS: Final = {
     Convention.STANDARD: "standard: Rz(θ) Tz(d) Tx(a) Rx(α)",
@@ -50,6 +56,9 @@ class TableTab:
         self._shown_slow: object = None
         self._cells = CellGrid(self._gui, send, state)
         self._notes = self._gui.add_html("")
+        self._parameters = ParameterFields(self._gui, send, state)
+        self._undo = self._gui.add_button("Undo", disabled=True, hint="Undoes the last edit of the table")
+        on_click(self._undo, send, Undo)
         self._rows = _names(state)
         chooser = self._gui.add_dropdown("Row", self._rows, hint="The row that is explained in the scene")
         self._chooser = bind(chooser, send, self._selected)
@@ -60,9 +69,6 @@ class TableTab:
             lambda on: Show(part=Part.ANNOTATIONS, on=on),
         )
         self._matrix = self._gui.add_html("")
-        self._undo = self._gui.add_button("Undo", disabled=True, hint="Undoes the last edit of the table")
-        on_click(self._undo, send, Undo)
-        self._parameters = ParameterFields(self._gui, send, state)
         with self._gui.add_folder("Whole table", expand_by_default=False):
             self._add_whole(state)
 
@@ -193,6 +199,7 @@ class ParameterFields:
         self._names = _parameters(state)
         self._folder = gui.add_folder("Parameters", order=order, visible=bool(state.table.parameters))
         with self._folder:
+            gui.add_html(markup.style(_TWO_COLUMNS, name=_PARAMETERS))
             self._fields = {
                 name: bind(gui.add_text(name, text), send, partial(_edit_parameter, name))
                 for name, text in state.table.parameters.items()
