@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from dh2sim.formats.table.grid import DELIMITER, Cells, Grid
+from dh2sim.formats.table.grid import DELIMITER, MAX_COLUMNS, MAX_ROWS, Cells, Grid
 from dh2sim.formats.table.headers import UNIT, are_headings, read_heading, variable_in
 from dh2sim.formats.table.notation import plain
 from dh2sim.messages import shown
 from dh2sim.robot.spec import Convention
 
 _UNIT_CELL: Final = re.compile(rf"[\[({{<]?\s*(?:in\s+)?({UNIT})\.?\s*[\])}}>]?", re.IGNORECASE)
-_NO_UNIT: Final = re.compile(r"[\[({<]?\s*[-–—/1]?\s*[\])}>]?")
+_NO_UNIT: Final = re.compile(r"[\[({<]?\s*(?:[-–—/1]|units?)?\s*[\])}>]?", re.IGNORECASE)
 _NUMERIC: Final = re.compile(rf"[-+(]*(?:[\d.,]|pi\b)[-+*/().,\deEpi\s]*(?:{UNIT})?\.?")
 
 
@@ -88,9 +88,28 @@ def make_table(header: Cells, rows: Sequence[Cells], grid: Grid) -> Table:
     while rows and len(rows[0]) == len(header) and (merged := _merged(header, rows[0])):
         header, rows = merged, rows[1:]
     notes: list[str] = []
-    if delimited or grid.markdown:
+    if delimited or grid.filled:
         rows = [_fitted(row, len(header), number, notes) for number, row in enumerate(rows, start=1)]
     return Table(header=header, rows=tuple(rows), grid=grid, notes=tuple(notes))
+
+
+def transposed(grid: Grid) -> Table | None:
+    """Return the table of a grid whose rows are the parameters and whose columns the joints; None for another."""
+    rows = [row for row in grid.rows if not all(DELIMITER.fullmatch(cell.text) for cell in row)]
+    width = max((len(row) for row in rows), default=0)
+    rows = [row for row in rows if len(row) > 1][:MAX_COLUMNS]
+    first = tuple(row[0] for row in rows)
+    if width < 2 or width > MAX_ROWS + 1 or not are_headings(first):
+        return None
+    even = [row if len(row) == width else (*row, *[replace(row[-1], text="")] * (width - len(row))) for row in rows]
+    columns = tuple(zip(*even, strict=True))
+    table = make_table(columns[0], columns[1:], replace(grid, filled=False))
+    note = "every row was read as a parameter, and every column as a joint"
+    short = next((row[0] for row in rows if len(row) < width), None)
+    lacking = (
+        () if short is None else (f"{shown(short.text)} has fewer values than others: the rest was read as empty",)
+    )
+    return replace(table, extent=grid.lines, notes=(*table.notes, note, *lacking))
 
 
 def _merged(header: Cells, row: Cells) -> Cells | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import itertools
 import re
 from collections.abc import Iterator, Sequence
@@ -48,8 +49,8 @@ class Grid:
     rows: tuple[Cells, ...] = field(repr=False)
     separator: str
     """``|``, ``,``, ``;``, a tab or a space."""
-    markdown: bool = False
-    """Whether a line of dashes as in Markdown is under the first row."""
+    filled: bool = False
+    """Whether rows may be shorter than the headings, as in Markdown, LaTeX and HTML."""
     problems: tuple[tuple[int, int, str], ...] = ()
     """Line, column and what is wrong with a line, such as a quote that is never closed."""
 
@@ -57,6 +58,23 @@ class Grid:
     def lines(self) -> range:
         """The lines from the first row to the last."""
         return range(self.rows[0][0].line, self.rows[-1][0].line + 1)
+
+
+class TextPlaces:
+    """Lines and columns of the offsets in a text whose lines are joined by line feeds."""
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        """Find where the lines start."""
+        self._starts = [0, *itertools.accumulate(len(line) + 1 for line in lines)]
+
+    def offset(self, index: int) -> int:
+        """Return where the line of an index, from 0, starts."""
+        return self._starts[min(index, len(self._starts) - 1)]
+
+    def at(self, offset: int) -> tuple[int, int]:
+        """Return line and column of an offset, from 1."""
+        line = max(bisect.bisect_right(self._starts, offset, hi=len(self._starts) - 1), 1)
+        return line, offset - self._starts[line - 1] + 1
 
 
 def pipe_grids(lines: Sequence[str]) -> Iterator[Grid]:
@@ -72,7 +90,7 @@ def pipe_grids(lines: Sequence[str]) -> Iterator[Grid]:
         if cells and not _is_pose_row(cells):
             rows.append(cells)
         elif not ruled and rows:
-            yield Grid(rows=tuple(rows), separator="|", markdown=markdown)
+            yield Grid(rows=tuple(rows), separator="|", filled=markdown)
             rows, markdown = [], False
 
 

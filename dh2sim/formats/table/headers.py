@@ -67,7 +67,7 @@ _NAMES: Final = {
     Quantity.TYPE: "type|joint type|jointtype|sigma|kind|r/p|rp|p/r",
     Quantity.NAME: "name|joint name|link name|jointname|joint names",
     Quantity.JOINT: "joint|joints|joint no|joint number|joint id|link|links|link no|link number|no|nr|num|number|#|"
-    "axis|frame|row|idx|index|id",
+    "axis|frame|row|idx|index|id|parameter|parameters|dh parameter|dh parameters",
     Quantity.LOWER: "min|lower|qmin|q min|q-|lower limit|min limit|limit min|limit lower|theta min|thetamin|"
     "joint min|lower bound|minimum|min angle|qlow",
     Quantity.UPPER: "max|upper|qmax|q max|q+|upper limit|max limit|limit max|limit upper|theta max|thetamax|"

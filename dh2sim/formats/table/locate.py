@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePath
 from typing import Final
 
-from dh2sim.formats.table.dh_table import Located, Table, make_table
+from dh2sim.formats.table.dh_table import Located, Table, make_table, transposed
 from dh2sim.formats.table.grid import (
     MAX_COLUMNS,
     Grid,
@@ -16,11 +17,15 @@ from dh2sim.formats.table.grid import (
     split,
 )
 from dh2sim.formats.table.headers import are_headings, parameters_in
+from dh2sim.formats.table.html_tables import html_grids
+from dh2sim.formats.table.latex_tables import latex_grids
 from dh2sim.formats.table.scripts import script_tables
 
 _SEPARATED: Final = (".csv", ".tsv", ".tab")
 _MAX_HEADING_LINES: Final = 2000
 """Lines that are searched for the headings of a table between separators."""
+_MAX_GRIDS: Final = 500
+"""Tables of a text that are looked at."""
 _MAX_CANDIDATES: Final = 20
 """Lines that may be headings of a table between separators, and are looked at."""
 
@@ -34,7 +39,7 @@ def locate(lines: Sequence[str], file: str) -> Located:
     """
     pipes = tuple(pipe_grids(lines))
     scripts, problems = script_tables(lines, file)
-    marked = [*_between_pipes(pipes), *scripts]
+    marked = [*_in_grids(pipes), *_in_grids(latex_grids(lines)), *_in_grids(html_grids(lines)), *scripts]
     taken = {number for table in marked for number in table.lines}
     separated = list(_between_separators(lines, taken))
     even = [table for table in separated if _is_even(table)]
@@ -48,12 +53,15 @@ def locate(lines: Sequence[str], file: str) -> Located:
     return Located(tables=(*found, *alike), pipes=pipes, problems=tuple(problems))
 
 
-def _between_pipes(pipes: Sequence[Grid]) -> Iterator[Table]:
-    for grid in pipes:
+def _in_grids(grids: Iterable[Grid]) -> Iterator[Table]:
+    for grid in itertools.islice(grids, _MAX_GRIDS):
         for index, row in enumerate(grid.rows[:5]):
             if are_headings(row[:MAX_COLUMNS]):
                 yield make_table(row, grid.rows[index + 1 :], grid)
                 break
+        else:
+            if (table := transposed(grid)) is not None:
+                yield table
 
 
 def _between_separators(lines: Sequence[str], taken: set[int]) -> Iterator[Table]:

@@ -41,6 +41,14 @@ _HTML: Final[tuple[_Change, ...]] = (
 )
 _LATEX: Final[tuple[_Change, ...]] = (
     (re.compile(r"\$|\\[()\[\]]"), ""),
+    (re.compile(r"~"), " "),
+    (re.compile(r"\\ang\s*\{([^{}]*)\}"), r"\1°"),
+    (re.compile(r"\\milli\s*\\met(?:re|er)\s*|\\mm(?![A-Za-z])"), "mm"),
+    (re.compile(r"\\centi\s*\\met(?:re|er)\s*|\\cm(?![A-Za-z])"), "cm"),
+    (re.compile(r"\\met(?:re|er)(?![A-Za-z])"), "m"),
+    (re.compile(r"\\radians?(?![A-Za-z])"), "rad"),
+    (re.compile(r"\\(?:SI|qty)\s*\{([^{}]*)\}\s*\{([^{}]*)\}"), r"\1 \2"),
+    (re.compile(r"\\(?:si|unit|num|ensuremath|bm|boldsymbol|mathsf|emph|textsuperscript)(?![A-Za-z])"), ""),
     (re.compile(r"\\([_*|#%&])"), r"\1"),
     (re.compile(r"\\(?:mathrm|mathbf|mathit|textbf|textit|text|operatorname|rm|bf)(?![A-Za-z])"), ""),
     (re.compile(r"\\(?:left|right|quad|qquad|[,;:! ])(?![A-Za-z])|\\[,;:! ]"), " "),

@@ -316,7 +316,7 @@ class _Reader:
         behind = range(table.lines.stop, self._around().stop)
         texts = [self._lines[number - 1] for number in behind]
         if (
-            table.grid.separator not in ("|", "")
+            table.grid.separator in (",", ";", "\t", " ")
             and self._printout is None
             and any(t.strip() and not is_comment(t) for t in texts)
         ):

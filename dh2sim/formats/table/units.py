@@ -24,6 +24,11 @@ _STATED: Final = re.compile(
     re.IGNORECASE,
 )
 
+_BOTH: Final = re.compile(
+    rf"(?:\b(?:in|units?)\b\s*:?\s*|[(\[])({_UNIT_WORDS})\s*(?:[,;/&]|and)\s*({_UNIT_WORDS})(?![a-z])", re.IGNORECASE
+)
+"""Such as ``(deg, mm)``."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kind:
@@ -73,6 +78,7 @@ LENGTHS: Final = Kind(
 def stated_units(lines: Sequence[str]) -> tuple[AngleUnit | None, LengthUnit | None]:
     """Return the units that words such as ``angles in degrees, lengths in mm`` name; None where they name several."""
     words = [found[1].casefold() for line in lines for found in _STATED.finditer(line[:1000])]
+    words += [word.casefold() for line in lines for found in _BOTH.finditer(line[:1000]) for word in found.groups()]
     angles = {ANGLE_WORDS[word] for word in words if word in ANGLE_WORDS}
     lengths = {LENGTH_WORDS[word] for word in words if word in LENGTH_WORDS}
     return (angles.pop() if len(angles) == 1 else None), (lengths.pop() if len(lengths) == 1 else None)
