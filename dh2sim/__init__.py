@@ -18,6 +18,7 @@ _HOMES = {
     "Limits": "robot.spec",
     "LinkSpec": "robot.spec",
     "Pose": "robot.spec",
+    "PayloadSpec": "robot.spec",
     "Prismatic": "robot_facade",
     "Revolute": "robot_facade",
     "Robot": "robot_facade",
@@ -28,6 +29,8 @@ _HOMES = {
     "Row": "robot.spec",
     "SerialChain": "kinematics.serial_chain",
     "SerialJoint": "kinematics.serial_chain",
+    "ShapeSpec": "robot.spec",
+    "ToolSpec": "robot.spec",
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
     "convert_robot": "importing.convert",
@@ -75,9 +78,12 @@ if TYPE_CHECKING:
     from dh2sim.robot.spec import Dynamics as Dynamics
     from dh2sim.robot.spec import Limits as Limits
     from dh2sim.robot.spec import LinkSpec as LinkSpec
+    from dh2sim.robot.spec import PayloadSpec as PayloadSpec
     from dh2sim.robot.spec import Pose as Pose
     from dh2sim.robot.spec import RobotSpec as RobotSpec
     from dh2sim.robot.spec import Row as Row
+    from dh2sim.robot.spec import ShapeSpec as ShapeSpec
+    from dh2sim.robot.spec import ToolSpec as ToolSpec
     from dh2sim.robot.write import robot_file_text as robot_file_text
     from dh2sim.robot_facade import Continuous as Continuous
     from dh2sim.robot_facade import Fixed as Fixed

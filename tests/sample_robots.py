@@ -13,7 +13,7 @@ import numpy as np
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import BaseSpec, Convention, JointType, Limits, LinkSpec, Pose, RobotSpec, Row
+from dh2sim.robot.spec import BaseSpec, Convention, JointType, Limits, LinkSpec, Pose, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 
 STANDARD, MODIFIED, HAYATI = Convention.STANDARD, Convention.MODIFIED, Convention.HAYATI
@@ -122,7 +122,7 @@ ODD_ROBOT = RobotSpec(
         Row(name="six", type=REVOLUTE, convention=MODIFIED, a=0.07, alpha=ODD, d=0.11, theta=-0.4),
     ),
     base=BaseSpec(pose=Pose(xyz=read_only([0.5, -0.4, 0.3]), rpy=read_only([0.2, -0.5, 1.3]))),
-    tool=Pose(xyz=read_only([0.02, 0.03, -0.1]), rpy=read_only([-0.8, 0.6, 2.4])),
+    tool=ToolSpec(xyz=read_only([0.02, 0.03, -0.1]), rpy=read_only([-0.8, 0.6, 2.4])),
     configurations=MappingProxyType({"home": read_only([0.4, 0.2, -2.5, 0.3, 1.1])}),
 )
 """Odd twists, both conventions, every joint type, flips, a base and a tool."""

@@ -7,13 +7,28 @@ from __future__ import annotations
 
 import math
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.robot.spec import BaseSpec, Convention, Dynamics, JointType, Limits, LinkSpec, Pose, RobotSpec, Row
+from dh2sim.robot.spec import (
+    BaseSpec,
+    Convention,
+    Dynamics,
+    JointType,
+    Limits,
+    LinkSpec,
+    PayloadSpec,
+    Pose,
+    RobotSpec,
+    Row,
+    ShapeSpec,
+    ShapeType,
+    ToolSpec,
+)
 from dh2sim.typing import Array, read_only
 
 ODD_TWIST = math.radians(37.3)
@@ -69,6 +84,45 @@ def link_specs(draw: DrawFn) -> LinkSpec:
 
 
 @st.composite
+def shape_specs(draw: DrawFn) -> ShapeSpec:
+    """Boxes, cylinders and balls anywhere near the frame that they are given in."""
+    kind, sizes = draw(st.sampled_from(ShapeType)), st.floats(0.01, 0.2)
+    pose = draw(poses)
+    match kind:
+        case ShapeType.BOX:
+            return ShapeSpec(type=kind, size=draw(vectors(sizes)), pose=pose)
+        case ShapeType.CYLINDER:
+            return ShapeSpec(type=kind, radius=draw(sizes), length=draw(sizes), pose=pose)
+        case _:
+            return ShapeSpec(type=kind, radius=draw(sizes), pose=pose)
+
+
+@st.composite
+def tool_specs(draw: DrawFn) -> ToolSpec:
+    """A frame tool0 alone; or with a tool of which the file says little or all."""
+    frame, masses = draw(poses), st.floats(0.1, 3.0)
+    known: dict[str, Any] = {}
+    match draw(st.sampled_from(["frame", "mass", "com", "inertia", "shape", "both"])):
+        case "mass":
+            known = {"mass": draw(masses)}
+        case "com":
+            known = {"mass": draw(masses), "com": draw(vectors(lengths))}
+        case "inertia":
+            known = {"mass": draw(masses), "com": draw(vectors(lengths)), "inertia": draw(inertias())}
+        case "shape":
+            known = {"shape": draw(shape_specs())}
+        case "both":
+            known = {"mass": draw(st.just(0.0) | masses), "shape": draw(shape_specs()), "color": (0.1, 0.2, 0.3, 1.0)}
+    return ToolSpec(xyz=frame.xyz, rpy=frame.rpy, **known)
+
+
+payloads: SearchStrategy[PayloadSpec] = st.builds(
+    PayloadSpec, mass=st.none() | st.just(0.0) | st.floats(0.1, 20.0), com=st.none() | vectors(lengths)
+)
+"""Payloads that assumed efforts and gains hold."""
+
+
+@st.composite
 def limits_for(draw: DrawFn, joint_type: JointType) -> Limits:
     """Limits that a joint of this type can have; a continuous one has none of position."""
     if not joint_type.moves:
@@ -117,7 +171,8 @@ def robot_specs(draw: DrawFn, *, max_rows: int = 12, must_move: bool = True) -> 
         rows=table,
         convention=draw(st.sampled_from(Convention)),
         base=BaseSpec(pose=draw(poses)),
-        tool=draw(poses),
+        tool=draw(tool_specs()),
+        payload=draw(payloads),
     )
     if draw(st.booleans()):
         return spec
@@ -127,6 +182,7 @@ def robot_specs(draw: DrawFn, *, max_rows: int = 12, must_move: bool = True) -> 
         convention=spec.convention,
         base=spec.base,
         tool=spec.tool,
+        payload=spec.payload,
         configurations=MappingProxyType({"home": draw(joint_vectors_for(spec))}),
     )
 

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TypeVar
 
 from dh2sim.kinematics.transforms import (
     compose,
@@ -21,7 +22,7 @@ from dh2sim.kinematics.transforms import (
     rpy_from_rotation,
 )
 from dh2sim.kinematics.trig import atan2, sin_cos
-from dh2sim.robot.spec import BaseSpec, Convention, LinkSpec, MeshSpec, Pose, RobotSpec, Row
+from dh2sim.robot.spec import BaseSpec, Convention, LinkSpec, MeshSpec, PayloadSpec, Pose, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 
 
@@ -153,14 +154,23 @@ def convert_rows(spec: RobotSpec, to: Convention) -> Conversion:
         _kept(row) if keep else _rewritten(row, link, to)
         for row, keep, link in zip(spec.rows, stays, links, strict=True)
     )
-    converted = replace(spec, rows=rows, convention=to, base=base, tool=tool, source_file=None)
+    T_new_old = _shift(spec.rows[-1], rows[-1])
+    converted = replace(
+        spec,
+        rows=rows,
+        convention=to,
+        base=base,
+        tool=_moved_tool(spec.tool, tool, T_new_old),
+        payload=_moved_payload(spec.payload, T_new_old),
+        source_file=None,
+    )
     notes = tuple(_note(spec.rows, i, to) for i, keep in enumerate(stays) if keep)
     return Conversion(spec=converted, notes=notes)
 
 
 def _cut_before_links(spec: RobotSpec, stays: Sequence[bool]) -> tuple[list[XPart], BaseSpec, Pose]:
     """The X before every Z, and what is left of base and tool; what is said of rows that stay does not count."""
-    rows, base, tool = spec.rows, spec.base, spec.tool
+    rows, base, tool = spec.rows, spec.base, spec.tool.pose
     links = [_head(rows[0])]
     for (before_it, row), keep in zip(pairwise(rows), stays[:-1], strict=True):
         links.append(_head(row) if keep else merged(_tail(before_it), _head(row)))
@@ -175,7 +185,7 @@ def _cut_before_links(spec: RobotSpec, stays: Sequence[bool]) -> tuple[list[XPar
 
 def _cut_behind_links(spec: RobotSpec, stays: Sequence[bool]) -> tuple[list[XPart], BaseSpec, Pose]:
     """The X behind every Z, and what is left of base and tool; what is said of rows that stay does not count."""
-    rows, base, tool = spec.rows, spec.base, spec.tool
+    rows, base, tool = spec.rows, spec.base, spec.tool.pose
     links = [*(merged(_tail(row), _head(behind_it)) for row, behind_it in pairwise(rows)), _tail(rows[-1])]
     of_tool = x_part_of(tool)
     if not stays[-1] and rows[-1].convention is Convention.MODIFIED and of_tool and not of_tool.is_identity:
@@ -224,20 +234,43 @@ def _kept(row: Row) -> Row:
 
 def _rewritten(row: Row, link: XPart, to: Convention) -> Row:
     new = replace(row, convention=to, a=link.a, alpha=link.alpha, beta=0.0)
-    # both DH frames follow the same Z, so they differ only in what comes after it: T_joint_new⁻¹ T_joint_old
-    return replace(new, link=_moved_link(row.link, merged(_tail(row), inverse(_tail(new)))))
+    return replace(new, link=_moved_body(row.link, _shift(row, new)))
 
 
-def _moved_link(link: LinkSpec, T_new_old: XPart) -> LinkSpec:
+def _shift(row: Row, new: Row) -> XPart:
+    """The old DH frame of a row in the new one: both follow the same Z, and differ only in what comes after it."""
+    return merged(_tail(row), inverse(_tail(new)))
+
+
+BodySpec = TypeVar("BodySpec", LinkSpec, ToolSpec)
+
+
+def _moved_body(body: BodySpec, T_new_old: XPart) -> BodySpec:
     if T_new_old.is_identity:
-        return link
+        return body
     T = T_new_old.transform
     return replace(
-        link,
-        com=None if link.com is None else read_only(move_point(T, link.com)),
-        inertia=None if link.inertia is None else rotate_tensor(T, link.inertia),
-        mesh=_moved_mesh(link.mesh, T_new_old),
+        body,
+        com=_moved_point(body.com, T_new_old),
+        inertia=None if body.inertia is None else rotate_tensor(T, body.inertia),
+        mesh=_moved_mesh(body.mesh, T_new_old),
     )
+
+
+def _moved_tool(tool: ToolSpec, pose: Pose, T_new_old: XPart) -> ToolSpec:
+    """Return the tool with tool0 at ``pose`` in the new DH frame n."""
+    shape = tool.shape if tool.shape is None else replace(tool.shape, pose=before(T_new_old, tool.shape.pose))
+    return replace(_moved_body(tool, T_new_old), xyz=pose.xyz, rpy=pose.rpy, shape=shape)
+
+
+def _moved_payload(payload: PayloadSpec, T_new_old: XPart) -> PayloadSpec:
+    return replace(payload, com=_moved_point(payload.com, T_new_old))
+
+
+def _moved_point(point: Array | None, T_new_old: XPart) -> Array | None:
+    if point is None or T_new_old.is_identity:
+        return point
+    return read_only(move_point(T_new_old.transform, point))
 
 
 def _moved_mesh(mesh: MeshSpec | None, T_new_old: XPart) -> MeshSpec | None:

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass, replace
 from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from dh2sim.errors import ModelError
-from dh2sim.kinematics.chain import HasChain, Joint, SpecLike, build_chain, spec_of
+from dh2sim.kinematics.chain import HasChain, Joint, KinematicChain, SpecLike, build_chain, spec_of
 from dh2sim.kinematics.skeleton import build_skeleton
+from dh2sim.kinematics.transforms import identity, pose_from_rpy
 from dh2sim.model.actuators import actuator_model, seen_inertias
 from dh2sim.model.collision_exclusions import excluded_pairs
 from dh2sim.model.limits import filled_limits, frame_extent, load_bound, position_ranges, reach_bound, travels_of
 from dh2sim.model.link_shapes import arm_length, lay_out, link_radii
-from dh2sim.model.mass import link_inertial
+from dh2sim.model.mass import MassProperties, ball_radius, link_inertial
 from dh2sim.model.meshes import load_mesh
-from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
-from dh2sim.model.shapes import Shape
-from dh2sim.robot.spec import RobotSpec, Row
-from dh2sim.typing import Array
+from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel, with_tool
+from dh2sim.model.shapes import Shape, given_shape, placed
+from dh2sim.robot.spec import LinkSpec, RobotSpec, Row
+from dh2sim.typing import Array, read_only
 
 LARGEST = 1e20
 """Size of the largest number that a model is built from, and one over the least mass, density or radius."""
@@ -31,6 +32,7 @@ PALETTE: tuple[Color, ...] = (
 """Colours of links whose file gives none, in turn."""
 BASE_COLOR: Color = (0.25, 0.28, 0.33, 1.0)
 JOINT_COLOR: Color = (0.20, 0.22, 0.26, 1.0)
+TOOL_COLOR: Color = (0.45, 0.48, 0.53, 1.0)
 
 
 class HasModel(HasChain, Protocol):
@@ -79,7 +81,8 @@ def build_model(spec: SpecLike) -> RobotModel:
     skeleton = build_skeleton(chain, travels)
     length = arm_length(skeleton)
     radii = link_radii(length, [row.link.radius for row in spec.rows])
-    shapes = lay_out(chain, skeleton, radii, length)
+    drawn = build_skeleton(replace(chain, T_dhn_tool0=_tool_start(spec, chain)), travels)
+    shapes = lay_out(chain, drawn, radii, length)
     links = tuple(
         _link(row, joint, own, skeleton.leaving(i), i)
         for i, (row, joint, own) in enumerate(zip(spec.rows, chain.joints, shapes[1:], strict=True), start=1)
@@ -93,9 +96,12 @@ def build_model(spec: SpecLike) -> RobotModel:
         inertial=None,
         estimated=(),
     )
-    bodies = [link.inertial for link in links]
+    tool = _tool(spec, chain)
+    bodies = with_tool([link.inertial for link in links], tool, chain.joints[-1])
     home = spec.named_configurations["home"]
     zero = np.zeros_like(home)
+    _check_carried(spec, bodies)
+    names = [base.name, *(link.name for link in links), *([] if tool is None else [tool.name])]
     seen = iter(seen_inertias(chain, bodies, home))
     joints = []
     for i, (row, joint, position) in enumerate(zip(spec.rows, chain.joints, ranges, strict=True)):
@@ -109,8 +115,9 @@ def build_model(spec: SpecLike) -> RobotModel:
         chain=chain,
         base=base,
         links=links,
+        tool=tool,
         joints=tuple(joints),
-        excluded=excluded_pairs(chain, [base.name, *(link.name for link in links)], shapes, (zero, home)),
+        excluded=excluded_pairs(chain, names, (*shapes, *_tool_shapes(tool, chain)), (zero, home)),
         reach=reach_bound(skeleton),
         extent=frame_extent(chain, travels),
         home=home,
@@ -123,13 +130,26 @@ def _check_sizes(spec: RobotSpec) -> None:
     Raises:
         ModelError: One is too large, or too small where it is divided by.
     """
-    parts = {f"joints[{index}]": row for index, row in enumerate(spec.rows)}
-    for part, value in {**parts, "base": spec.base.pose, "tool": spec.tool, "gravity": spec.gravity}.items():
+    parts: dict[str, object] = {f"joints[{index}]": row for index, row in enumerate(spec.rows)}
+    parts |= {"base": spec.base.pose, "tool": spec.tool, "payload": spec.payload, "gravity": spec.gravity}
+    for part, value in parts.items():
         for path, number in _numbers(part, value):
             divides = path.endswith(("mass", "density", "radius"))
-            if abs(number) > LARGEST or (divides and number < 1 / LARGEST):
+            if abs(number) > LARGEST or (divides and 0 < number < 1 / LARGEST):
                 bound = f"at most {LARGEST:g}" if abs(number) > LARGEST else f"at least {1 / LARGEST:g}"
                 raise ModelError(f"{spec.name}: {path} is {number:g}; a model needs numbers of {bound}")
+
+
+def _check_carried(spec: RobotSpec, bodies: Sequence[MassProperties | None]) -> None:
+    """Refuse a last joint that moves no mass; ``bodies`` are the links', the last with the tool.
+
+    Raises:
+        ModelError: It does; the robot file cannot tell where what is fixed to a link is estimated.
+    """
+    last = max((i for i, row in enumerate(spec.rows) if row.type.moves), default=None)
+    if last is not None and not any(bodies[last:]):
+        name = spec.rows[last].name
+        raise ModelError(f"{spec.name}: {name} moves nothing that has mass; give its link a mass, or the tool")
 
 
 def _numbers(path: str, value: object) -> Iterator[tuple[str, float]]:
@@ -145,9 +165,43 @@ def _numbers(path: str, value: object) -> Iterator[tuple[str, float]]:
                 yield from _numbers(f"{path}.{field.name}", getattr(value, field.name))
 
 
+def _tool_start(spec: RobotSpec, chain: KinematicChain) -> Array:
+    """Return the pose in DH frame n that the last link reaches to: tool0, or a tool that is drawn by itself."""
+    drawn = spec.tool.shape or spec.tool.mesh
+    return chain.T_dhn_tool0 if drawn is None else pose_from_rpy(drawn.pose.xyz, drawn.pose.rpy)
+
+
+def _tool_shapes(tool: LinkModel | None, chain: KinematicChain) -> list[tuple[Shape, ...]]:
+    """Return the shapes of the tool in the frame of the last joint, if there is a tool."""
+    return [] if tool is None else [tuple(placed(shape, chain.joints[-1].T_joint_dh) for shape in tool.shapes)]
+
+
+def _tool(spec: RobotSpec, chain: KinematicChain) -> LinkModel | None:
+    tool = spec.tool
+    if not tool.is_body:
+        return None
+    shapes = () if tool.shape is None else (given_shape(tool.shape),)
+    assumed = LinkSpec(mass=tool.mass, com=tool.com, inertia=tool.inertia)
+    if not shapes:  # a ball at tool0
+        mass = tool.mass or 0.0
+        com = read_only(chain.T_dhn_tool0[:3, 3]) if tool.com is None else tool.com
+        assumed = replace(assumed, mass=mass, com=com, radius=ball_radius(mass))
+    inertial, _ = link_inertial(assumed, identity(), shapes, read_only([0, 0, 0]))
+    estimated = tuple(name for name in ("mass", "com", "inertia") if inertial and getattr(tool, name) is None)
+    return LinkModel(
+        name="tool",
+        shapes=shapes,
+        color=tool.color or TOOL_COLOR,
+        joint_color=tool.color or TOOL_COLOR,
+        mesh=None if tool.mesh is None else load_mesh(tool.mesh, "tool"),
+        inertial=inertial,
+        estimated=estimated,
+    )
+
+
 def _link(row: Row, joint: Joint, shapes: tuple[Shape, ...], anchor: Array, i: int) -> LinkModel:
     name = f"link_{i}"
-    inertial, estimated = link_inertial(row.link, joint, shapes, anchor)
+    inertial, estimated = link_inertial(row.link, joint.T_joint_dh, shapes, anchor)
     return LinkModel(
         name=name,
         shapes=shapes,

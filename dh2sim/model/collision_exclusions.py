@@ -43,8 +43,8 @@ def excluded_pairs(
 
     Args:
         chain: The chain, n rows.
-        names: Of the n + 1 links, the base link's first.
-        shapes: Of the links, each in its link's frame.
+        names: Of the n + 1 links, the base link's first; then of what is fixed to the last one.
+        shapes: Of each, in its link's frame; in the last link's for what is fixed to it.
         configurations: Joint vectors (rad, m); links that touch in one of them do so by construction.
 
     Returns:
@@ -54,6 +54,7 @@ def excluded_pairs(
     group = [0]
     for joint in chain.joints:
         group.append(group[-1] + (1 if joint.type.moves else 0))
+    group += group[-1:] * (len(names) - len(group))
     touching = np.zeros((len(names), len(names)), dtype=bool)
     for q in configurations:
         touching |= _overlaps(chain, shapes, q)
@@ -72,6 +73,7 @@ def excluded_pairs(
 def _overlaps(chain: KinematicChain, shapes: Sequence[Sequence[Shape]], q: Array) -> np.ndarray:
     """Whether each pair of links overlaps at ``q``: booleans, shape (links, links)."""
     poses = [np.eye(4), *reference_joint_poses(chain, q)]
+    poses += poses[-1:] * (len(shapes) - len(poses))
     owner, starts, ends, radii = [], [], [], []
     for index, (T, own) in enumerate(zip(poses, shapes, strict=True)):
         for shape in own:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dh2sim.kinematics.chain import Joint
 from dh2sim.kinematics.transforms import move_point, rotate_tensor
 from dh2sim.model.shapes import Shape, ShapeKind
 from dh2sim.robot.parts import inertia_problem
@@ -46,14 +45,35 @@ class MassProperties:
     """About the centre of mass, along the frame's axes, kg·m², shape (3, 3)."""
 
 
+LIGHTEST = MassProperties(
+    mass=2e-14,
+    com=read_only([0, 0, 0]),
+    inertia=read_only([[2e-14, 0, 0], [0, 2e-14, 0], [0, 0, 2e-14]]),
+)
+"""What simulators are given for a link that moves and weighs nothing.
+
+MuJoCo refuses moving bodies of less than 1e-15 kg, and in a URDF inertias of less than 1e-14 kg·m².
+"""
+
+
 def of_shape(shape: Shape, density: float) -> MassProperties:
     """Return the mass properties of a solid shape in its link's frame; ``density`` in kg/m³.
 
     Cylinder: I_z = m r²/2, I_x = m (3 r² + l²)/12. The capsule adds two half balls of mass m_b = 2/3 π r³ ρ, whose
     centres of mass lie 3/8 r beyond the cylinder's ends: I_z += 2 · 2/5 m_b r²,
-    I_x += 2 m_b (2/5 r² + l²/4 + 3/8 l r). (Beer & Johnston, Vector Mechanics, tables of inertia; parallel axes.)
+    I_x += 2 m_b (2/5 r² + l²/4 + 3/8 l r). Ball: 2/5 m r². Box: I_x = m (y² + z²)/12.
+    (Beer & Johnston, Vector Mechanics, tables of inertia; parallel axes.)
     """
+    T = shape.T_link_shape
+    if shape.size is not None:
+        x, y, z = shape.size
+        mass = density * x * y * z
+        moments = [mass * (u * u + v * v) / 12 for u, v in ((y, z), (x, z), (x, y))]
+        own = read_only([[moments[i] if i == j else 0.0 for j in range(3)] for i in range(3)])
+        return MassProperties(mass=mass, com=read_only(T[:3, 3]), inertia=rotate_tensor(T, own))
     r, length = shape.radius, shape.length
+    if shape.kind is ShapeKind.SPHERE:
+        return replace(ball(density * 4 / 3 * math.pi * r * r * r, r), com=read_only(T[:3, 3]))
     mass = density * math.pi * r * r * length
     I_z = mass * r * r / 2
     I_x = mass * (3 * r * r + length * length) / 12
@@ -63,8 +83,18 @@ def of_shape(shape: Shape, density: float) -> MassProperties:
         I_x += 2 * half_ball * (2 / 5 * r * r + length * length / 4 + 3 / 8 * length * r)
         mass += 2 * half_ball
     own = read_only([[I_x, 0, 0], [0, I_x, 0], [0, 0, I_z]])
-    T = shape.T_link_shape
     return MassProperties(mass=mass, com=read_only(T[:3, 3]), inertia=rotate_tensor(T, own))
+
+
+def ball(mass: float, radius: float) -> MassProperties:
+    """Return a solid ball at the origin; kg, m."""
+    I = 2 / 5 * mass * radius * radius  # noqa: E741
+    return MassProperties(mass=mass, com=read_only([0, 0, 0]), inertia=read_only([[I, 0, 0], [0, I, 0], [0, 0, I]]))
+
+
+def ball_radius(mass: float) -> float:
+    """Return the radius, m, of a solid ball of the assumed density, to three digits; ``mass`` in kg."""
+    return float(f"{(3 * mass / (4 * math.pi * ASSUMED_DENSITY)) ** (1 / 3):.3g}")
 
 
 def combine(parts: Iterable[MassProperties]) -> MassProperties:
@@ -164,20 +194,22 @@ def in_frame(T: Array, body: MassProperties) -> MassProperties:
 
 
 def link_inertial(
-    link: LinkSpec, joint: Joint, shapes: tuple[Shape, ...], anchor: Array
+    link: LinkSpec, T_link_dh: Array, shapes: tuple[Shape, ...], anchor: Array
 ) -> tuple[MassProperties | None, tuple[str, ...]]:
     """Return the mass properties of a link; what the robot file gives wins over estimates from the shapes.
 
     Args:
         link: As in the file; centre of mass and inertia in DH frame i.
-        joint: The link's joint.
+        T_link_dh: Pose of DH frame i in the link, shape (4, 4).
         shapes: Of the link, solid. A given mass scales their inertia, a given centre of mass moves it.
         anchor: Where a link without shapes counts as a ball, in the joint frame, m, shape (3,).
 
     Returns:
-        The properties in the joint frame, and which of 'mass', 'com' and 'inertia' were estimated; None for a link
-        of which nothing is known.
+        The properties in the link's frame, and which of 'mass', 'com' and 'inertia' were estimated; None for a link
+        of mass 0, and for one of which nothing is known.
     """
+    if link.mass == 0.0:
+        return None, ()
     given = {"mass": link.mass, "com": link.com, "inertia": link.inertia}
     if not shapes and all(value is None for value in given.values()):
         return None, ()
@@ -185,7 +217,7 @@ def link_inertial(
     estimate = _of_mass(estimate, max(estimate.mass, MIN_MASS) if link.mass is None else link.mass)
     mass, com, inertia = estimate.mass, estimate.com, estimate.inertia
     in_dh = in_frame(
-        joint.T_joint_dh,
+        T_link_dh,
         MassProperties(
             mass=mass,
             com=read_only([0, 0, 0]) if link.com is None else link.com,
@@ -216,6 +248,4 @@ def _estimate(link: LinkSpec, shapes: tuple[Shape, ...], anchor: Array) -> MassP
     """Estimate from the shapes; a fixed link without any, but with a mass, counts as a small ball."""
     if shapes:
         return combine(of_shape(shape, link.density or ASSUMED_DENSITY) for shape in shapes)
-    mass, r = link.mass or 1.0, link.radius or 0.01
-    I = 2 / 5 * mass * r * r  # noqa: E741
-    return MassProperties(mass=mass, com=anchor, inertia=read_only([[I, 0, 0], [0, I, 0], [0, 0, I]]))
+    return replace(ball(link.mass or 1.0, link.radius or 0.01), com=anchor)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 from dh2sim.kinematics.chain import Joint, KinematicChain
+from dh2sim.kinematics.transforms import identity
 from dh2sim.model.actuators import ActuatorModel, gravity_loads
 from dh2sim.model.collision_exclusions import ExcludedPair
 from dh2sim.model.limits import Range, clamped
-from dh2sim.model.mass import MassProperties
+from dh2sim.model.mass import MassProperties, combine, in_frame
 from dh2sim.model.meshes import MeshAsset
 from dh2sim.model.shapes import Shape
 from dh2sim.robot.spec import ActuatorType, Dynamics, Limits, RobotSpec
@@ -55,7 +56,7 @@ class FilledIn:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinkModel:
-    """A link: what it looks like and weighs, in its joint-placed frame."""
+    """A link: what it looks like and weighs, in its joint-placed frame, or DH frame n for the tool."""
 
     name: str
     shapes: tuple[Shape, ...]
@@ -66,7 +67,7 @@ class LinkModel:
     mesh: MeshAsset | None
     """Shows the link instead of its shapes; placed from DH frame i."""
     inertial: MassProperties | None
-    """In the joint frame; None for a fixed link without shapes or mass, and for a base link that does not move."""
+    """In the link's frame; None for one that weighs nothing, and for a base link that does not move."""
     estimated: tuple[str, ...]
     """Which of 'mass', 'com' and 'inertia' were estimated from the shapes."""
 
@@ -130,6 +131,8 @@ class RobotModel:
     """base_link."""
     links: tuple[LinkModel, ...]
     """link_1 … link_n, one for every row."""
+    tool: LinkModel | None
+    """What the last link carries, in DH frame n; None without a tool besides the frame tool0."""
     joints: tuple[JointModel, ...]
     """One for every row."""
     excluded: tuple[ExcludedPair, ...]
@@ -147,9 +150,20 @@ class RobotModel:
         return self.spec.name
 
     @property
+    def moving_links(self) -> tuple[LinkModel, ...]:
+        """The links of the rows, and the tool where there is one."""
+        return self.links if self.tool is None else (*self.links, self.tool)
+
+    @property
     def all_links(self) -> tuple[LinkModel, ...]:
-        """The base link and the others, base first."""
-        return (self.base, *self.links)
+        """The base link, the links of the rows and the tool, base first."""
+        return (self.base, *self.moving_links)
+
+    @property
+    def T_link_dh(self) -> tuple[Array, ...]:
+        """Pose of the DH frame that carries its mesh in each of ``all_links``, shape (4, 4)."""
+        own = (self.chain.T_base_link_dh0, *(joint.T_joint_dh for joint in self.joints))
+        return own if self.tool is None else (*own, identity())
 
     @property
     def moving_joints(self) -> tuple[JointModel, ...]:
@@ -158,8 +172,8 @@ class RobotModel:
 
     @property
     def bodies(self) -> tuple[MassProperties | None, ...]:
-        """Mass properties of link_1 … link_n, each in its joint frame."""
-        return tuple(link.inertial for link in self.links)
+        """Mass properties of link_1 … link_n, each in its joint frame, the last with the tool."""
+        return with_tool([link.inertial for link in self.links], self.tool, self.joints[-1])
 
     @property
     def mass(self) -> float:
@@ -199,7 +213,7 @@ class RobotModel:
     @property
     def estimates(self) -> tuple[FilledIn, ...]:
         """What was estimated from the shapes; links of which the same was estimated together."""
-        found = ((link.name, link.estimated) for link in self.links)
+        found = ((link.name, link.estimated) for link in self.moving_links)
         return tuple(FilledIn(how=FilledInHow.ESTIMATED, what=what, where=names) for what, names in _grouped(found))
 
     @property
@@ -211,6 +225,17 @@ class RobotModel:
             FilledIn(how=FilledInHow.ASSUMED, what=what, where=names, everywhere=len(names) == n)
             for what, names in found
         )
+
+
+def with_tool(
+    bodies: Sequence[MassProperties | None], tool: LinkModel | None, last: Joint
+) -> tuple[MassProperties | None, ...]:
+    """Return the mass properties of the links, of which the last carries the tool; each in its joint frame."""
+    if tool is None or tool.inertial is None:
+        return tuple(bodies)
+    *others, link = bodies
+    carried = in_frame(last.T_joint_dh, tool.inertial)
+    return (*others, carried if link is None else combine([link, carried]))
 
 
 def _grouped(entries: Iterable[tuple[str, tuple[str, ...]]]) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
@@ -226,7 +251,8 @@ def _spans(names: Iterable[str]) -> str:
     """Return ``link_1 to link_3, link_5`` for link_1, link_2, link_3, link_5."""
     runs: list[list[str]] = []
     for name in names:
-        if runs and int(name.rsplit("_", 1)[1]) == int(runs[-1][-1].rsplit("_", 1)[1]) + 1:
+        number = name.rpartition("_")[2]
+        if runs and number.isdecimal() and runs[-1][-1] == f"link_{int(number) - 1}":
             runs[-1].append(name)
         else:
             runs.append([name])

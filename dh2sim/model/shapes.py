@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from dh2sim.kinematics.transforms import compose
+from dh2sim.kinematics.transforms import compose, pose_from_rpy
+from dh2sim.robot.spec import ShapeSpec
 from dh2sim.typing import Array, read_only
 
 
@@ -16,6 +17,8 @@ class ShapeKind(StrEnum):
 
     CYLINDER = "cylinder"
     CAPSULE = "capsule"
+    SPHERE = "sphere"
+    BOX = "box"
 
 
 class ShapePart(StrEnum):
@@ -32,11 +35,14 @@ class Shape:
     kind: ShapeKind
     part: ShapePart
     radius: float
-    """m, positive."""
+    """m, positive; of a box, that of the cylinder around it."""
     length: float
-    """Of the cylindrical part along z, m, positive; a capsule has half a ball more at each end."""
+    """Of the cylindrical part or the box along z, m, positive, 0 for a sphere; a capsule has half a ball more at each
+    end."""
     T_link_shape: Array = field(repr=False)
     """Pose of the shape's centre in the link's (joint-placed) frame, shape (4, 4)."""
+    size: tuple[float, float, float] | None = None
+    """Of a box along x, y and z, m."""
 
     @property
     def ends(self) -> tuple[Array, Array]:
@@ -66,13 +72,19 @@ def along_z(kind: ShapeKind, part: ShapePart, radius: float, start: float, end: 
 
 def placed(shape: Shape, T_link_frame: Array) -> Shape:
     """Return ``shape``, given in some frame, in the link in which that frame has pose ``T_link_frame``."""
-    return Shape(
-        kind=shape.kind,
-        part=shape.part,
-        radius=shape.radius,
-        length=shape.length,
-        T_link_shape=compose(T_link_frame, shape.T_link_shape),
-    )
+    return replace(shape, T_link_shape=compose(T_link_frame, shape.T_link_shape))
+
+
+def given_shape(spec: ShapeSpec) -> Shape:
+    """Return a shape that a robot file gives, in the frame that it is given in."""
+    T = pose_from_rpy(spec.pose.xyz, spec.pose.rpy)
+    part = ShapePart.LINK
+    if spec.size is not None:
+        x, y, z = (float(side) for side in spec.size)
+        around = 0.5 * math.sqrt(x * x + y * y)
+        return Shape(kind=ShapeKind.BOX, part=part, radius=around, length=z, T_link_shape=T, size=(x, y, z))
+    kind = ShapeKind.SPHERE if spec.length is None else ShapeKind.CYLINDER
+    return Shape(kind=kind, part=part, radius=spec.radius or 0.0, length=spec.length or 0.0, T_link_shape=T)
 
 
 def pose_with_z(origin: list[float], z: list[float]) -> Array:

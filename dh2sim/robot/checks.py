@@ -17,6 +17,8 @@ _SLACK: Final = 1e-12
 """By which a configuration may pass a limit, of the larger of the two limits' sizes."""
 _GAINS: Final = {"kp": ("position",), "kv": ("position", "velocity")}
 """The actuators that a gain is for."""
+_SIZES: Final = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
+"""The sizes that a shape has."""
 
 
 def default_name(index: int) -> str:
@@ -33,6 +35,8 @@ def check(robot: Tree, scope: Scope) -> None:
         _check_convention(row, ("joints", index), robot, scope)
     check_configurations(robot, rows, "joints", scope)
     check_actuators(robot, rows, "joints", scope)
+    _check_tool(robot.get("tool"), scope)
+    _check_masses(robot, rows, scope)
 
 
 def trees(tree: Any, key: str) -> list[Tree]:
@@ -161,3 +165,45 @@ def _check_gains(actuator: Any, loc: Loc, inherited: Any, scope: Scope) -> Any:
     if kind == "velocity" and actuator.get("kv") == 0.0:
         scope.report((*loc, "kv"), "must be greater than 0 for an actuator of type 'velocity', found 0")
     return kind
+
+
+def _check_tool(tool: Any, scope: Scope) -> None:
+    """A shape has the sizes of its type, and what has a centre of mass has a mass."""
+    if not isinstance(tool, dict):
+        return
+    shape = tool.get("shape")
+    if isinstance(shape, dict) and isinstance(kind := shape.get("type"), str):
+        for key in ("size", "radius", "length"):
+            if key in shape and key not in _SIZES[kind]:
+                message = f"a {kind} takes no '{key}'; its sizes: {listed(_SIZES[kind])}"
+                scope.report(("tool", "shape", key), message, at_key=True)
+            elif key not in shape and key in _SIZES[kind]:
+                scope.report(("tool", "shape"), f"missing key '{key}', of a {kind}")
+    if "shape" not in tool and "mass" not in tool:
+        for key in ("com", "inertia"):
+            if key in tool:
+                message = f"a tool that has a '{key}' needs a 'mass', or a 'shape' to estimate it from"
+                scope.report(("tool", key), message, at_key=True)
+
+
+def _check_masses(robot: Tree, rows: Sequence[Tree], scope: Scope) -> None:
+    """What weighs nothing has no centre of mass, and the last joint moves some mass."""
+    links = [_part(row, "link") for row in rows]
+    tool = _part(robot, "tool")
+    owners: list[tuple[Loc, Tree]] = [(("joints", index, "link"), link) for index, link in enumerate(links)]
+    for loc, owner in [*owners, (("tool",), tool)]:
+        for key in ("com", "inertia"):
+            if owner.get("mass") == 0 and key in owner:
+                scope.report((*loc, key), f"what has a mass of 0 has no '{key}'", at_key=True)
+    last = max((index for index, row in enumerate(rows) if row.get("type") not in (None, "fixed")), default=None)
+    if last is None or any(link.get("mass") != 0 for link in links[last:]):
+        return  # what is not given is estimated
+    if tool.get("mass", 0) == 0 and ("mass" in tool or "shape" not in tool):
+        message = f"{_name(rows, last)} would move nothing that has mass; 0 is for links between others"
+        scope.report(("joints", last, "link", "mass"), f"{message}, or before a tool that has a mass")
+
+
+def _part(tree: Tree, key: str) -> Tree:
+    """Return a part of a checked tree; an empty tree for one that is wrong or not given."""
+    part = tree.get(key)
+    return part if isinstance(part, dict) else {}

@@ -49,6 +49,8 @@ class Part(Kind):
     """Keys of files that are no fields."""
     list_is: str | None = field(default=None, kw_only=True)
     """The key that a list in place of the mapping is the value of."""
+    number_is: str | None = field(default=None, kw_only=True)
+    """The key that a number in place of the mapping is the value of."""
 
     @property
     def keys(self) -> Mapping[str, Kind]:
@@ -61,6 +63,8 @@ class Part(Kind):
         keys = self.keys if scope.in_file else _keys(self.of)
         if self.list_is and isinstance(value, list):
             value = {self.list_is: value}
+        if self.number_is and isinstance(value, int | float | str) and not isinstance(value, bool):
+            value = {self.number_is: value}
         if not isinstance(value, dict):
             expected = f"a mapping with the keys {listed(keys)}" if scope.in_file else _article(self.of)
             return scope.wrong(loc, f"expected {expected}, found {shown(value)}")
@@ -251,13 +255,18 @@ def plain_part(part: Any) -> dict[str, object]:
         default = defaults[name]
         if value is default or (type(value) is type(default) and value == default):
             continue
-        other = isinstance(kind, Part) and dataclasses.is_dataclass(value) and not isinstance(value, kind.of)
+        other = isinstance(kind, Part) and dataclasses.is_dataclass(value) and not _can_be(type(value), kind.of)
         inner = value if other else plain(value)  # a part of another kind is for the check to refuse
         if isinstance(kind, Part) and isinstance(inner, dict):
             tree |= inner if kind.inline else {kind.key or name: inner} if inner else {}
         else:
             tree[kind.key or name] = inner
     return tree
+
+
+def _can_be(given: type, part: type) -> bool:
+    """Whether a value of a class has the fields of a part: a Pose is a ToolSpec of which the rest is not given."""
+    return issubclass(given, part) or issubclass(part, given)
 
 
 def kept(old: Any, new: Any) -> Any:

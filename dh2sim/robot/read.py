@@ -167,7 +167,7 @@ def _plain(node: Node) -> object:
 
 def _locate_meshes(tree: Tree, places: Places) -> None:
     """Note in the meshes of a checked tree where the file names them, for later messages."""
-    owners: list[tuple[Loc, Tree]] = [(("base",), tree.get("base", {}))]
+    owners: list[tuple[Loc, Tree]] = [((key,), tree.get(key, {})) for key in ("base", "tool")]
     owners += [(("joints", index, "link"), row.get("link", {})) for index, row in enumerate(tree["joints"])]
     for loc, owner in owners:
         if "mesh" in owner:

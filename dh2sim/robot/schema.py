@@ -70,9 +70,9 @@ def _value(kind: Kind, definitions: dict[str, Any]) -> dict[str, Any]:
             if name not in definitions:
                 definitions[name] = _part(kind, definitions)
             mapping = {"$ref": f"#/$defs/{name}"}
-            if kind.list_is is None:
+            if (short := kind.list_is or kind.number_is) is None:
                 return mapping
-            return {"anyOf": [mapping, _value(kind.keys[kind.list_is], definitions)]}
+            return {"anyOf": [mapping, _value(kind.keys[short], definitions)]}
         case Inertia():
             return _value(Part("", InertiaNumbers), definitions)
         case Parts():

@@ -235,7 +235,7 @@ _COLOR: Final = Color("Red, green, blue and optionally alpha, each 0 to 1.")
 class LinkSpec:
     """The link that a joint moves."""
 
-    mass: Annotated[float | None, Number("kg", above=0)] = None
+    mass: Annotated[float | None, Number("kg; 0 for a link that weighs nothing, between others.", least=0)] = None
     com: Annotated[Array | None, Numbers("Centre of mass in DH frame i, in the file's length unit.", LENGTHS)] = None
     inertia: Annotated[Array | None, Inertia("About com, along DH frame i's axes, kg·m².")] = None
     density: Annotated[
@@ -319,6 +319,74 @@ class BaseSpec:
     mesh: Annotated[MeshSpec | None, Part("Visual mesh, in DH frame 0.", MeshSpec)] = None
 
 
+class ShapeType(StrEnum):
+    """A solid that a tool is made of."""
+
+    BOX = "box"
+    CYLINDER = "cylinder"
+    SPHERE = "sphere"
+
+
+_SIDES: Final = Number("", Dimension.LENGTH, above=0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShapeSpec:
+    """A solid: it shows a tool, collides, and gives the tool the mass and inertia that are not given."""
+
+    type: Annotated[ShapeType, Choice("Its axis is its own z.", ShapeType, required=True)]
+    size: Annotated[Array | None, Numbers("Of a box, along x, y, z, in the file's length unit.", _SIDES)] = None
+    radius: Annotated[
+        float | None,
+        Number("Of a cylinder or a sphere, in the file's length unit.", Dimension.LENGTH, above=0),
+    ] = None
+    length: Annotated[
+        float | None, Number("Of a cylinder, in the file's length unit.", Dimension.LENGTH, above=0)
+    ] = None
+    pose: Annotated[Pose, Part("Pose of its centre in DH frame n.", Pose, inline=True)] = field(default_factory=Pose)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ToolSpec(Pose):
+    """Pose of tool0 in DH frame n, and what the last link carries: a gripper, say. All of it in DH frame n."""
+
+    mass: Annotated[float | None, Number("kg", least=0)] = None
+    com: Annotated[Array | None, Numbers("Centre of mass in DH frame n, in the file's length unit.", LENGTHS)] = None
+    inertia: Annotated[Array | None, Inertia("About com, along DH frame n's axes, kg·m².")] = None
+    color: Annotated[_Rgba | None, _COLOR] = None
+    shape: Annotated[
+        ShapeSpec | None, Part("Solid in DH frame n; by default a rod to tool0, if that is elsewhere.", ShapeSpec)
+    ] = None
+    mesh: Annotated[MeshSpec | None, Part("Visual mesh, in DH frame n.", MeshSpec)] = None
+
+    @classmethod
+    def at(cls, pose: Pose) -> "ToolSpec":
+        """Return a tool0 without a tool."""
+        return cls(xyz=pose.xyz, rpy=pose.rpy)
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of tool0 in DH frame n, alone."""
+        return Pose(xyz=self.xyz, rpy=self.rpy)
+
+    @property
+    def is_body(self) -> bool:
+        """Whether there is a tool besides the frame tool0."""
+        given = (self.mass, self.com, self.inertia, self.color, self.shape, self.mesh)
+        return any(value is not None for value in given)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PayloadSpec:
+    """What the arm is to carry besides its tool: assumed efforts and gains hold it, but no export contains it."""
+
+    mass: Annotated[float | None, Number("kg; default a share of the arm's moving mass.", least=0)] = None
+    com: Annotated[
+        Array | None,
+        Numbers("Centre of mass in DH frame n, in the file's length unit; default just before tool0.", LENGTHS),
+    ] = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotSpec:
     """A robot described by its Denavit-Hartenberg table.
@@ -351,7 +419,15 @@ class RobotSpec:
     ] = field(default_factory=lambda: MappingProxyType({}))
     """Evaluated."""
     base: Annotated[BaseSpec, Part("DH frame 0 in base_link.", BaseSpec)] = field(default_factory=BaseSpec)
-    tool: Annotated[Pose, Part("tool0 in DH frame n.", Pose)] = field(default_factory=Pose)
+    tool: Annotated[ToolSpec, Part("tool0 in DH frame n, and the tool.", ToolSpec)] = field(default_factory=ToolSpec)
+    payload: Annotated[
+        PayloadSpec,
+        Part(
+            "Nominal payload, which assumed efforts and gains hold; a number is its mass, kg.",
+            PayloadSpec,
+            number_is="mass",
+        ),
+    ] = field(default_factory=PayloadSpec)
     gravity: Annotated[Array, Numbers("m/s² in base_link.")] = field(default_factory=lambda: read_only([0, 0, -9.81]))
     rows: Annotated[
         tuple[Row, ...],

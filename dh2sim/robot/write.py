@@ -433,7 +433,7 @@ def robot_file_text(
     for key, text in {"description": spec.description, "source": spec.source}.items():
         lines += text_lines(key, text) if text else []
     lines += [f"convention: {spec.convention}", f"units: {{angle: {angle}, length: {length}}}"]
-    before: dict[str, Tree] = {"base": parts.part(spec.base), "tool": parts.part(spec.tool)}
+    before: dict[str, Tree] = {key: parts.part(getattr(spec, key)) for key in ("base", "tool", "payload")}
     if spec.gravity.tolist() != _GRAVITY:
         before["gravity"] = numbers(spec.gravity.tolist())
     lines += [line for key, tree in before.items() if tree for line in entry_lines(key, tree)]

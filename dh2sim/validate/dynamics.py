@@ -29,7 +29,7 @@ def check_inertias(engine: MujocoEngine, model: RobotModel) -> Check:
     Errors are relative: to the mass, to the reach, and to the inertia's trace. A link without mass must have none.
     """
     errors: list[tuple[float, str]] = []
-    for link in model.links:
+    for link in model.moving_links:
         try:
             found = engine.mass_properties(link.name)
         except EngineError as refusal:

@@ -214,7 +214,7 @@ def _at(state: ViewState, q: tuple[float, ...], *, keep_goal: bool = False) -> V
 
 def _can_be_dragged(state: ViewState, drag: LinkDrag) -> bool:
     """Return whether a robot with that link is simulated, and all numbers are finite."""
-    links = {link.name for link in state.model.links}
+    links = {link.name for link in state.model.moving_links}
     finite = all(math.isfinite(value) for value in (*drag.point_in_link, *drag.target))
     return state.mode is Mode.PHYSICS and drag.link in links and finite
 

@@ -12,7 +12,7 @@ from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import BaseSpec, LinkSpec, Pose, RobotSpec, Row
+from dh2sim.robot.spec import BaseSpec, LinkSpec, Pose, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 from tests.formats.readers import body_poses, in_mujoco, site_poses
 from tests.sample_robots import (
@@ -100,7 +100,7 @@ def test_frames_that_are_nearly_others_are_where_the_table_says(tiny: float, wha
         name="near",
         rows=(row, Row(name="two", type=REVOLUTE, convention=STANDARD, a=0.4, alpha=ODD)),
         base=BaseSpec(pose=pose if what == "base" else Pose()),
-        tool=pose if what == "tool" else Pose(),
+        tool=ToolSpec.at(pose) if what == "tool" else ToolSpec(),
     )
     assert_poses_are_the_tables(build_model(spec), np.array([[0.7, -1.1], [0.0, 0.0]]))
 
@@ -124,7 +124,7 @@ def test_an_arm_of_nearly_parallel_axes_is_where_the_table_says() -> None:
         Row(name="plate", type=FIXED, convention=HAYATI, a=0.1, alpha=1e-3, beta=2e-6, theta=0.7),
         Row(name="wrist", type=REVOLUTE, convention=MODIFIED, a=0.05, alpha=ODD, d=0.2, theta=0.2),
     )
-    built = build_model(RobotSpec(name="calibrated", rows=rows, tool=Pose(xyz=read_only([0.1, 0.02, 0.03]))))
+    built = build_model(RobotSpec(name="calibrated", rows=rows, tool=ToolSpec(xyz=read_only([0.1, 0.02, 0.03]))))
     assert_poses_are_the_tables(built, in_limits(built, 100, seed=12))
 
 

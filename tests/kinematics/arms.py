@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.spec import BaseSpec, Convention, Pose, RobotSpec, Row
+from dh2sim.robot.spec import BaseSpec, Convention, Pose, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import HAYATI, MODIFIED, ODD, STANDARD, row
 
@@ -59,7 +59,11 @@ def arm(*conventions: Convention, base: Pose | None = None, tool: Pose | None = 
             )
         )
     return RobotSpec(
-        name="arm", rows=tuple(rows), base=BaseSpec(pose=base or Pose()), tool=tool or Pose(), source="made up"
+        name="arm",
+        rows=tuple(rows),
+        base=BaseSpec(pose=base or Pose()),
+        tool=ToolSpec.at(tool or Pose()),
+        source="made up",
     )
 
 

@@ -11,7 +11,7 @@ from dh2sim.kinematics.chain import KinematicChain, build_chain
 from dh2sim.kinematics.forward import frame_poses
 from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses
 from dh2sim.kinematics.transforms import compose, joint_part, link_part
-from dh2sim.robot.spec import Pose, RobotSpec, Row
+from dh2sim.robot.spec import RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import HAYATI, MODIFIED, ODD, ODD_ROBOT, STANDARD, STANFORD, row
 from tests.strategies import robot_specs, robots_with_joint_vectors
@@ -147,6 +147,6 @@ def test_all_of_the_chain_is_read_only() -> None:
 
 
 def test_a_tool_turned_by_a_right_angle_is_exact() -> None:
-    spec = dataclasses.replace(STANFORD, tool=Pose(rpy=read_only([0, math.pi / 2, 0])))
+    spec = dataclasses.replace(STANFORD, tool=ToolSpec(rpy=read_only([0, math.pi / 2, 0])))
     expected = [[0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]]
     np.testing.assert_array_equal(build_chain(spec).T_dhn_tool0, expected)

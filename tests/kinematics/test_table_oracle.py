@@ -13,7 +13,7 @@ from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics import table_oracle as table
 from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses, table_tool_errors, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
-from dh2sim.robot.spec import Convention, Pose, RobotSpec, Row
+from dh2sim.robot.spec import Convention, Pose, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import HAYATI, MODIFIED, ODD, ODD_ROBOT, REVOLUTE, STANDARD, STANFORD, row
 from tests.strategies import robots_with_joint_vectors
@@ -91,7 +91,7 @@ def test_planar_arm_reaches_where_trigonometry_says(q: tuple[float, float]) -> N
     modified = RobotSpec(
         name="planar",
         rows=(row("one", "revolute", MODIFIED), row("two", "revolute", MODIFIED, a=l1)),
-        tool=Pose(xyz=read_only([l2, 0, 0])),
+        tool=ToolSpec(xyz=read_only([l2, 0, 0])),
     )
     for spec in (standard, modified):
         T = table_tool_pose(spec, q)

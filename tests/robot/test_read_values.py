@@ -9,7 +9,8 @@ import pytest
 from tests.robot.files import MINIMAL, complaints, with_joint, with_keys
 
 TOP = (
-    "name, description, source, convention, units, parameters, base, tool, gravity, joints, configurations, actuators"
+    "name, description, source, convention, units, parameters, base, tool, payload, gravity, joints, configurations, "
+    "actuators"
 )
 JOINT = "name, type, convention, a, alpha, d, theta, beta, flip, limits, dynamics, link, actuator"
 NUMBER = "expected a number or an expression in a string"
@@ -142,7 +143,16 @@ def test_the_error_of_a_file_without_a_mapping_says_what_belongs_there(text: str
             "{type: revolute, dynamics: {armature: -0.1}}",
             "4:41: joints[0].dynamics.armature: must not be negative, found -0.1",
         ),
-        ("{type: fixed, link: {mass: 0}}", "4:30: joints[0].link.mass: must be greater than 0, found 0"),
+        ("{type: fixed, link: {mass: -1}}", "4:30: joints[0].link.mass: must not be negative, found -1"),
+        (
+            "{type: revolute, link: {mass: 0}}",
+            "4:33: joints[0].link.mass: joint_1 would move nothing that has mass; 0 is for links between others, "
+            "or before a tool that has a mass",
+        ),
+        (
+            "{type: fixed, link: {mass: 0, com: [0, 0, 1]}}",
+            "4:33: joints[0].link.com: what has a mass of 0 has no 'com'",
+        ),
         ("{type: fixed, link: {density: -1}}", "4:33: joints[0].link.density: must be greater than 0, found -1"),
         ("{type: fixed, link: {radius: 0}}", "4:32: joints[0].link.radius: must be greater than 0, found 0"),
         (
@@ -201,7 +211,29 @@ def test_a_wrong_value_in_a_row_is_reported(joint: str, message: str) -> None:
         ("units: {length: km}\n", "5:17: units.length: found 'km'. Did you mean 'm'? Allowed: m, mm, cm, in"),
         ("base: {xyz: [1, 2]}\n", "5:13: base.xyz: expected a list of 3 numbers (x, y, z), found a list of 2"),
         ("tool: {rpy: 3}\n", "5:13: tool.rpy: expected a list of 3 numbers (roll, pitch, yaw), found 3"),
-        ("tool: {color: [1, 1, 1]}\n", "5:8: tool: unknown key 'color'. Allowed keys: xyz, rpy"),
+        (
+            "tool: {colour: [1, 1, 1]}\n",
+            "5:8: tool: unknown key 'colour'. Did you mean 'color'? Allowed keys: xyz, rpy, mass, com, inertia, color, "
+            "shape, mesh",
+        ),
+        (
+            "tool: {com: [0, 0, 1]}\n",
+            "5:8: tool.com: a tool that has a 'com' needs a 'mass', or a 'shape' to estimate it from",
+        ),
+        ("tool: {mass: 0, com: [0, 0, 1]}\n", "5:17: tool.com: what has a mass of 0 has no 'com'"),
+        ("tool: {shape: {radius: 1}}\n", "5:15: tool.shape: missing key 'type'"),
+        ("tool: {shape: {type: sphere}}\n", "5:15: tool.shape: missing key 'radius', of a sphere"),
+        (
+            "tool: {shape: {type: box, size: [1, 2, 3], radius: 1}}\n",
+            "5:44: tool.shape.radius: a box takes no 'radius'; its sizes: size",
+        ),
+        (
+            "tool: {shape: {type: box, size: [1, 0, 3]}}\n",
+            "5:37: tool.shape.size[1]: must be greater than 0, found 0",
+        ),
+        ("payload: -1\n", "5:10: payload.mass: must not be negative, found -1"),
+        ("payload: {mass: 1, com: 2}\n", "5:25: payload.com: expected a list of 3 numbers (x, y, z), found 2"),
+        ("payload: [1]\n", "5:10: payload: expected a mapping with the keys mass, com, found a list"),
         ("gravity: [0, 0, x]\n", "5:17: gravity[2]: unknown name 'x'. Known names: pi"),
         ("gravity:\n", "5:1: gravity: expected a list of 3 numbers (x, y, z), found nothing"),
         ("configurations: [1]\n", "5:17: configurations: expected a mapping, found a list"),

@@ -15,7 +15,7 @@ import pytest
 from dh2sim import build_chain
 from dh2sim.kinematics.table_oracle import row_matrix, table_tool_pose
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import Convention, JointType, Pose, RobotSpec, Row
+from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -97,7 +97,7 @@ def test_distances_of_the_common_mistakes_are_as_printed(example: RobotSpec) -> 
 def test_shifting_a_and_alpha_down_and_the_last_into_the_tool_keeps_the_arm(example: RobotSpec) -> None:
     first, second = example.rows
     shifted = (replace(first, a=0, alpha=0), replace(second, a=first.a, alpha=first.alpha))
-    tool = Pose(xyz=np.array([second.a, 0, 0]), rpy=np.array([second.alpha, 0, 0]))
+    tool = ToolSpec(xyz=np.array([second.a, 0, 0]), rpy=np.array([second.alpha, 0, 0]))
     modified = read_as(replace(example, rows=shifted, tool=tool), Convention.MODIFIED)
     np.testing.assert_allclose(table_tool_pose(modified, Q), table_tool_pose(example, Q), rtol=0, atol=1e-15)
 

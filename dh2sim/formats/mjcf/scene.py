@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.forward import reference_joint_poses
-from dh2sim.kinematics.transforms import identity, move_point
+from dh2sim.kinematics.transforms import compose, identity, move_point
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import read_only
@@ -70,11 +70,13 @@ def to_scene(model: ModelLike) -> str:
 
 def _extent(model: RobotModel) -> _Extent:
     poses = [identity(), *reference_joint_poses(model.chain, model.home)]
+    if model.tool is not None:
+        poses.append(compose(poses[-1], model.joints[-1].T_joint_dh))
     points, lowest = [], 0.0
     for link, T in zip(model.all_links, poses, strict=True):
         for shape in link.shapes:
             start, end = (move_point(T, point) for point in shape.ends)
-            slope = (end[2] - start[2]) / shape.length
+            slope = (end[2] - start[2]) / shape.length if shape.length else 0.0
             # by how much a disc of this radius, square to the axis, is lower than its centre
             drop = shape.radius * math.sqrt(max(0.0, 1.0 - slope * slope))
             points += [(start, shape.radius), (end, shape.radius)]

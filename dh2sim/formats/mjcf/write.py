@@ -9,9 +9,9 @@ from dh2sim.errors import ModelError
 from dh2sim.formats.mjcf.sites import add_site, needs_body, placed
 from dh2sim.formats.mjcf.tree import DYNAMICS
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
-from dh2sim.kinematics.transforms import compose
+from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.model.build import ModelLike, model_of
-from dh2sim.model.mass import MassProperties
+from dh2sim.model.mass import LIGHTEST, MassProperties
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.spec import ActuatorType, JointType
@@ -103,7 +103,8 @@ def to_mjcf(model: ModelLike, options: MjcfOptions = EXPORTED) -> str:
         ModelError: the robot has more bodies than MuJoCo can read back.
     """
     model = model_of(model)
-    nested = 1 + len(model.links) + any(needs_body(T, model.links[-1].inertial) for _, T in _last_frames(model))
+    nested = 1 + len(model.links)
+    nested += model.tool is not None or any(needs_body(T, model.links[-1].inertial) for _, T in _last_frames(model))
     if nested > MAX_BODIES:
         raise ModelError(
             f"{model.name}: {len(model.links)} rows make {nested} nested bodies with base_link; MuJoCo "
@@ -184,13 +185,17 @@ def _bodies(mujoco: ET.Element, model: RobotModel, materials: dict[Color, str], 
     add_site(body, "dh_0", model.chain.T_base_link_dh0, model.base.inertial if options.floating_base else None)
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
         body = child(body, "body", name=link.name, **placed(joint.T_parent_joint))
-        _inertial(body, link.inertial)
+        _inertial(body, link.inertial or (LIGHTEST if joint.type.moves else None))
         if joint.type is not JointType.FIXED:
             _joint(body, joint)
         _geoms(body, model, link, joint.T_joint_dh, materials)
         frames = [(f"dh_{i}", joint.T_joint_dh)] if i < len(model.links) else _last_frames(model)
         for name, T in frames:
             add_site(body, name, T, link.inertial)
+    if model.tool is not None:
+        body = child(body, "body", name=model.tool.name, **placed(model.joints[-1].T_joint_dh))
+        _inertial(body, model.tool.inertial)
+        _geoms(body, model, model.tool, identity(), materials)
 
 
 def _last_frames(model: RobotModel) -> list[tuple[str, Array]]:
@@ -252,11 +257,15 @@ def _geoms(
 
 
 def _geom(body: ET.Element, class_: str, shape: Shape, material: str, weight: dict[str, str]) -> None:
-    kind = "capsule" if shape.kind is ShapeKind.CAPSULE else "cylinder"
-    size = numbers([shape.radius, 0.5 * shape.length])
-    child(
-        body, "geom", class_=class_, type=kind, size=size, material=material, **weight, **_moved(shape.T_link_shape)
-    )
+    match shape.kind:
+        case ShapeKind.BOX if shape.size is not None:
+            size = [0.5 * side for side in shape.size]
+        case ShapeKind.SPHERE:
+            size = [shape.radius]
+        case _:
+            size = [shape.radius, 0.5 * shape.length]
+    attributes = {"type": shape.kind.value, "size": numbers(size), "material": material}
+    child(body, "geom", class_=class_, **attributes, **weight, **_moved(shape.T_link_shape))
 
 
 def _contact(mujoco: ET.Element, model: RobotModel) -> None:

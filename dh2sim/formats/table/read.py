@@ -33,7 +33,18 @@ from dh2sim.formats.table.printout import (
 from dh2sim.formats.table.rows import Body, ResolvedUnits, is_hayati, read_body, to_row
 from dh2sim.messages import member, shown
 from dh2sim.robot.fields import name_problem
-from dh2sim.robot.spec import AngleUnit, BaseSpec, Convention, JointType, LengthUnit, Pose, RobotSpec, Row, Units
+from dh2sim.robot.spec import (
+    AngleUnit,
+    BaseSpec,
+    Convention,
+    JointType,
+    LengthUnit,
+    Pose,
+    RobotSpec,
+    Row,
+    ToolSpec,
+    Units,
+)
 from dh2sim.robot.yaml_tree import Report, decode
 
 _COMMA: Final = re.compile(r"\d,\d")
@@ -294,7 +305,7 @@ class _Reader:
             source=f"{PurePath(findings.file).name}, line {table.header[0].line}",
             convention=convention,
             base=BaseSpec(pose=poses.get("base", Pose())),
-            tool=poses.get("tool", Pose()),
+            tool=ToolSpec.at(poses.get("tool", Pose())),
             configurations=MappingProxyType(configurations),
         )
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 from dh2sim.formats.urdf.tree import DYNAMICS
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.transforms import compose, identity, invert, pose_from_rpy, rpy_from_rotation
 from dh2sim.model.build import ModelLike, model_of
-from dh2sim.model.mass import MassProperties
+from dh2sim.model.mass import LIGHTEST, MassProperties
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.spec import JointType
@@ -48,10 +49,13 @@ def to_urdf(model: ModelLike, *, dh_frames: bool = True) -> str:
     parent = model.base.name
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
         _joint(robot, joint, parent, link.name)
-        _link(robot, link, joint.T_joint_dh, materials, link.inertial or MASSLESS)
+        _link(robot, link, joint.T_joint_dh, materials, link.inertial or (LIGHTEST if joint.type.moves else MASSLESS))
         if dh_frames:
             _frame(robot, f"dh_{i}", link.name, joint.T_joint_dh)
         parent = link.name
+    if model.tool is not None:
+        _fixed_joint(robot, parent, model.tool.name, model.joints[-1].T_joint_dh)
+        _link(robot, model.tool, identity(), materials, model.tool.inertial or MASSLESS)
     _frame(robot, "flange", parent, compose(model.joints[-1].T_joint_dh, T_DHN_FLANGE))
     _frame(robot, "tool0", "flange", compose(T_FLANGE_DHN, model.chain.T_dhn_tool0))
     header = [*provenance(model), *(entry.sentence for entry in model.assumptions)]
@@ -68,8 +72,12 @@ def _materials(model: RobotModel) -> dict[Color, str]:
 
 def _frame(robot: ET.Element, name: str, parent: str, T_parent_frame: Array) -> None:
     _inertial(child(robot, "link", name=name), MASSLESS)
+    _fixed_joint(robot, parent, name, T_parent_frame)
+
+
+def _fixed_joint(robot: ET.Element, parent: str, name: str, T_parent_child: Array) -> None:
     joint = child(robot, "joint", name=f"{parent}-{name}", type="fixed")
-    _ends(joint, parent, name, T_parent_frame)
+    _ends(joint, parent, name, T_parent_child)
 
 
 def _ends(joint: ET.Element, parent: str, name: str, T_parent_joint: Array) -> None:
@@ -110,24 +118,27 @@ def _link(
             _geometry(child(element, "collision"), simple)
 
 
-def _without_capsules(shape: Shape) -> list[tuple[Array, float, float | None]]:
-    """Pose, radius and length of the cylinder and balls (no length) that make up a shape: URDF 1.0 has no capsule."""
-    simple: list[tuple[Array, float, float | None]] = [(shape.T_link_shape, shape.radius, shape.length)]
-    if shape.kind is ShapeKind.CAPSULE:
-        for end in shape.ends:
-            T = [[1.0 if i == j else 0.0 for j in range(3)] + [float(end[i])] for i in range(3)]
-            simple.append((read_only([*T, [0.0, 0.0, 0.0, 1.0]]), shape.radius, None))
-    return simple
+def _without_capsules(shape: Shape) -> list[Shape]:
+    """Return the cylinder and balls that make up a capsule, which URDF 1.0 has not; any other shape as it is."""
+    if shape.kind is not ShapeKind.CAPSULE:
+        return [shape]
+    balls = []
+    for end in shape.ends:
+        T = [[1.0 if i == j else 0.0 for j in range(3)] + [float(end[i])] for i in range(3)]
+        T_link_ball = read_only([*T, [0.0, 0.0, 0.0, 1.0]])
+        balls.append(replace(shape, kind=ShapeKind.SPHERE, length=0.0, T_link_shape=T_link_ball))
+    return [replace(shape, kind=ShapeKind.CYLINDER), *balls]
 
 
-def _geometry(element: ET.Element, simple: tuple[Array, float, float | None]) -> None:
-    T, radius, length = simple
-    _origin(element, T)
+def _geometry(element: ET.Element, shape: Shape) -> None:
+    _origin(element, shape.T_link_shape)
     geometry = child(element, "geometry")
-    if length is None:
-        child(geometry, "sphere", radius=number(radius))
+    if shape.size is not None:
+        child(geometry, "box", size=numbers(shape.size))
+    elif shape.kind is ShapeKind.SPHERE:
+        child(geometry, "sphere", radius=number(shape.radius))
     else:
-        child(geometry, "cylinder", radius=number(radius), length=number(length))
+        child(geometry, "cylinder", radius=number(shape.radius), length=number(shape.length))
 
 
 def _inertial(element: ET.Element, body: MassProperties) -> None:

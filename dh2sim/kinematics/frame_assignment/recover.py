@@ -14,7 +14,7 @@ from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint, serial_link_poses
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors, rpy_from_rotation
-from dh2sim.robot.spec import BaseSpec, Convention, Pose, RobotSpec, Row
+from dh2sim.robot.spec import BaseSpec, Convention, Pose, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array
 
 
@@ -51,7 +51,7 @@ def to_spec(
         rows=tuple(rows),
         convention=convention,
         base=BaseSpec(pose=_pose(assignment.T_base_dh0, tolerances)),
-        tool=_pose(assignment.T_dhn_tip, tolerances),
+        tool=ToolSpec.at(_pose(assignment.T_dhn_tip, tolerances)),
     )
 
 

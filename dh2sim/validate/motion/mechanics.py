@@ -93,6 +93,9 @@ def bodies(model: RobotModel, q: Array, v: Array, base: BaseMotion | None = None
                 p, u = p + arm, u + np.cross(w, arm) + rate[:, None] * axis
         if link.inertial is not None:
             found.append(_Body.of(link.inertial, R, p, u, w))
+    if model.tool is not None and model.tool.inertial is not None:
+        T = model.chain.joints[-1].T_joint_dh
+        found.append(_Body.of(model.tool.inertial, R @ T[:3, :3], p + R @ T[:3, 3], u + np.cross(w, R @ T[:3, 3]), w))
     return Bodies(
         mass=np.array([body.mass for body in found]),
         com=np.stack([body.com for body in found], axis=1),

@@ -107,6 +107,7 @@ def by_construction(model: RobotModel) -> set[Pair]:
     for row in model.spec.rows:
         body.append(body[-1] + (1 if row.type.moves else 0))
     names = [link.name for link in model.all_links]
+    body += body[-1:] * (len(names) - len(body))
     pairs = {
         (names[i], names[j]) for i in range(len(names)) for j in range(i + 1, len(names)) if body[j] - body[i] <= 1
     }

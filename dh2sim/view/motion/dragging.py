@@ -136,7 +136,7 @@ class LinkGrabs:
 
     def _links(self, state: ViewState) -> dict[str, Any]:
         """Return the handles of the solids of links that move."""
-        names = {link.name for link in state.model.links}
+        names = {link.name for link in state.model.moving_links}
         return {name: handle for name, handle in self._painter.solids().items() if _link_of(name) in names}
 
     async def _dragged(self, event: viser.SceneNodeDragEvent[Any]) -> None:  # async: viser keeps the order of events

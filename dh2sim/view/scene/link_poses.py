@@ -26,7 +26,7 @@ class LinkPoses:
     """Poses in base_link."""
 
     links: Array
-    """Of base_link and of each row's link, shape (number of rows + 1, 4, 4)."""
+    """Of the robot's ``all_links``: base_link, each row's link and the tool, shape (links, 4, 4)."""
     frames: Array
     """Of DH frames 0 … number of rows, shape (number of rows + 1, 4, 4)."""
     tool0: Array
@@ -52,6 +52,8 @@ def _poses_at(model: RobotModel, q: tuple[float, ...]) -> LinkPoses:
     links = np.concatenate([identity()[None], joint_poses(chain, q)])
     T_link_dh = np.stack([chain.T_base_link_dh0, *(joint.T_joint_dh for joint in chain.joints)])
     frames = links @ T_link_dh
+    if model.tool is not None:
+        links = np.concatenate([links, frames[-1:]])
     tool0 = compose(frames[-1], chain.T_dhn_tool0)
     return LinkPoses(links=read_only(links), frames=read_only(frames), tool0=read_only(tool0))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import lru_cache
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import TypeAlias
 
 import numpy as np
@@ -46,8 +46,8 @@ def link_solids(
 
     Args:
         link: The link.
-        T_link_dh: Pose of the link's DH frame, which carries its mesh, in the link's frame: a joint's ``T_joint_dh``,
-            or ``T_base_link_dh0`` for the base link; shape (4, 4).
+        T_link_dh: Pose of the link's DH frame, which carries its mesh, in the link's frame, from ``T_link_dh`` of the
+            model; shape (4, 4).
         color: Instead of the link's own colours.
         opacity: Times the link's own.
 
@@ -94,21 +94,22 @@ def robot_solids(
 @lru_cache(maxsize=_ROBOTS_CACHED)
 def _fixed_solids(model: RobotModel, root: str, color: Color | None, opacity: float) -> Mapping[str, Solid]:
     """Return what is below the links' frames, the same at every configuration."""
-    dh_frames = [model.chain.T_base_link_dh0, *(joint.T_joint_dh for joint in model.chain.joints)]
     return {
         f"{root}/{link.name}/{name}": solid
-        for link, T_link_dh in zip(model.all_links, dh_frames, strict=True)
+        for link, T_link_dh in zip(model.all_links, model.T_link_dh, strict=True)
         for name, solid in link_solids(link, T_link_dh, color=color, opacity=opacity).items()
     }
 
 
 def shape_triangles(shape: Shape) -> Triangles:
     """Return the closed surface of a shape in its own frame."""
-    return _shape_triangles(shape.kind, shape.radius, shape.length)
+    return _shape_triangles(shape.kind, shape.radius, shape.length, shape.size)
 
 
 @lru_cache(maxsize=_SHAPES_CACHED)
-def _shape_triangles(kind: ShapeKind, radius: float, length: float) -> Triangles:
+def _shape_triangles(
+    kind: ShapeKind, radius: float, length: float, size: tuple[float, float, float] | None
+) -> Triangles:
     half = 0.5 * length
     match kind:
         case ShapeKind.CYLINDER:
@@ -119,8 +120,10 @@ def _shape_triangles(kind: ShapeKind, radius: float, length: float) -> Triangles
                 [(radius, half), (0.0, half)],
             )
             return _merged([_revolved(profile) for profile in (below, side, above)])
-        case ShapeKind.CAPSULE:
+        case ShapeKind.CAPSULE | ShapeKind.SPHERE:
             return _revolved(_capsule_profile(radius, half))
+        case ShapeKind.BOX:
+            return _box_triangles(size or (radius, radius, length))
 
 
 @lru_cache(maxsize=1)
@@ -195,7 +198,23 @@ def _capsule_profile(radius: float, half: float) -> _Profile:
         for angle in (-0.5 * math.pi * (RINGS - k) / RINGS for k in range(1, RINGS + 1))
     ]
     above = [(r, -z) for r, z in reversed(below)]
-    return [(0.0, -half - radius), *below, *above, (0.0, half + radius)]
+    profile = [(0.0, -half - radius), *below, *above, (0.0, half + radius)]
+    return list(dict.fromkeys(profile))  # a ball has one equator
+
+
+def _box_triangles(size: tuple[float, float, float]) -> Triangles:
+    """Return a box; every side has corners of its own, which makes its edges look sharp."""
+    vertices: list[Vector] = []
+    faces: list[tuple[int, int, int]] = []
+    for axis, sign in product(range(3), (-1.0, 1.0)):
+        u, v = ((axis + 1) % 3, (axis + 2) % 3) if sign > 0 else ((axis + 2) % 3, (axis + 1) % 3)
+        first = len(vertices)
+        for at_u, at_v in ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)):
+            corner = [0.0, 0.0, 0.0]
+            corner[axis], corner[u], corner[v] = 0.5 * sign * size[axis], at_u * size[u], at_v * size[v]
+            vertices.append((corner[0], corner[1], corner[2]))
+        faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
+    return tuple(vertices), tuple(faces)
 
 
 def _revolved(profile: _Profile) -> Triangles:
