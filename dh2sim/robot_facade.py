@@ -28,9 +28,11 @@ from dh2sim.robot.spec import (
     LengthUnit,
     Limits,
     LinkSpec,
+    PayloadSpec,
     Pose,
     RobotSpec,
     Row,
+    ToolSpec,
     Units,
 )
 from dh2sim.robot.textbook_table import table_html, table_latex, table_text
@@ -152,7 +154,8 @@ class Robot:
         name: str = "robot",
         convention: Convention | str = Convention.STANDARD,
         base: PoseLike = (0.0, 0.0, 0.0),
-        tool: PoseLike = (0.0, 0.0, 0.0),
+        tool: ToolSpec | PoseLike = (0.0, 0.0, 0.0),
+        payload: PayloadSpec | float | None = None,
         gravity: ArrayLike = (0.0, 0.0, -9.81),
         configurations: Mapping[str, ArrayLike] = MappingProxyType({}),
         description: str = "",
@@ -165,7 +168,9 @@ class Robot:
             name: Letters, digits, '_' and '-', starting with a letter; names the exported files.
             convention: Of rows that name none: 'standard', 'modified' or 'hayati'.
             base: Pose of DH frame 0 in base_link.
-            tool: Pose of tool0 in DH frame n.
+            tool: Pose of tool0 in DH frame n; a :class:`ToolSpec` has mass, inertia and looks too.
+            payload: What the arm is to carry besides, for the limits and gains that are left open; a number is its
+                mass, kg. By default a share of the arm's own mass.
             gravity: m/s² in base_link, shape (3,).
             configurations: Named joint vectors, rad and m, each of shape (n,).
             description: What the robot is.
@@ -182,6 +187,7 @@ class Robot:
             "convention": convention,
             "base": BaseSpec(pose=_pose("base", base)),
             "tool": _pose("tool", tool),
+            "payload": PayloadSpec() if payload is None else payload,
             "gravity": gravity,
             "configurations": configurations,
         }

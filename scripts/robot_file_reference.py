@@ -55,6 +55,30 @@ parallel axes, has a second twist `beta`, and a `d` only if it is prismatic; `be
 A mesh shows a link instead of the shapes made from the table, and has no mass. It is in the link's DH frame, or
 where its `xyz` and `rpy` put it from there.
 
+## Tool and payload
+
+`tool` says where tool0 is, the point that works, and may say what is mounted there:
+
+```yaml
+tool: {xyz: [0, 0, 0.15], mass: 0.5, com: [0, 0, 0.06], shape: {type: box, size: [0.1, 0.06, 0.1], xyz: [0, 0, 0.05]}}
+payload: 2
+```
+
+All of it is in DH frame n, as makers give loads in the frame of the flange; `xyz` and `rpy` are the pose of tool0.
+The tool is a body of its own, `tool`, fixed to the last link; its frame is DH frame n. Without any of the further keys
+there is none. What they leave out is estimated: a mass from the shape, at 1000 kg/m³; a centre of mass from the shape,
+or else at tool0; an inertia from the shape, or else that of a solid ball of 1000 kg/m³. A mesh alone weighs nothing.
+
+`payload` is what the arm is to carry besides its tool: the efforts and gains that a file leaves open are chosen so
+that they hold it. It is no body, and in no export; an arm that does carry something has it as its tool. It is a solid
+ball of 1000 kg/m³ that touches tool0, beyond it along its z, or has its centre at `com`, in DH frame n. Without a
+`payload` it weighs a fifth of the moving links, as the nominal payload of many arms does.
+
+## Links that weigh nothing
+
+`link: {mass: 0}` is for links between joints, such as those of a wrist or of a planar base that are one body: what
+comes behind them must have mass. Exports give them 2e-14 kg and kg·m², about the least that simulators read.
+
 ## What is filled in
 
 | left out | becomes |
@@ -77,14 +101,16 @@ of the wrong length, cycles in `parameters` and the like are errors, never warni
 
 TITLES = {
     "UnitsEntry": "`units`",
-    "PoseEntry": "`tool`",
+    "ToolEntry": "`tool`",
+    "ShapeEntry": "`tool.shape`",
+    "PayloadEntry": "`payload`",
     "BaseEntry": "`base`",
     "JointEntry": "`joints`: a row of the table",
     "LimitsEntry": "`joints[].limits`",
     "DynamicsEntry": "`joints[].dynamics`",
     "LinkEntry": "`joints[].link`",
-    "InertiaEntry": "`joints[].link.inertia`",
-    "MeshEntry": "`mesh`, of a link or the base",
+    "InertiaEntry": "`inertia`, of a link or the tool",
+    "MeshEntry": "`mesh`, of a link, the base or the tool",
     "ActuatorEntry": "`actuators`, and `joints[].actuator`",
 }
 

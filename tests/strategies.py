@@ -6,6 +6,7 @@ Right angles hide errors: odd twists, offsets, flips, prismatic and fixed rows, 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -205,3 +206,17 @@ def robots_with_joint_vectors(draw: DrawFn, *, max_rows: int = 12, must_move: bo
     spec = draw(robot_specs(max_rows=max_rows, must_move=must_move))
     drawn = draw(st.lists(joint_vectors_for(spec), min_size=1, max_size=4))
     return spec, read_only(np.reshape(drawn, (len(drawn), len(spec.moving_rows))))
+
+
+@st.composite
+def massless_robot_specs(draw: DrawFn) -> RobotSpec:
+    """Robots some of whose links weigh nothing, with a tool that carries mass behind them."""
+    spec = draw(robot_specs(max_rows=5))
+    massless = draw(st.lists(st.booleans(), min_size=len(spec.rows), max_size=len(spec.rows)))
+    rows = tuple(
+        replace(row, link=LinkSpec(mass=0.0)) if nothing else row
+        for row, nothing in zip(spec.rows, massless, strict=True)
+    )
+    mass = draw(st.floats(0.5, 3.0))
+    com, inertia = draw(vectors(lengths)), draw(inertias())
+    return replace(spec, rows=rows, tool=replace(spec.tool, mass=mass, com=com, inertia=inertia))

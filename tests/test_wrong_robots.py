@@ -24,6 +24,8 @@ from dh2sim import (
     Robot,
     RobotSpec,
     Row,
+    ShapeSpec,
+    ToolSpec,
 )
 from dh2sim.errors import Dh2simError, MeshError, RobotError
 from dh2sim.robot.spec import BaseSpec, MeshSpec
@@ -138,7 +140,24 @@ WRONG: list[tuple[Callable[[], object], str]] = [
     ),
     (lambda: row(dynamics=Limits()), "joints[0].dynamics: expected a Dynamics, found a Limits"),
     # links
-    (lambda: link(mass=0), "joints[0].link.mass: must be greater than 0, found 0"),
+    (lambda: link(mass=-1), "joints[0].link.mass: must not be negative, found -1"),
+    (
+        lambda: link(mass=0),
+        "joints[0].link.mass: joint_1 would move nothing that has mass; 0 is for links between others, or before a "
+        "tool that has a mass",
+    ),
+    # tools and payloads
+    (lambda: robot(tool=ToolSpec(mass=-1)), "tool.mass: must not be negative, found -1"),
+    (
+        lambda: robot(tool=ToolSpec(com=np.zeros(3))),
+        "tool.com: a tool that has a 'com' needs a 'mass', or a 'shape' to estimate it from",
+    ),
+    (
+        lambda: robot(tool=ToolSpec(shape=ShapeSpec(type="cylinder", radius=1.0))),  # type: ignore[arg-type]
+        "tool.shape: missing key 'length', of a cylinder",
+    ),
+    (lambda: robot(payload="heavy"), "payload.mass: expected a number, found 'heavy'"),
+    (lambda: robot(payload=[1.0]), "payload: expected a PayloadSpec, found a list"),
     (lambda: link(mass="heavy"), "joints[0].link.mass: expected a number, found 'heavy'"),
     (lambda: link(com=[0, 0]), f"joints[0].link.com: {XYZ} a list of 2"),
     (lambda: link(com=[0, 0, NAN]), "joints[0].link.com[2]: expected a finite number, found nan"),

@@ -73,7 +73,7 @@ def as_dict(model: RobotModel) -> dict[str, Any]:
                 "mass": 0.0 if link.inertial is None else link.inertial.mass,
                 "estimated": list(link.estimated),
             }
-            for link in model.links
+            for link in model.moving_links
         ],
         "disabled_collisions": [
             {"link1": pair.link1, "link2": pair.link2, "reason": pair.reason.value} for pair in model.excluded

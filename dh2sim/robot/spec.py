@@ -351,11 +351,14 @@ class ToolSpec(Pose):
     """Pose of tool0 in DH frame n, and what the last link carries: a gripper, say. All of it in DH frame n."""
 
     mass: Annotated[float | None, Number("kg", least=0)] = None
-    com: Annotated[Array | None, Numbers("Centre of mass in DH frame n, in the file's length unit.", LENGTHS)] = None
+    com: Annotated[
+        Array | None,
+        Numbers("Centre of mass in DH frame n, in the file's length unit; default the shape's, or tool0.", LENGTHS),
+    ] = None
     inertia: Annotated[Array | None, Inertia("About com, along DH frame n's axes, kg·m².")] = None
     color: Annotated[_Rgba | None, _COLOR] = None
     shape: Annotated[
-        ShapeSpec | None, Part("Solid in DH frame n; by default a rod to tool0, if that is elsewhere.", ShapeSpec)
+        ShapeSpec | None, Part("Solid in DH frame n, to which the last link then reaches.", ShapeSpec)
     ] = None
     mesh: Annotated[MeshSpec | None, Part("Visual mesh, in DH frame n.", MeshSpec)] = None
 

@@ -28,7 +28,8 @@ POSES = (
 
 
 def shape(kind: ShapeKind, radius: float, length: float, T: Array) -> Shape:
-    return Shape(kind=kind, part=ShapePart.LINK, radius=radius, length=length, T_link_shape=T)
+    size = (radius, 0.7 * radius, length) if kind is ShapeKind.BOX else None
+    return Shape(kind=kind, part=ShapePart.LINK, radius=radius, length=length, T_link_shape=T, size=size)
 
 
 SHAPES = [
@@ -39,9 +40,16 @@ SHAPES = [
 ]
 
 
+def geom_size(one: Shape) -> str:
+    """As MuJoCo has it: half of the sides of a box, radius and half the length of a cylinder or a capsule."""
+    if one.size is not None:
+        return " ".join(repr(0.5 * side) for side in one.size)
+    return f"{one.radius!r} {0.5 * one.length!r}"
+
+
 def in_mujoco(shapes: list[Shape]) -> MassProperties:
     geoms = "".join(
-        f'<geom type="{one.kind.value}" size="{one.radius!r} {0.5 * one.length!r}" density="{DENSITY!r}" '
+        f'<geom type="{one.kind.value}" size="{geom_size(one)}" density="{DENSITY!r}" '
         f'pos="{" ".join(map(repr, one.T_link_shape[:3, 3].tolist()))}" '
         f'quat="{" ".join(map(repr, quaternion_from_rotation(one.T_link_shape).tolist()))}"/>'
         for one in shapes
@@ -72,11 +80,16 @@ def test_several_shapes_weigh_what_mujoco_says(count: int) -> None:
 @pytest.mark.parametrize("kind", list(ShapeKind))
 def test_a_shape_weighs_what_its_triangulated_surface_says(kind: ShapeKind) -> None:
     one = shape(kind, 0.2, 0.7, POSES[1])
-    if kind is ShapeKind.CYLINDER:
-        surface = trimesh.creation.cylinder(radius=0.2, height=0.7, sections=400)
-    else:
-        surface = trimesh.creation.capsule(radius=0.2, height=0.7, count=(200, 200))
-        surface.apply_translation(-surface.bounds.mean(axis=0))
+    match kind:
+        case ShapeKind.CYLINDER:
+            surface = trimesh.creation.cylinder(radius=0.2, height=0.7, sections=400)
+        case ShapeKind.CAPSULE:
+            surface = trimesh.creation.capsule(radius=0.2, height=0.7, count=(200, 200))
+            surface.apply_translation(-surface.bounds.mean(axis=0))
+        case ShapeKind.SPHERE:
+            surface = trimesh.creation.icosphere(subdivisions=5, radius=0.2)
+        case ShapeKind.BOX:
+            surface = trimesh.creation.box(one.size)
     surface.apply_transform(one.T_link_shape)
     surface.density = DENSITY
     faceted = MassProperties(mass=surface.mass, com=surface.center_mass, inertia=surface.moment_inertia)

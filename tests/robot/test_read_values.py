@@ -213,8 +213,8 @@ def test_a_wrong_value_in_a_row_is_reported(joint: str, message: str) -> None:
         ("tool: {rpy: 3}\n", "5:13: tool.rpy: expected a list of 3 numbers (roll, pitch, yaw), found 3"),
         (
             "tool: {colour: [1, 1, 1]}\n",
-            "5:8: tool: unknown key 'colour'. Did you mean 'color'? Allowed keys: xyz, rpy, mass, com, inertia, color, "
-            "shape, mesh",
+            "5:8: tool: unknown key 'colour'. Did you mean 'color'? Allowed keys: xyz, rpy, mass, com, inertia, "
+            "color, shape, mesh",
         ),
         (
             "tool: {com: [0, 0, 1]}\n",

@@ -26,7 +26,7 @@ def assert_holds_the_model(built: RobotModel, mj: mujoco.MjModel, *, own_bodies:
     bodies = [mj.body(i).name for i in range(mj.nbody)]
     assert [name for name in bodies if not name.startswith(("dh_", "tool0"))] == ["world", *links]
     assert own_bodies or len(bodies) == 1 + len(links)
-    sites = sorted(f"dh_{i}" for i in range(len(links)))
+    sites = sorted(f"dh_{i}" for i in range(1 + len(built.links)))
     found = [mj.site(i).name for i in range(mj.nsite)]
     assert (sorted(found) if own_bodies else found) == [*sites, "tool0"]
     assert [mj.joint(i).name for i in range(mj.njnt)] == [joint.name for joint in built.moving_joints]

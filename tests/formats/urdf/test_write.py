@@ -160,7 +160,7 @@ def test_shapes_are_cylinders_and_a_capsule_has_a_ball_at_either_end(part: str) 
                     assert floats(ball.find("origin"), "xyz") == normal(end)
                     assert floats(ball.find("geometry/sphere"), "radius") == [shape.radius]
         assert list(elements) == []
-    assert kinds == set(ShapeKind)
+    assert kinds == {ShapeKind.CYLINDER, ShapeKind.CAPSULE}
 
 
 def test_materials_are_declared_once_and_used_by_every_visual() -> None:
