@@ -65,9 +65,10 @@ payload: 2
 ```
 
 All of it is in DH frame n, as makers give loads in the frame of the flange; `xyz` and `rpy` are the pose of tool0.
-The tool is a body of its own, `tool`, fixed to the last link; its frame is DH frame n. Without any of the further keys
-there is none. What they leave out is estimated: a mass from the shape, at 1000 kg/m³; a centre of mass from the shape,
-or else at tool0; an inertia from the shape, or else that of a solid ball of 1000 kg/m³. A mesh alone weighs nothing.
+The tool is a body of its own, `tool`, fixed to the last link; its frame is DH frame n. Without any of the further
+keys there is none. What they leave out is estimated: a mass from the shape, at 1000 kg/m³; a centre of mass from the
+shape, or else at tool0; an inertia from the shape, or else that of a solid ball of 1000 kg/m³. A mesh alone weighs
+nothing.
 
 `payload` is what the arm is to carry besides its tool: the efforts and gains that a file leaves open are chosen so
 that they hold it. It is no body, and in no export; an arm that does carry something has it as its tool. It is a solid
