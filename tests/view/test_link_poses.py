@@ -27,7 +27,10 @@ def test_frames_and_tool_are_where_the_table_has_them(robot: tuple[RobotSpec, Ar
         assert np.allclose(poses.frames, table_frame_poses(spec, q), rtol=0, atol=1e-12 * scale)
         assert np.allclose(poses.tool0, table_tool_pose(spec, q), rtol=0, atol=1e-12 * scale)
         assert poses.links[0].tolist() == np.eye(4).tolist()
-        for link, joint, frame in zip(poses.links[1:], model.chain.joints, poses.frames[1:], strict=True):
+        links = [*poses.links[1:]]
+        if model.tool is not None:
+            assert links.pop().tolist() == poses.frames[-1].tolist()
+        for link, joint, frame in zip(links, model.chain.joints, poses.frames[1:], strict=True):
             assert np.allclose(link @ joint.T_joint_dh, frame, rtol=0, atol=1e-12 * scale)
 
 

@@ -27,7 +27,9 @@ from tests.sample_robots import NAMES, ODD_ROBOT, robot
 
 
 def shape(kind: ShapeKind, radius: float, length: float) -> Shape:
-    return Shape(kind=kind, part=ShapePart.LINK, radius=radius, length=length, T_link_shape=identity())
+    size = (radius, 2 * radius, length) if kind is ShapeKind.BOX else None
+    length = 0.0 if kind is ShapeKind.SPHERE else length
+    return Shape(kind=kind, part=ShapePart.LINK, radius=radius, length=length, T_link_shape=identity(), size=size)
 
 
 def surface(made: Shape) -> trimesh.Trimesh:
@@ -45,12 +47,16 @@ def test_a_shape_is_a_closed_surface_of_the_right_volume_seen_from_outside(
     kind: ShapeKind, radius: float, length: float
 ) -> None:
     solid = surface(shape(kind, radius, length))
-    volume = math.pi * radius**2 * length
-    if kind is ShapeKind.CAPSULE:
-        volume += 4 / 3 * math.pi * radius**3
+    ball, cylinder = 4 / 3 * math.pi * radius**3, math.pi * radius**2 * length
+    volume = {
+        ShapeKind.CYLINDER: cylinder,
+        ShapeKind.CAPSULE: cylinder + ball,
+        ShapeKind.SPHERE: ball,
+        ShapeKind.BOX: radius * 2 * radius * length,
+    }[kind]
     assert solid.is_watertight
     assert solid.is_winding_consistent
-    assert volume * 0.98 < solid.volume < volume  # positive: the faces look outwards
+    assert volume * 0.98 < solid.volume < volume * (1 + 1e-12)  # positive: the faces look outwards
     assert len(solid.faces) < 1200
 
 
