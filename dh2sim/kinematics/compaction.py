@@ -13,7 +13,7 @@ import math
 from collections.abc import Set
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -43,7 +43,7 @@ from dh2sim.kinematics.exact import (
     rounded_matrix,
 )
 from dh2sim.kinematics.transforms import rotate_tensor, rpy_from_rotation
-from dh2sim.robot.spec import BaseSpec, Convention, JointType, LinkSpec, MeshSpec, Pose, RobotSpec, Row
+from dh2sim.robot.spec import BaseSpec, Convention, JointType, LinkSpec, MeshSpec, Pose, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 
 _PARALLEL: Final = Decimal("4e-16")
@@ -252,13 +252,19 @@ def compact_rows(spec: RobotSpec) -> Conversion:
                 # row 1 begins where it began: nothing has to go from it to the base
                 first = replace(first, a=spec.rows[0].a, alpha=spec.rows[0].alpha)
                 compact = replace(compact, rows=(first, *compact.rows[1:]), base=spec.base)
-        rows = tuple(
-            replace(new, link=_moved_link(old, new, T_old_new))
-            for old, new, T_old_new in zip(spec.rows, compact.rows, moved, strict=True)
+        shifts = [_shift(*pair, T) for *pair, T in zip(spec.rows, compact.rows, moved, strict=True)]
+        compact = replace(
+            compact,
+            rows=tuple(
+                replace(new, link=_moved_body(old.link, T_new_old))
+                for old, new, T_new_old in zip(spec.rows, compact.rows, shifts, strict=True)
+            ),
+            tool=_moved_tool(spec.tool, compact.tool.pose, shifts[-1]),
+            payload=replace(spec.payload, com=_moved_point(spec.payload.com, shifts[-1])),
+            convention=spec.convention,
+            source_file=None,
         )
-    return Conversion(
-        spec=replace(compact, rows=rows, convention=spec.convention, source_file=None), notes=tuple(notes)
-    )
+    return Conversion(spec=compact, notes=tuple(notes))
 
 
 def _cut_anew(spec: RobotSpec, hayati: Set[int]) -> tuple[RobotSpec, list[Matrix | None], list[str]]:
@@ -335,7 +341,7 @@ def _moved_base(base: BaseSpec, survey: _Survey) -> tuple[BaseSpec, Matrix]:
     return replace(base, pose=pose, mesh=_moved_mesh(base.mesh, exact_inverse(T_old_new))), T_old_new
 
 
-def _last(begins: Matrix, survey: _Survey, spec: RobotSpec) -> tuple[_Cut, Pose]:
+def _last(begins: Matrix, survey: _Survey, spec: RobotSpec) -> tuple[_Cut, ToolSpec]:
     """End the last row on its own axis, beside the tool, which takes the rest."""
     height = Decimal(float(survey.path.own(survey.n)[2]))
     frame = exact_frame((begins[0][3], begins[1][3], height), (ONE, ZERO, ZERO), (ZERO, ZERO, ONE))
@@ -349,7 +355,7 @@ def _last(begins: Matrix, survey: _Survey, spec: RobotSpec) -> tuple[_Cut, Pose]
         before=frame,
         behind=frame,
     )
-    return cut, Pose(xyz=read_only(tool[:3, 3]), rpy=rpy)
+    return cut, ToolSpec(xyz=read_only(tool[:3, 3]), rpy=rpy)
 
 
 def _lead(begins: Matrix, survey: _Survey, i: int, *, hayati: bool) -> _Cut:
@@ -427,30 +433,49 @@ def _cut(
     )
 
 
-def _moved_link(old: Row, new: Row, T_old_new: Matrix | None) -> LinkSpec:
-    """Return what a link says of itself, written down in its new DH frame."""
+def _shift(old: Row, new: Row, T_old_new: Matrix | None) -> Matrix | None:
+    """Return the old DH frame of a row in its new one; None where they are the same."""
     tails = (_tail(old), _tail(new))
     if T_old_new is None and tails[0] == tails[1]:
-        return old.link
+        return None
     Z = exact_link_part(0.0, 0.0) if T_old_new is None else T_old_new
-    T_new_old = exact_inverse(exact_product(exact_inverse(tails[0]), Z, tails[1]))
-    link = old.link
-    com = None if link.com is None else read_only([rounded(value) for value in _point(T_new_old, link.com)])
-    inertia = None if link.inertia is None else rotate_tensor(rounded_matrix(T_new_old), link.inertia)
-    return replace(link, com=com, inertia=inertia, mesh=_moved_mesh(link.mesh, T_new_old))
+    return exact_inverse(exact_product(exact_inverse(tails[0]), Z, tails[1]))
 
 
-def _point(T: Matrix, point: Array) -> Vector:
+_BodySpec = TypeVar("_BodySpec", LinkSpec, ToolSpec)
+
+
+def _moved_body(body: _BodySpec, T_new_old: Matrix | None) -> _BodySpec:
+    """Return what a link or the tool says of itself, written down in its new DH frame."""
+    if T_new_old is None:
+        return body
+    inertia = None if body.inertia is None else rotate_tensor(rounded_matrix(T_new_old), body.inertia)
+    com, mesh = _moved_point(body.com, T_new_old), _moved_mesh(body.mesh, T_new_old)
+    return replace(body, com=com, inertia=inertia, mesh=mesh)
+
+
+def _moved_tool(tool: ToolSpec, pose: Pose, T_new_old: Matrix | None) -> ToolSpec:
+    """Return the tool with tool0 at ``pose`` in the new DH frame n."""
+    shape = tool.shape
+    if shape is not None and T_new_old is not None:
+        shape = replace(shape, pose=_moved_pose(shape.pose, T_new_old))
+    return replace(_moved_body(tool, T_new_old), xyz=pose.xyz, rpy=pose.rpy, shape=shape)
+
+
+def _moved_point(point: Array | None, T_new_old: Matrix | None) -> Array | None:
+    if point is None or T_new_old is None:
+        return point
     at = _decimals(point)
-    x, y, z = (exact_dot(row[:3], at) + row[3] for row in T)
-    return (x, y, z)
+    return read_only([rounded(exact_dot(row[:3], at) + row[3]) for row in T_new_old])
 
 
 def _moved_mesh(mesh: MeshSpec | None, T_new_old: Matrix) -> MeshSpec | None:
-    if mesh is None:
-        return None
-    T = rounded_matrix(exact_product(T_new_old, exact_pose(mesh.pose.xyz, mesh.pose.rpy)))
-    return replace(mesh, pose=Pose(xyz=read_only(T[:3, 3]), rpy=rpy_from_rotation(T)))
+    return None if mesh is None else replace(mesh, pose=_moved_pose(mesh.pose, T_new_old))
+
+
+def _moved_pose(pose: Pose, T_new_old: Matrix) -> Pose:
+    T = rounded_matrix(exact_product(T_new_old, exact_pose(pose.xyz, pose.rpy)))
+    return Pose(xyz=read_only(T[:3, 3]), rpy=rpy_from_rotation(T))
 
 
 class _Notes:

@@ -242,10 +242,10 @@ def _shift(row: Row, new: Row) -> XPart:
     return merged(_tail(row), inverse(_tail(new)))
 
 
-BodySpec = TypeVar("BodySpec", LinkSpec, ToolSpec)
+_BodySpec = TypeVar("_BodySpec", LinkSpec, ToolSpec)
 
 
-def _moved_body(body: BodySpec, T_new_old: XPart) -> BodySpec:
+def _moved_body(body: _BodySpec, T_new_old: XPart) -> _BodySpec:
     if T_new_old.is_identity:
         return body
     T = T_new_old.transform

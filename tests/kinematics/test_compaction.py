@@ -17,7 +17,18 @@ from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_errors
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import BaseSpec, Dynamics, Limits, LinkSpec, MeshSpec, Pose, RobotSpec, Row
+from dh2sim.robot.spec import (
+    BaseSpec,
+    Dynamics,
+    Limits,
+    LinkSpec,
+    MeshSpec,
+    PayloadSpec,
+    Pose,
+    RobotSpec,
+    Row,
+    ToolSpec,
+)
 from dh2sim.typing import Array, read_only
 from tests.kinematics.arms import table
 from tests.kinematics.perturbed_arms import KINDS, REACHES, perturbed, textbook_table
@@ -157,6 +168,7 @@ def test_frames_slide_back_along_parallel_axes_without_hayati_rows(convention: s
 
 
 def test_the_first_and_the_last_frame_come_to_the_arm() -> None:
+    at_base = np.linalg.inv(pose_from_rpy([40.0, 0, -200.0], [0.9, 0, 0]))[:3, 3]
     spec = RobotSpec(
         name="ends",
         rows=(
@@ -168,7 +180,8 @@ def test_the_first_and_the_last_frame_come_to_the_arm() -> None:
             pose=Pose(xyz=read_only([0.1, 0.0, -300.0])),
             mesh=MeshSpec(file=Path("base.stl"), pose=Pose(xyz=read_only([0, 0, 300]))),
         ),
-        tool=Pose(xyz=np.linalg.inv(pose_from_rpy([40.0, 0, -200.0], [0.9, 0, 0]))[:3, 3] + [0, 0, 0.1]),
+        tool=ToolSpec(xyz=at_base + np.array([0, 0, 0.1]), mass=0.5, com=at_base + np.array([0, 0.02, 0.05])),
+        payload=PayloadSpec(mass=1.0, com=at_base),
     )
     conversion = compact_rows(spec)
     compact = conversion.spec
@@ -178,6 +191,14 @@ def test_the_first_and_the_last_frame_come_to_the_arm() -> None:
     assert np.linalg.norm(compact.tool.xyz) < 1.0
     assert compact.base.mesh is not None
     assert np.allclose(compact.base.pose.xyz + compact.base.mesh.pose.xyz, [0.1, 0.0, 0.0], atol=1e-13)
+    q = drawn(spec, 5)
+    old, new = table_frame_poses(spec, q)[:, -1], table_frame_poses(compact, q)[:, -1]
+    for before, after in ((spec.tool.com, compact.tool.com), (spec.payload.com, compact.payload.com)):
+        assert before is not None
+        assert after is not None
+        assert np.abs(after).max() < 1.0
+        place = old[:, :3, :3] @ before + old[:, :3, 3]
+        assert np.allclose(new[:, :3, :3] @ after + new[:, :3, 3], place, atol=1e-11)
     assert_the_same_arm(spec, compact)
 
 
