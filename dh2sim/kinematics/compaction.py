@@ -252,7 +252,7 @@ def compact_rows(spec: RobotSpec) -> Conversion:
                 # row 1 begins where it began: nothing has to go from it to the base
                 first = replace(first, a=spec.rows[0].a, alpha=spec.rows[0].alpha)
                 compact = replace(compact, rows=(first, *compact.rows[1:]), base=spec.base)
-        shifts = [_shift(*pair, T) for *pair, T in zip(spec.rows, compact.rows, moved, strict=True)]
+        shifts = [_shift(old, new, T) for old, new, T in zip(spec.rows, compact.rows, moved, strict=True)]
         compact = replace(
             compact,
             rows=tuple(

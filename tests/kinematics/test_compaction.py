@@ -168,7 +168,7 @@ def test_frames_slide_back_along_parallel_axes_without_hayati_rows(convention: s
 
 
 def test_the_first_and_the_last_frame_come_to_the_arm() -> None:
-    at_base = np.linalg.inv(pose_from_rpy([40.0, 0, -200.0], [0.9, 0, 0]))[:3, 3]
+    at_base: Array = read_only(np.linalg.inv(pose_from_rpy([40.0, 0, -200.0], [0.9, 0, 0]))[:3, 3])
     spec = RobotSpec(
         name="ends",
         rows=(

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.skeleton import Skeleton, build_skeleton
-from dh2sim.robot.spec import Pose, RobotSpec, Row
+from dh2sim.robot.spec import RobotSpec, Row, ToolSpec
 from dh2sim.typing import read_only
 from tests.sample_robots import MODIFIED, PRISMATIC, REVOLUTE, STANDARD, row
 from tests.strategies import robot_specs
@@ -17,7 +17,7 @@ from tests.strategies import robot_specs
 def skeleton(
     *rows: Row, tool: tuple[float, float, float] = (0, 0, 0), travel: tuple[float, float] = (0, 0)
 ) -> Skeleton:
-    spec = RobotSpec(name="r", rows=rows, tool=Pose(xyz=read_only(tool)))
+    spec = RobotSpec(name="r", rows=rows, tool=ToolSpec(xyz=read_only(tool)))
     return build_skeleton(build_chain(spec), [travel if one.type is PRISMATIC else (0.0, 0.0) for one in rows])
 
 

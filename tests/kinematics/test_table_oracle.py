@@ -153,7 +153,7 @@ def test_the_oracle_imports_nothing_of_what_it_judges() -> None:
 def test_errors_in_exact_arithmetic_are_those_of_doubles(robot: tuple[RobotSpec, Array]) -> None:
     spec, q = robot
     longer = dataclasses.replace(
-        spec, tool=ToolSpec(xyz=spec.tool.xyz + np.array([0.0, 0.03, 0.04]), rpy=spec.tool.rpy)
+        spec, tool=ToolSpec(xyz=spec.tool.xyz + np.array([0, 0.03, 0.04]), rpy=spec.tool.rpy)
     )
     position, rotation = table_tool_errors(longer, spec, q)
     assert position == pytest.approx(0.05, rel=1e-12)

@@ -17,7 +17,7 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import link_part, pose_from_rpy, rpy_from_rotation, second_twist
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import BaseSpec, Convention, JointType, LinkSpec, Pose, RobotSpec, Row
+from dh2sim.robot.spec import BaseSpec, Convention, JointType, LinkSpec, Pose, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import HAYATI, MODIFIED, NAMES, REVOLUTE, STANDARD, model, robot
 from tests.strategies import robot_specs
@@ -31,6 +31,8 @@ def assert_same_bodies(one: RobotModel, other: RobotModel) -> None:
     assert other.reach == pytest.approx(one.reach, rel=0, abs=SAME * size)
     q = one.home
     poses = [[np.eye(4), *reference_joint_poses(built.chain, q)] for built in (one, other)]
+    for built, own in zip((one, other), poses, strict=True):
+        own += [own[-1] @ built.joints[-1].T_joint_dh] if built.tool else []
     for a, b, T_a, T_b in zip(one.all_links, other.all_links, *poses, strict=True):
         assert [(s.kind, s.part, s.radius) for s in a.shapes] == [(s.kind, s.part, s.radius) for s in b.shapes]
         for s, t in zip(a.shapes, b.shapes, strict=True):
@@ -120,7 +122,9 @@ def recut(spec: RobotSpec, slides: list[float]) -> RobotSpec:
             )
         )
         before = rest
-    return replace(spec, rows=tuple(cut), base=replace(spec.base, pose=as_pose(base)), tool=as_pose(before))
+    return replace(
+        spec, rows=tuple(cut), base=replace(spec.base, pose=as_pose(base)), tool=ToolSpec.at(as_pose(before))
+    )
 
 
 @st.composite
@@ -135,7 +139,8 @@ def parallel_axes(draw: DrawFn) -> RobotSpec:
             small = draw(st.sampled_from([0.0, 4.1e-4, -1.7e-3])) if row.convention is HAYATI else 0.0
             row = replace(row, alpha=draw(tilts), beta=small)
         rows.append(row)
-    return replace(spec, rows=tuple(rows))
+    tool, payload = ToolSpec.at(spec.tool.pose), replace(spec.payload, com=None)
+    return replace(spec, rows=tuple(rows), tool=tool, payload=payload)
 
 
 @settings(max_examples=80)

@@ -171,7 +171,10 @@ def _triads(model: RobotModel) -> Mapping[str, Item]:
     """Return DH frames and tool0, each below the link that carries it."""
     chain, length = model.chain, triad_length(model)
     T_link_dh = [chain.T_base_link_dh0, *(joint.T_joint_dh for joint in chain.joints)]
-    carried = [(link.name, f"dh_{i}", T) for i, (link, T) in enumerate(zip(model.all_links, T_link_dh, strict=True))]
+    carried = [
+        (link.name, f"dh_{i}", T)
+        for i, (link, T) in enumerate(zip((model.base, *model.links), T_link_dh, strict=True))
+    ]
     link, _, T_last = carried[-1]
     carried.append((link, "tool0", compose(T_last, chain.T_dhn_tool0)))
     return {
