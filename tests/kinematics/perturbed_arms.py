@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dh2sim.kinematics.transforms import rpy_from_rotation
-from dh2sim.robot.spec import BaseSpec, Convention, JointType, Pose, RobotSpec, Row
+from dh2sim.robot.spec import BaseSpec, Convention, JointType, Pose, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 from tests.kinematics.frame_assignment.chains import Axis, pose, turn, unit
 
@@ -96,7 +96,7 @@ def textbook_table(axes: list[Axis], T_base_tip: Array) -> RobotSpec:
         convention=Convention.STANDARD,
         rows=tuple(rows),
         base=BaseSpec(pose=_pose(base)),
-        tool=_pose(tool),
+        tool=ToolSpec.at(_pose(tool)),
     )
 
 
