@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import signal
 import sys
+import textwrap
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,7 +16,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dh2sim.cli.common import INTERRUPTED, RobotArgument, build_all
-from dh2sim.cli.output import progress_bar, size_text
+from dh2sim.cli.output import make_console, progress_bar, size_text
+from dh2sim.cli.runs import clipped_controls, contacts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -79,17 +82,23 @@ def rollout(
     floating_base: Annotated[bool, typer.Option("--floating-base", help="Let base_link move freely.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted run, or start it.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing run.")] = False,
+    as_json: Annotated[
+        bool,
+        typer.Option("--json", help="Print a description of the run as JSON, as 'dh2sim runs --json' does, alone."),
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> int:
     """Simulate many rollouts in MuJoCo and write them as a dataset.
 
     The same seed gives the same bits, with any number of threads and after any interruption: Ctrl-C finishes the
-    rollouts in progress, and --resume continues. Unstable rollouts are stopped one by one, and marked.
+    rollouts in progress, and --resume continues. Unstable rollouts are stopped one by one, and marked. At the end it
+    says in how many rollouts links of the robot touched, or a controller wanted more than an actuator can do.
 
     \b
     Examples:
       dh2sim rollout stanford --out run.zarr
       dh2sim rollout scara --out run.zarr --controller pd:period=0.5
+      dh2sim rollout ur5e --out run.zarr --start random --json -q
       dh2sim rollout my_arm.yaml --out run.zarr --rollouts 100000 --resume
       dh2sim rollout puma560 --out run.zarr --randomize mass=0.2
     Then:
@@ -126,7 +135,10 @@ def rollout(
         progress = fill(writer, job, threads=threads, advance=advance, stopping=lambda: patience.arrived is not None)
     summary = describe(out)
     if not quiet:
-        _print_summary(job, summary, progress, out)
+        with redirect_stdout(sys.stderr) if as_json else nullcontext():
+            _print_summary(job, summary, progress, out)
+    if as_json:
+        print(json.dumps(summary.to_json(), indent=2))
     if progress.finished:
         return 0
     print(
@@ -206,6 +218,15 @@ def _print_summary(job: Job, summary: RunDescription, progress: Progress, out: P
         counts.append(f"stopped early {summary.unstable:,} ({reasons})")
     if summary.not_run:
         counts.append(f"not run {summary.not_run:,}")
-    if summary.saturated:
-        counts.append(f"controls clipped in {summary.saturated:,}")
-    print(f"  {', '.join(counts)}")
+    counts += [*contacts(summary), *clipped_controls(summary)]
+    width = make_console().width
+    print(
+        textwrap.fill(
+            ", ".join(counts),
+            width,
+            initial_indent="  ",
+            subsequent_indent="    ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+    )

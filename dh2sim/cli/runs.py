@@ -153,7 +153,10 @@ def _sections(description: RunDescription) -> Iterator[tuple[str, list[str]]]:
     yield "controller", [description.controller]
     changes = ", ".join(f"{name} ±{100 * share:g} %" for name, share in description.randomize.items())
     yield "randomised", [changes or "nothing"]
-    yield "rollouts", [_counts(description), *_early_stops(description), *_clipped(description)]
+    yield (
+        "rollouts",
+        [_counts(description), *_early_stops(description), *contacts(description), *clipped_controls(description)],
+    )
     every = "every one" if description.every == 1 else f"one in {description.every}"
     yield (
         "steps",
@@ -191,9 +194,26 @@ def _counts(description: RunDescription) -> str:
     return f"{description.rollouts:,}: {', '.join(parts)}"
 
 
-def _clipped(description: RunDescription) -> list[str]:
-    count = description.saturated
-    return [f"controls clipped in {count:,}"] if count else []
+def contacts(description: RunDescription) -> list[str]:
+    """Return in how many rollouts links touched, and where the first of them did; empty if in none."""
+    first = description.first_contact
+    if first is None:
+        return []
+    where = f"{' and '.join(first.links)} in rollout {first.rollout} at {first.time:.4g} s"
+    return [f"links touched in {description.touched:,} (first: {where})"]
+
+
+def clipped_controls(description: RunDescription) -> list[str]:
+    """Return in how many rollouts controls were clipped, of which joints, and what helps; empty if in none."""
+    if not description.saturated:
+        return []
+    from dh2sim.simulate.controllers.registry import slower
+
+    counts = [f"{joint} in {count:,}" for joint, count in description.saturated_joints.items()]
+    more = [f"{len(counts) - SHOWN} more joints"] if len(counts) > SHOWN else []
+    text = f"controls clipped in {description.saturated:,}: {', '.join([*counts[:SHOWN], *more])}"
+    gentler = slower(description.controller)
+    return [f"{text}; a longer period takes less: --controller {gentler}" if gentler else text]
 
 
 def _early_stops(description: RunDescription) -> Iterator[str]:

@@ -9,6 +9,7 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
+from dh2sim.simulate.contacts import FirstContacts
 from dh2sim.simulate.dataset_layout import FINISHED, STATUS
 from dh2sim.simulate.mujoco_runtime import VELOCITY_STAGE, forward
 from dh2sim.simulate.plant import Plant
@@ -180,6 +181,7 @@ class MonitoredBatch:
         self.status = np.full(batch.nsim, FINISHED, dtype=np.int8)
         self.stop_step = np.full(batch.nsim, -1, dtype=np.int64)
         self.saturation = np.zeros((batch.nsim, len(plant.actuators)), dtype=np.int64)
+        self.contacts = FirstContacts(plant, batch.nsim, substeps=recorder.substeps)
 
     @property
     def ids(self) -> NDArray[np.int32] | None:

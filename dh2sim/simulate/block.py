@@ -136,6 +136,9 @@ def _simulate(job: Job, rollouts: range, threads: int, arrays: Block, run_steps:
     recorder.end(monitored.stop_step)
     arrays["status"][:], arrays["stop_step"][:] = monitored.status, monitored.stop_step
     arrays["saturation"][:] = monitored.saturation
+    monitored.contacts.forget_after(monitored.stop_step)
+    arrays["contact_step"][:] = monitored.contacts.step
+    arrays["contact_link_a"][:], arrays["contact_link_b"][:] = monitored.contacts.links.T
     for quantity, values in factors.items():
         arrays[f"{quantity}_scale"][:] = values
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dh2sim.simulate.contacts import NO_CONTACT, links_with_shapes
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.plant import Plant
 from dh2sim.simulate.randomization import links
@@ -148,6 +149,12 @@ def _variables(plant: Plant, options: RolloutOptions, *, follows: bool) -> Itera
     yield _per_rollout(
         "saturation", ("actuator",), LONG, 0, "1", "time steps in which the wanted control was out of range"
     )
+    words = "time step at whose beginning links of the robot first touched, or -1"
+    yield _per_rollout("contact_step", (), LONG, NO_CONTACT, "1", words)
+    bodies = {NO_CONTACT: "none", **links_with_shapes(plant.model)}
+    flags = {"flag_values": list(bodies), "flag_meanings": " ".join(bodies.values())}
+    for name, which in (("contact_link_a", "one"), ("contact_link_b", "the other")):
+        yield _per_rollout(name, (), INT, NO_CONTACT, "1", f"{which} of the links that touched then", **flags)
     dimensions = {"mass": ("link",), "gain": ("actuator",)}
     for name in options.randomize:
         yield _per_rollout(

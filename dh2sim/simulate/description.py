@@ -12,9 +12,11 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from dh2sim.simulate.contacts import NO_CONTACT
 from dh2sim.simulate.dataset_layout import FINISHED, NOT_RUN, STATUS
-from dh2sim.simulate.store.reader import open_run
+from dh2sim.simulate.store.reader import StoredRun, open_run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +40,18 @@ class EarlyStop:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FirstContact:
+    """Where links of the robot first touch in a rollout."""
+
+    rollout: int
+    step: int
+    """Time step at whose beginning they touch."""
+    time: float
+    """s."""
+    links: tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RunDescription:
     """A description of a run. Rollouts of a block that is not committed count as not run."""
 
@@ -52,8 +66,14 @@ class RunDescription:
     not_run: int
     reasons: Mapping[str, int]
     """Number of rollouts that stopped early for each reason."""
+    touched: int | None
+    """Rollouts in which links of the robot touch at least once; None for a run that does not contain it."""
+    first_contact: FirstContact | None
+    """Of the first of these rollouts."""
     saturated: int
     """Rollouts in which the controller wanted a control outside its range at least once."""
+    saturated_joints: Mapping[str, int]
+    """The same for each joint that there were any of."""
     steps: int
     """Time steps of a rollout."""
     timestep: float
@@ -115,6 +135,9 @@ def describe(path: str | PathLike[str]) -> RunDescription:
             done[manifest.part(block)] = True
             seconds.append(record.seconds)
     status = np.where(done, status, NOT_RUN)
+    contact_step = None
+    if "contact_step" in manifest.variables:
+        contact_step = np.where(done, run.values("contact_step"), NO_CONTACT)
     complete = bool(done.all())
     steps = int(np.where(stop_step >= 0, stop_step, settings["steps"])[done].sum())
     counts = {name: int((status == value).sum()) for name, value in STATUS.items() if value > FINISHED}
@@ -129,7 +152,10 @@ def describe(path: str | PathLike[str]) -> RunDescription:
         unstable=int((status > FINISHED).sum()),
         not_run=int((status == NOT_RUN).sum()),
         reasons=MappingProxyType({name: count for name, count in counts.items() if count}),
+        touched=None if contact_step is None else int((contact_step >= 0).sum()),
+        first_contact=None if contact_step is None else _first_contact(run, contact_step, timestep),
         saturated=int((saturation[done] > 0).any(axis=1).sum()),
+        saturated_joints=MappingProxyType(_by_joint(run, saturation[done] > 0)),
         steps=settings["steps"],
         timestep=timestep,
         every=settings["every"],
@@ -165,6 +191,32 @@ def describe(path: str | PathLike[str]) -> RunDescription:
     )
 
 
+def _first_contact(run: StoredRun, contact_step: NDArray[Any], timestep: float) -> FirstContact | None:
+    touched = np.flatnonzero(contact_step >= 0)
+    if not len(touched):
+        return None
+    rollout = int(touched[0])
+    step = int(contact_step[rollout])
+    links = []
+    for name in ("contact_link_a", "contact_link_b"):
+        flags = run.manifest.variables[name].attributes
+        names = dict(zip(flags["flag_values"], flags["flag_meanings"].split(), strict=True))
+        links.append(names.get(int(run.values(name)[rollout]), "unknown"))
+    return FirstContact(rollout=rollout, step=step, time=step * timestep, links=(links[0], links[1]))
+
+
+def _by_joint(run: StoredRun, clipped: NDArray[np.bool_]) -> dict[str, int]:
+    """Return the number of rollouts for each joint, from where its actuator was clipped, shape (rollouts, actuators).
+
+    An actuator is named after its joint and its type.
+    """
+    if not clipped.any():
+        return {}
+    names = [str(actuator).rpartition("_")[0] for actuator in run.values("actuator")]
+    counts = {name: int(count) for name, count in zip(names, clipped.sum(axis=0), strict=True) if count}
+    return dict(sorted(counts.items(), key=lambda item: -item[1]))
+
+
 def resumed(command: str) -> str:
     """Return the command that resumes a run which another command began."""
     try:
@@ -177,7 +229,7 @@ def resumed(command: str) -> str:
 
 def _json(value: Any) -> Any:
     match value:
-        case RecordedVariable() | EarlyStop():
+        case RecordedVariable() | EarlyStop() | FirstContact():
             return {name: _json(getattr(value, name)) for name in value.__dataclass_fields__}
         case Mapping():
             return {name: _json(item) for name, item in value.items()}

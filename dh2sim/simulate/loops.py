@@ -112,8 +112,10 @@ class _Segment:
 
     def __init__(self, monitored: MonitoredBatch) -> None:
         self._monitored = monitored
+        self._qpos = monitored.batch.bind("qpos")
         recorder, data = monitored.recorder, mujoco.MjData(monitored.plant.model)
-        self._fields = (*recorder.state_fields, *recorder.derived_fields)
+        # positions and the number of contacts always, for the first contact of each rollout
+        self._fields = tuple(dict.fromkeys((*recorder.state_fields, *recorder.derived_fields, "qpos", "ncon")))
         shapes = {field: np.shape(getattr(data, field)) for field in self._fields}
         width = monitored.plant.model.nu + sum(int(np.prod(shape)) for shape in shapes.values())
         self.steps = max(16, min(monitored.steps, SEGMENT_BYTES // (8 * monitored.batch.nsim * max(1, width))))
@@ -125,15 +127,18 @@ class _Segment:
     def run(self, controls: Array, first: int, count: int) -> None:
         """Simulate ``count`` time steps from ``first``; controls of shape (batch, count or 1, actuators)."""
         monitored, batch = self._monitored, self._monitored.batch
-        before = batch.state.copy()
+        before, start = batch.state.copy(), self._qpos.copy()
         ids, rows = monitored.ids, monitored.rows
         out = self._out(count, rows)
         failed = monitored.call(self._advance, controls, rows, ids, count, out)
         for field, values in out.items():
             monitored.recorder.put_field(field, first + (field in monitored.recorder.state_fields), values, rows)
         monitored.recorder.put("ctrl", first, np.broadcast_to(controls, (len(controls), count, controls.shape[2])))
+        running = np.arange(batch.nsim)[rows]
         if len(failed):
+            out["ncon"][np.isin(running, failed)] = 0
             self._step_by_step(failed, before, controls, first, count)
+        monitored.contacts.see_many(running, first, out["ncon"], start, out["qpos"])
 
     def _advance(
         self, controls: Array, rows: Any, ids: NDArray[np.int32] | None, count: int, out: dict[str, NDArray[Any]]
@@ -159,7 +164,7 @@ class _Segment:
         batch.warning[failed] = 0
         left = failed
         for j in range(count):
-            now = controls[left, min(j, controls.shape[1] - 1)][:, None]
+            now, start = controls[left, min(j, controls.shape[1] - 1)][:, None], self._qpos.copy()
             ids = left.astype(np.int32)
             out = {name: np.empty((len(left), 1, *old.shape[2:]), old.dtype) for name, old in self._buffers.items()}
             stopped = monitored.call(self._one, now, ids, out)
@@ -169,7 +174,9 @@ class _Segment:
                 monitored.recorder.put_field(
                     field, first + j + (field in monitored.recorder.state_fields), values, left
                 )
-            left = left[~np.isin(left, stopped)]
+            went_on = ~np.isin(left, stopped)
+            monitored.contacts.see_many(left[went_on], first + j, out["ncon"][went_on], start, out["qpos"][went_on])
+            left = left[went_on]
             if not len(left):
                 return
 
@@ -219,10 +226,12 @@ def simulate_closed_loop(
     derived = {field: batch.bind(field) for field in recorder.derived_fields}
     states = {field: batch.bind(field) for field in recorder.state_fields}
     pages = _Pages(monitored)
+    contacts, qpos = batch.bind("ncon"), batch.bind("qpos")
     monitored.look(0)
     for step in range(monitored.steps):
         if not monitored.alive.any():
             break
+        monitored.contacts.see(np.flatnonzero(monitored.alive), step, contacts[monitored.rows], qpos[monitored.rows])
         for field, values in derived.items():
             if field != "qacc":
                 pages.note(field, "before", values)

@@ -31,7 +31,7 @@ class Recorder:
         self._arrays = arrays
         self._every = every
         self._first_q, self._first_v = (7, 6) if plant.floating else (0, 0)
-        self._substeps = plant.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
+        self.substeps = plant.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
         self.joints = n = plant.n
         self._torque = slice(2 * n, 3 * n)  # sensors are in the order of ``add_sensors``
         self._tool = slice(3 * n, 3 * n + 7)
@@ -43,7 +43,7 @@ class Recorder:
     @property
     def looks_between_steps(self) -> bool:
         """Whether something is recorded that the substeps of RK4 overwrite."""
-        return self._substeps and any(map(self.wants, ("energy", "contacts")))
+        return self.substeps and any(map(self.wants, ("energy", "contacts")))
 
     @property
     def state_fields(self) -> tuple[str, ...]:

@@ -108,7 +108,10 @@ def test_what_went_wrong_in_rollouts_is_counted(folder: Path) -> None:
     motor = ["--controller", "pd:kp=1e6", "--start", "s.csv"]
     run = dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *QUICK, *motor)
     assert (run.status, run.err) == (0, "")
-    assert run.out.splitlines()[-1] == "  finished 1, stopped early 2 (bad_qvel 2), controls clipped in 1"
+    assert run.out.splitlines()[-2:] == [
+        "  finished 1, stopped early 2 (bad_qvel 2), controls clipped in 1: joint_1 in 1,",
+        "    elbow in 1; a longer period takes less: --controller pd:kp=1000000,period=2",
+    ]
 
 
 def test_a_finished_run_has_nothing_to_resume(folder: Path) -> None:
@@ -292,7 +295,7 @@ def test_every_example_of_the_help_works(folder: Path) -> None:
     write(folder, small("my_arm"))
     lines = dh2sim("rollout", "--help").out.split("Examples:\n")[1].split("  Then:")[0].splitlines()
     commands = [line.split()[1:] for line in lines if line.strip()]
-    assert len(commands) == 4
+    assert len(commands) == 5
     for number, command in enumerate(commands):
         at = command.index("--out") + 1
         run = dh2sim(*command[:at], f"{number}.zarr", *command[at + 1 :], *QUICK)

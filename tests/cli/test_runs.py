@@ -19,25 +19,31 @@ run.zarr  complete
   rollouts    7: 6 finished, 1 stopped early
               stopped early: bad_qacc 1
                 rollout 4: bad_qacc in step 5 (0.01 s)
-              controls clipped in 7
+              links touched in 1 (first: base_link and link_3 in rollout 2 at
+              0.006 s)
+              controls clipped in 7: slide in 7; a longer period takes less:
+              --controller pd:kp=10,period=2
   steps       8 of 0.002 s = 0.016 s, one in 2 recorded
   integrator  implicitfast
   start       home, seed 0
-  recorded    qpos        7 x 5 x 3  rollout, step, joint
-              qvel        7 x 5 x 3  rollout, step, joint
-              ctrl        7 x 4 x 2  rollout, interval, actuator
-              qpos_ref    7 x 5 x 3  rollout, step, joint
-              torque      7 x 4 x 3  rollout, interval, joint
-              tool_pose   7 x 5 x 7  rollout, step, pose
-              base_pose   7 x 5 x 7  rollout, step, pose
-              base_twist  7 x 5 x 6  rollout, step, twist
-              energy      7 x 5 x 2  rollout, step, energy_kind
-              mass_scale  7 x 3      rollout, link
-              gain_scale  7 x 2      rollout, actuator
-              contacts    7 x 4      rollout, interval
-              status      7          rollout
-              stop_step   7          rollout
-              saturation  7 x 2      rollout, actuator
+  recorded    qpos            7 x 5 x 3  rollout, step, joint
+              qvel            7 x 5 x 3  rollout, step, joint
+              ctrl            7 x 4 x 2  rollout, interval, actuator
+              qpos_ref        7 x 5 x 3  rollout, step, joint
+              torque          7 x 4 x 3  rollout, interval, joint
+              tool_pose       7 x 5 x 7  rollout, step, pose
+              base_pose       7 x 5 x 7  rollout, step, pose
+              base_twist      7 x 5 x 6  rollout, step, twist
+              energy          7 x 5 x 2  rollout, step, energy_kind
+              mass_scale      7 x 3      rollout, link
+              gain_scale      7 x 2      rollout, actuator
+              contacts        7 x 4      rollout, interval
+              status          7          rollout
+              stop_step       7          rollout
+              saturation      7 x 2      rollout, actuator
+              contact_step    7          rollout
+              contact_link_a  7          rollout
+              contact_link_b  7          rollout
   size        {size}
   speed       {speed}
   made        2026-11-22 01:02:03 UTC
@@ -103,7 +109,10 @@ def test_json_tells_the_same_alone(run: Path, arrays: Arrays) -> None:
         "not_run": 0,
         "reasons": {"bad_qacc": 1},
         "stopped": [{"rollout": 4, "reason": "bad_qacc", "step": 5}],
+        "touched": 1,
+        "first_contact": {"rollout": 2, "step": 3, "time": 0.006, "links": ["base_link", "link_3"]},
         "saturated": 7,
+        "saturated_joints": {"slide": 7},
         "steps": 8,
         "timestep": 0.002,
         "every": 2,

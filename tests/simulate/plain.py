@@ -48,6 +48,8 @@ class Track:
     qacc: Array
     torque: Array
     contacts: NDArray[Any]
+    touching: NDArray[Any]
+    """Bodies that touch with the least distance, or -1, at the beginning of every step."""
     saturation: NDArray[Any]
     status: int
     stop_step: int
@@ -115,6 +117,7 @@ def track(model: mujoco.MjModel, qpos: Array, qvel: Array, control: Control, ste
         kept["ctrl"].append(data.ctrl.copy())
         kept["torque"].append(seen.qfrc_actuator[model.nv - _joints(model) :].copy())
         kept["contacts"].append(seen.ncon)
+        kept["touching"].append(_deepest(model, seen))
         mujoco.mj_step(model, data)
         kept["qacc"].append(data.qacc.copy())
         state()
@@ -132,6 +135,14 @@ def track(model: mujoco.MjModel, qpos: Array, qvel: Array, control: Control, ste
     arrays = {name: np.array(values) for name, values in kept.items()}
     arrays["saturation"] = kept["saturation"][0]
     return Track(**arrays, status=status, stop_step=stop_step)
+
+
+def _deepest(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
+    contacts = [data.contact[i] for i in range(data.ncon)]
+    if not contacts:
+        return [-1, -1]
+    geoms = min(contacts, key=lambda contact: contact.dist).geom
+    return sorted(int(model.geom(int(geom)).bodyid[0]) for geom in geoms)
 
 
 def _reason(data: mujoco.MjData) -> int:
@@ -170,6 +181,12 @@ def _recorded(name: str, one: Track, n: int, every: int, steps: int) -> Any:
     match name:
         case "status" | "stop_step" | "saturation":
             return getattr(one, name)
+        case "contact_step" | "contact_link_a" | "contact_link_b":
+            seen = one.touching if one.stop_step < 0 else one.touching[: one.stop_step]
+            first = next((k for k, links in enumerate(seen.tolist()) if links[0] >= 0), None)
+            if first is None:
+                return -1
+            return {"step": first, "link_a": seen[first, 0], "link_b": seen[first, 1]}[name.removeprefix("contact_")]
         case "base_pose":
             values = one.qpos[:, :-n]
         case "base_twist":
@@ -191,8 +208,9 @@ def assert_equal(run: xr.Dataset, wanted: Mapping[str, NDArray[Any]], rollouts: 
     """Compare bit for bit."""
     for name, values in wanted.items():
         found = run[name].values[rollouts]
-        assert found.dtype == values.dtype or name in ("status", "contacts"), name
-        np.testing.assert_array_equal(found, values, err_msg=name, strict=name not in ("status", "contacts"))
+        narrow = name in ("status", "contacts", "contact_link_a", "contact_link_b")
+        assert found.dtype == values.dtype or narrow, name
+        np.testing.assert_array_equal(found, values, err_msg=name, strict=not narrow)
 
 
 def replayed(run: xr.Dataset) -> Control:

@@ -45,6 +45,9 @@ def test_every_variable_has_its_dimensions() -> None:
         "status": ("rollout",),
         "stop_step": ("rollout",),
         "saturation": ("rollout", "actuator"),
+        "contact_step": ("rollout",),
+        "contact_link_a": ("rollout",),
+        "contact_link_b": ("rollout",),
         "mass_scale": ("rollout", "link"),
     }
 
@@ -82,7 +85,7 @@ def test_every_variable_says_its_unit_and_what_it_is() -> None:
         if variable.dtype.kind == "f":
             assert math.isnan(variable.fill)
         else:
-            assert variable.fill == {"status": -1, "stop_step": -1, "contacts": -1, "saturation": 0}[variable.name]
+            assert variable.fill == (0 if variable.name == "saturation" else -1)
 
 
 def test_the_status_explains_its_values() -> None:
@@ -90,6 +93,15 @@ def test_the_status_explains_its_values() -> None:
     assert (
         dict(zip(status.attributes["flag_meanings"].split(), status.attributes["flag_values"], strict=True)) == STATUS
     )
+
+
+def test_the_links_of_a_contact_explain_their_values() -> None:
+    for name in ("contact_link_a", "contact_link_b"):
+        flags = next(variable for variable in layout().variables if variable.name == name).attributes
+        names = dict(zip(flags["flag_values"], flags["flag_meanings"].split(), strict=True))
+        assert names.pop(-1) == "none"
+        assert set(names.values()) <= {"base_link", *(f"link_{i}" for i in range(1, 7))}
+        assert "link_2" in names.values()
 
 
 def test_coordinates_say_what_belongs_to_what() -> None:

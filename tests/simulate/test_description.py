@@ -9,13 +9,15 @@ from dh2sim.errors import RunDamagedError, RunError
 from dh2sim.simulate.description import describe
 from dh2sim.simulate.store.writer import RunWriter
 from tests.program import contents
-from tests.simulate.store.runs import layout, make, whole
+from tests.simulate.store.runs import JOINTS, layout, make, whole
 
 
 def test_a_finished_run_is_described(tmp_path: Path) -> None:
     of = layout(rollouts=7, block=3, steps=4)
     path = make(tmp_path / "run.zarr", of)
     saturated = int((whole(of)["saturation"] > 0).any(axis=1).sum())
+    counts = (whole(of)["saturation"] > 0).sum(axis=0)
+    by_joint = dict(zip(JOINTS, map(int, counts), strict=True))
     assert describe(str(path)).to_json() == {
         "path": str(path),
         "robot": "small",
@@ -25,7 +27,10 @@ def test_a_finished_run_is_described(tmp_path: Path) -> None:
         "unstable": 1,
         "not_run": 0,
         "reasons": {"bad_qacc": 1},
+        "touched": None,
+        "first_contact": None,
         "saturated": saturated,
+        "saturated_joints": by_joint,
         "steps": 8,
         "timestep": 0.002,
         "every": 2,

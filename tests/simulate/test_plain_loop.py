@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -24,6 +25,8 @@ from tests.strategies import robot_specs
 
 DRIVERS = "tests.simulate.drivers"
 ORACLES = {"Wave": plain.wave, "MotorWave": plain.wave, "Spring": plain.spring}
+ALWAYS = {"status", "stop_step", "saturation", "contact_step", "contact_link_a", "contact_link_b"}
+"""Variables of every run."""
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast")
 
 
@@ -61,7 +64,8 @@ def test_links_that_touch_rub_and_meet_their_limits_do_so_as_in_the_plain_loop(
         every=4,
     )
     assert run.contacts.values.max() > 0
-    assert set(run.data_vars) - {"status", "stop_step", "saturation"} == {
+    assert (run.contact_step.values >= 0).any()
+    assert set(run.data_vars) - ALWAYS == {
         *("qpos", "qvel", "ctrl", "tool_pose", "torque", "contacts", "energy"),
         *(("qacc",) if integrator != "RK4" else ()),
         *(("base_pose", "base_twist") if floating else ()),
@@ -157,7 +161,19 @@ def test_less_that_is_recorded_changes_nothing_of_the_rest() -> None:
     for name in ("qpos", "qvel", "ctrl", "tool_pose", "qacc", "torque", "energy", "contacts"):
         run = rollout(robots.worm(), rollouts=3, steps=60, start="curled", record=name)
         assert np.array_equal(run[name].values, everything_recorded[name].values)
-        assert set(run.data_vars) == {name, "status", "stop_step", "saturation"}
+        assert set(run.data_vars) == {name, *ALWAYS}
+        for always in ALWAYS:
+            assert np.array_equal(run[always].values, everything_recorded[always].values)
+
+
+def test_contacts_in_substeps_are_found_where_they_are_not_recorded() -> None:
+    how: dict[str, Any] = {"rollouts": 8, "steps": 120, "timestep": 0.004, "start": "random", "seed": 3}
+    how["integrator"] = "RK4"
+    looked = rollout(robots.worm(), record=("qpos", "contacts"), controller=f"{DRIVERS}:MotorWave", **how)
+    guessed = rollout(robots.worm(), record=("qpos",), controller=f"{DRIVERS}:MotorWave", **how)
+    assert np.array_equal(looked.qpos.values, guessed.qpos.values)
+    assert (looked.contact_step.values >= 0).any()
+    assert np.abs(looked.contact_step.values - guessed.contact_step.values).max() <= 1
 
 
 @pytest.mark.parametrize("driver", ["MotorWave", "Spring", "Wave"])

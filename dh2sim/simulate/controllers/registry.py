@@ -93,6 +93,20 @@ def choose(text: str | type) -> ControllerChoice:
     )
 
 
+def slower(text: str) -> str | None:
+    """Return a controller of dh2sim with twice the ``period`` of its reference; None for one without that option."""
+    name, _, rest = text.partition(":")
+    if name not in BUILT_IN:
+        return None
+    options = _options(name, BUILT_IN[name])
+    defaults = {option.name: option.default for option in options}
+    if "period" not in defaults:
+        return None
+    given = read_options(name, options, rest)
+    given["period"] = 2.0 * given.get("period", defaults["period"])
+    return join_pairs(name, given.items())
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Maker:
     """Makes the controller of a batch of rollouts; a class so that it can be sent to another process."""

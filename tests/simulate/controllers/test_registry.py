@@ -8,7 +8,7 @@ import pytest
 from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, OpenLoop
-from dh2sim.simulate.controllers.registry import BUILT_IN, choose
+from dh2sim.simulate.controllers.registry import BUILT_IN, choose, slower
 from tests.refusals import refusal
 from tests.simulate.controllers.samples import arm, make
 
@@ -88,3 +88,19 @@ def test_an_unknown_name_is_reported_with_the_known_ones(text: str) -> None:
 @pytest.mark.parametrize("text", ["", ":", ":x"])
 def test_no_name_is_an_unknown_one(text: str) -> None:
     assert refused(text) == (f"unknown controller ''. Known controllers: {KNOWN}; your own is named MODULE:CLASS")
+
+
+@pytest.mark.parametrize(
+    ("text", "gentler"),
+    [
+        ("computed-torque", "computed-torque:period=2"),
+        ("computed-torque:amplitude=0.3,period=0.25", "computed-torque:period=0.5,amplitude=0.3"),
+        ("pd:kp=10", "pd:kp=10,period=2"),
+        ("sine", None),
+        ("some.module:Own", None),
+    ],
+)
+def test_a_slower_controller_has_twice_the_period_where_there_is_one(text: str, gentler: str | None) -> None:
+    assert slower(text) == gentler
+    if gentler is not None:
+        assert choose(gentler).text == gentler

@@ -17,6 +17,8 @@ JOINTS, ACTUATORS = ("shoulder", "elbow_2", "slide"), ("shoulder_position", "sli
 LINKS = ("link_1", "link_2", "link_3")
 STOPPED, STOP_RECORD = 4, 2
 """A rollout that stopped early, and the last record that it has."""
+TOUCHED = 2
+"""A rollout in which links touched."""
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -97,6 +99,7 @@ def _variables() -> list[Variable]:
         "gain_scale": (("rollout", "actuator"), "1"),
     }
     reported = {"flag_values": list(STATUS.values()), "flag_meanings": " ".join(STATUS)}
+    touching = {"flag_values": [-1, 1, 2, 4], "flag_meanings": "none base_link link_1 link_3"}
     return [
         *(
             Variable(
@@ -112,6 +115,11 @@ def _variables() -> list[Variable]:
         Variable(name="status", dimensions=("rollout",), dtype=np.dtype(np.int8), fill=-1, attributes=reported),
         Variable(name="stop_step", dimensions=("rollout",), dtype=np.dtype(np.int64), fill=-1),
         Variable(name="saturation", dimensions=("rollout", "actuator"), dtype=np.dtype(np.int64), fill=0),
+        Variable(name="contact_step", dimensions=("rollout",), dtype=np.dtype(np.int64), fill=-1),
+        *(
+            Variable(name=name, dimensions=("rollout",), dtype=np.dtype(np.int32), fill=-1, attributes=touching)
+            for name in ("contact_link_a", "contact_link_b")
+        ),
     ]
 
 
@@ -129,6 +137,9 @@ def make_arrays(layout: Layout, *, seed: int = 0) -> Arrays:
             arrays[variable.name][STOPPED, STOP_RECORD + 1 :] = variable.fill
     arrays["status"][:] = 0
     arrays["stop_step"][:] = -1
+    for name, value in {"contact_step": 3, "contact_link_a": 1, "contact_link_b": 4}.items():
+        if name in arrays:
+            arrays[name][:] = np.where(np.arange(len(arrays[name])) == TOUCHED, value, -1)
     if layout.sizes["rollout"] > STOPPED:
         arrays["status"][STOPPED], arrays["stop_step"][STOPPED] = STATUS["bad_qacc"], 5
     return arrays
