@@ -12,7 +12,6 @@ from dh2sim.importing.result import Imported, PlacedFrames, placed_frames
 from dh2sim.importing.serial import residual_text
 from dh2sim.kinematics.frame_assignment.lines import Case
 from dh2sim.kinematics.frame_assignment.result import (
-    FAR,
     LOOSE,
     BaseRule,
     FootRule,
@@ -212,7 +211,7 @@ def _nearly_parallel(placed: PlacedFrames, joint: int, step: Step) -> str:
         why = f"That is below {LOOSE:.0e} rad, so that noise would decide where their common normal is."
     else:
         why = (
-            f"Their common normal is {number(step.normal_at)} away, more than {FAR:.0f} times the reach of "
+            f"Their common normal is {number(step.normal_at)} away, far from the arm, whose reach is "
             f"{number(placed.reach)}."
         )
     start = beginning(placed, joint)

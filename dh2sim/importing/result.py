@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.kinematics.frame_assignment.lines import Line
-from dh2sim.kinematics.frame_assignment.recover import Residual, chain_reach
+from dh2sim.kinematics.frame_assignment.recover import Residual, bounded_reach
 from dh2sim.kinematics.frame_assignment.result import Assignment
 from dh2sim.kinematics.serial_chain import SerialChain
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
@@ -116,5 +116,5 @@ def placed_frames(imported: Imported, q: ArrayLike | None = None) -> PlacedFrame
         assignment=imported.assignment,
         frames=read_only(table_frame_poses(spec, vector)),
         T_base_tip=read_only(table_tool_pose(spec, vector)),
-        reach=chain_reach(imported.chain) or 1.0,
+        reach=bounded_reach(imported.chain) or 1.0,
     )

@@ -21,6 +21,7 @@ from dh2sim.formats.xml_read import Element
 from dh2sim.importing.explain import explanation
 from dh2sim.importing.result import Imported
 from dh2sim.importing.serial import import_serial, robot_name
+from dh2sim.kinematics.compaction import far_frames
 from dh2sim.kinematics.frame_assignment.recover import TOLERANCE
 from dh2sim.kinematics.frame_assignment.result import Tolerances
 from dh2sim.kinematics.frame_assignment.rounding import simple_angle, simple_length
@@ -73,6 +74,11 @@ def import_table(
     if tolerance > TOLERANCE:
         spec = _simpler(spec, Tolerances(angle=tolerance, length=tolerance, reach=1.0))
         notes.append(f"Numbers within {tolerance:g} rad or m of a simple one were made simple.")
+    far = far_frames(spec)
+    if far.frames:
+        notes.append(
+            f"{far.sentence} 'dh2sim convert {spec.name}.yaml --to compact' rewrites the table without them."
+        )
     header = [f"Note: {note}" for note in notes]
     text = robot_file_text(spec, header=header, folder=folder, angle=read.units.angle, length=read.units.length)
     return Imported(text=text, spec=parse_robot(text, file="the robot file", directory=folder), notes=tuple(notes))

@@ -40,6 +40,8 @@ class ArmPath:
     """Of the way from base_link up to the next axis, and of the way that comes from the tool, m."""
     reach: float
     """Length of the longer way, m, but for how far from base_link the arm is mounted."""
+    mounting: float
+    """How far from base_link's origin the first axis is, m; 0 where that joint slides."""
 
     def entry(self, link: int) -> Array:
         """Return where the way from base_link meets the axis behind a link, in the link's coordinates, m."""
@@ -82,6 +84,17 @@ class ArmPath:
         beside = max(lower - height, height - upper)
         return beside > NEAR * self.reach or self.way_along_axis(link, height) > self.reach * (1.0 + ROUNDING)
 
+    def leads_away(self, link: int, foot: float, start: float) -> bool:
+        """Whether a common normal begins too far along a link's axis, and farther than a Hayati row would.
+
+        Args:
+            link: 1 … n - 1.
+            foot: Where the normal begins, along the axis, m.
+            start: Where the row begins, which has no d if it is Hayati's, m.
+        """
+        gain = self.way_along_axis(link, foot) - self.way_along_axis(link, start)
+        return self.is_far_along_axis(link, foot) and gain > ROUNDING * self.reach
+
 
 def arm_path(arm: KinematicChain | SerialChain) -> ArmPath:
     """Return the path of an arm at coordinate zero.
@@ -110,11 +123,12 @@ def arm_path(arm: KinematicChain | SerialChain) -> ArmPath:
     for i in range(n, 0, -1):
         own[i] = _foot(lines[i - 1], leaving[i])
         leaving[i - 1] = _forth(transforms[i - 1], own[i])
-    outlines, lengths = [], []
+    outlines, lengths, mounting = [], [], 0.0
     for i, corners in enumerate(zip(entries, own, leaving, arrivals, strict=True)):
         outlines.append(np.array([*corners, corners[0]]))
         entry, start, end, arrival = corners
         if i == 0 and lines[0] is not None:  # how far from base_link it is mounted does not count
+            mounting = math.dist(entry, arrival)
             entry = start = arrival
         lengths.append((math.dist(entry, arrival), math.dist(start, end)))
     sums = [
@@ -125,7 +139,9 @@ def arm_path(arm: KinematicChain | SerialChain) -> ArmPath:
         (float((entry - start) @ z), float((end - start) @ z))
         for (start, z), entry, end in zip(axes, entries[1:], own[1:], strict=True)
     ]
-    return ArmPath(outlines=tuple(outlines), heights=tuple(heights), lengths=tuple(sums), reach=max(sums[-1]))
+    return ArmPath(
+        outlines=tuple(outlines), heights=tuple(heights), lengths=tuple(sums), reach=max(sums[-1]), mounting=mounting
+    )
 
 
 def _foot(line: Line | None, point: Array) -> Array:

@@ -161,16 +161,9 @@ class _Survey:
         return self._is_nearly_parallel(i) and self.leads_away(i, 0.0, start)
 
     def leads_away(self, i: int, foot: float, start: float) -> bool:
-        """Whether a common normal begins too far along axis i, and farther than a row without d.
-
-        Args:
-            i: The row, from 1.
-            foot: Where the normal begins, along the axis in link i, m.
-            start: Where the row does.
-        """
-        path, slides = self.path, self.rows[i - 1].type is JointType.PRISMATIC
-        gain = path.way_along_axis(i, foot) - path.way_along_axis(i, start)
-        return path.is_far_along_axis(i, foot) and (slides or gain > ROUNDING * path.reach)
+        """Whether row i, counted from 1, is to be Hayati's; see ``ArmPath.leads_away``."""
+        slides = self.rows[i - 1].type is JointType.PRISMATIC  # then the row can begin elsewhere
+        return self.path.is_far_along_axis(i, foot) if slides else self.path.leads_away(i, foot, start)
 
     def _sine(self, i: int) -> Decimal:
         z = column(self.links[i], 2)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from dh2sim.errors import Problem
+from dh2sim.kinematics.compaction import far_frames
 from dh2sim.messages import Loc, loc_of, path_of
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.limits import NO_LENGTH
@@ -45,6 +46,7 @@ class SlipKind(StrEnum):
     REACH = "unlikely-reach"
     MASS = "unlikely-mass"
     CONVENTION = "other-convention"
+    FAR_FRAMES = "far-frames"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, order=True)
@@ -72,7 +74,7 @@ def find_slips(robot: ModelLike) -> tuple[Slip, ...]:
     model = model_of(robot)
     found = [
         Slip(kind=kind, path=path_of(loc), message=message)
-        for search in (_angles, _limits, _convention, _size)
+        for search in (_angles, _limits, _convention, _frames, _size)
         for kind, loc, message in search(model)
     ]
     return _placed(found, model.spec)
@@ -225,6 +227,17 @@ def _convention(model: RobotModel) -> Iterator[_Found]:
 
 def _is_bare(row: Row) -> bool:
     return row.a == 0 and row.alpha == 0
+
+
+def _frames(model: RobotModel) -> Iterator[_Found]:
+    """Note frames that the table puts far from the arm, as tables of calibrated robots do."""
+    far = far_frames(model.spec)
+    if not far.frames:
+        return
+    source, first = model.spec.source_file, far.frames[0].frame
+    remedy = f"'dh2sim convert {source.name} --to compact'" if source is not None else "convert('compact')"
+    loc: Loc = ("base",) if first == 0 else ("joints", first - 1, "d")
+    yield SlipKind.FAR_FRAMES, loc, f"{far.sentence.removesuffix('.')}; {remedy} rewrites the table without them"
 
 
 def _size(model: RobotModel) -> Iterator[_Found]:

@@ -24,8 +24,10 @@ def _suite(robot: str, folder: str, tip: str, *, ask: bool = False, remark: str 
     )
 
 
-def _humanoid(robot: str, file: str, base: str, tip: str, remark: str = "") -> Arm:
-    return Arm(robot=robot, package=EXAMPLES, file=file, base=base, tip=tip, ask_tip=True, remark=remark)
+def _humanoid(robot: str, file: str, base: str, tip: str, remark: str = "", hayati: tuple[str, ...] = ()) -> Arm:
+    return Arm(
+        robot=robot, package=EXAMPLES, file=file, base=base, tip=tip, ask_tip=True, remark=remark, hayati=hayati
+    )
 
 
 PANDA = Arm(
@@ -171,7 +173,8 @@ ARMS: tuple[Arm, ...] = (
         "g1_description/urdf/g1_29dof_rev_1_0.urdf",
         "pelvis",
         "left_rubber_hand",
-        "waist and arm; shoulders turned by 16°",
+        "waist and arm; shoulders turned by 16°, their common normals with the waist out of reach",
+        hayati=("waist_pitch_joint",),
     ),
     _humanoid("Unitree G1 left leg", "g1_description/urdf/g1_29dof_rev_1_0.urdf", "pelvis", "left_ankle_roll_link"),
     _humanoid("iCub right arm", "icub_description/robots/icub.urdf", "base_link", "r_hand", "torso and arm"),

@@ -16,6 +16,7 @@ from dh2sim.importing.serial import assemble
 from dh2sim.importing.sources import ImportOptions, import_data, import_robot, import_table
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
+from tests.kinematics.test_compaction import UR5
 from tests.refusals import refusal
 
 ARM = """\
@@ -304,4 +305,14 @@ def test_what_is_no_options_and_a_convention_that_is_not_made_are_refused() -> N
     )
     assert _refused(ARM, ImportOptions(convention="hayati")) == (
         "a table is made in the standard or the modified convention; Hayati's rows come by themselves"
+    )
+
+
+def test_a_calibrated_table_says_that_it_can_be_compact() -> None:
+    rows = "\n".join(f"| {theta} | {a} | {d} | {alpha} |" for theta, a, d, alpha in UR5)
+    data = f"| theta (rad) | a (m) | d (m) | alpha (rad) |\n|---|---|---|---|\n{rows}\n".encode()
+    imported = import_data(data, "ur5.md", ImportOptions(convention="standard"))
+    assert imported.notes[-1] == (
+        "DH frames 2 and 3 are 574.1 and 66.77 m away from the arm, whose reach is 1.19 m. "
+        "'dh2sim convert ur5.yaml --to compact' rewrites the table without them."
     )

@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from dh2sim import Robot, RobotFileError, find_slips, parse_robot
 from dh2sim.model.slips import Slip, SlipKind
 from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.write import robot_file_text
 from dh2sim.robot_facade import Prismatic, Revolute
+from tests.kinematics.test_compaction import calibrated_ur5
 from tests.program import dh2sim
 from tests.refusals import refusal
 from tests.robot_files import write
@@ -233,3 +235,20 @@ def test_slips_are_sorted_by_place() -> None:
     assert (
         sorted([Slip(kind=SlipKind.REACH, file="a.yaml", line=2, column=1, path="", message="m"), first])[0] is first
     )
+
+
+def test_frames_far_from_the_arm_are_noted_with_what_moves_them(tmp_path: Path) -> None:
+    text = robot_file_text(calibrated_ur5())
+    [slip] = Robot.load(write(tmp_path, text)).slips()
+    assert (slip.kind, slip.path) == (SlipKind.FAR_FRAMES, "joints[1].d")
+    assert slip.line == text.splitlines().index("    d: 574.241384579456") + 1
+    assert slip.message == (
+        "DH frames 2 and 3 are 574.1 and 66.77 m away from the arm, whose reach is 1.19 m; "
+        "'dh2sim convert ur5.yaml --to compact' rewrites the table without them"
+    )
+    run = dh2sim("info", tmp_path / "ur5.yaml")
+    assert run.status == 0
+    assert "--to compact" in run.err
+    [in_code] = Robot.from_spec(calibrated_ur5()).slips()
+    assert in_code.message.endswith("; convert('compact') rewrites the table without them")
+    assert Robot.from_spec(calibrated_ur5()).convert("compact").slips() == ()

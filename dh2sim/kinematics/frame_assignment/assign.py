@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Set
+from functools import partial
 
 import numpy as np
 
+from dh2sim.kinematics.arm_path import ArmPath, arm_path
 from dh2sim.kinematics.frame_assignment.lines import Case, Line, angle_about, sine_between
 from dh2sim.kinematics.frame_assignment.result import Assignment, JointPart, LinkPart, Slide, Step, Tolerances
-from dh2sim.kinematics.frame_assignment.rules import Passage, first_frame, last_parts, lead, place_slide
+from dh2sim.kinematics.frame_assignment.rules import (
+    Passage,
+    first_frame,
+    is_nearly_parallel,
+    last_parts,
+    lead,
+    place_slide,
+)
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import joint_part, link_part, second_twist
 from dh2sim.typing import Array, read_only
@@ -34,8 +44,50 @@ def assign_frames(
     Returns:
         base · X_0 Z_1 X_1 … Z_n X_n · tool, not rounded.
     """
+    path = arm_path(chain)
+    hayati: set[int] = set()
+    while True:
+        assignment = _assigned(chain, path, hayati, tolerances, first_link=first_link, last_link=last_link)
+        # a row that starts far along its axis may end too far out: the one before it becomes Hayati's, too
+        more = hayati.union(
+            *(_up_to(i, assignment) for i in range(1, chain.n) if _is_far(chain, path, assignment, i))
+        )
+        if more == hayati:
+            return assignment
+        hayati = more
+
+
+def _is_far(chain: SerialChain, path: ArmPath, assignment: Assignment, i: int) -> bool:
+    """Whether the link part of joint i, counted from 1, starts too far along the joint's axis."""
+    return path.is_far_along_axis(i, _height_of(chain.joints[i - 1], assignment.T_link_before[i - 1][:3, 3]))
+
+
+def _height_of(joint: SerialJoint, point: Array) -> float:
+    return float((point - joint.point) @ joint.axis)
+
+
+def _is_away(path: ArmPath, joint: SerialJoint, i: int, foot: Array, *, start: float, hayati: bool) -> bool:
+    return hayati or path.leads_away(i, _height_of(joint, foot), start)
+
+
+def _up_to(i: int, assignment: Assignment) -> set[int]:
+    """Return joint i and the one before it, of those whose axes are nearly parallel to the next."""
+    steps = assignment.steps
+    return {k for k in (i - 1, i) if k > 0 and is_nearly_parallel(steps[k - 1].angle, steps[k - 1].case)}
+
+
+def _assigned(
+    chain: SerialChain,
+    path: ArmPath,
+    hayati: Set[int],
+    tolerances: Tolerances,
+    *,
+    first_link: bool,
+    last_link: bool,
+) -> Assignment:
+    """Assign frames; joints in ``hayati``, counted from 1, get a Hayati row in any case."""
     slides: list[Slide] = []
-    first = _axis(chain, 0, None, np.zeros(3), tolerances, slides)
+    first = _axis(chain, 0, None, np.zeros(3), path, slides)
     T_base_dh0, X_0, base_rule = first_frame(first, _second(chain), tolerances, first_link=first_link)
     T = T_base_dh0 @ link_transform(X_0)  # where the row at hand begins, in its parent link
     links, joints, steps = [X_0], [], []
@@ -48,8 +100,16 @@ def assign_frames(
             Z, X, tip_rule = last_parts(_into(T, chain.T_link_tip), tolerances, last_link=last_link)
             T_before = T @ joint_part(Z.theta, Z.d)
         else:
-            following = _axis(chain, i + 1, own, T[:3, 3], tolerances, slides)
-            passage = lead(T, own, following, height=_height(chain, i, T), tolerances=tolerances)
+            following = _axis(chain, i + 1, own, T[:3, 3], path, slides)
+            start = _height_of(joint, T[:3, 3])
+            passage = lead(
+                T,
+                own,
+                following,
+                height=_height(chain, i, T, path),
+                is_away=partial(_is_away, path, joint, i + 1, start=start, hayati=i + 1 in hayati),
+                tolerances=tolerances,
+            )
             Z, X, T_before = _joint_part(T, passage), passage.part, passage.T_link_before
             steps.append(_step(joint, chain.joints[i + 1], own, following, passage))
         T = T_before @ link_transform(X)
@@ -81,14 +141,14 @@ def _axis(
     index: int,
     previous: Line | None,
     origin: Array,
-    tolerances: Tolerances,
+    path: ArmPath,
     slides: list[Slide],
 ) -> Line:
     """Return a joint's axis at coordinate zero in its parent link; a sliding one's place is chosen, and noted."""
     joint = chain.joints[index]
     if joint.type.turns:
         return Line(point=joint.point, direction=joint.axis).moved(joint.T_parent_link)
-    line, rule = place_slide(chain, index, previous, origin, tolerances)
+    line, rule = place_slide(chain, index, previous, origin, path)
     slides.append(Slide(joint=joint.name, rule=rule))
     return line
 
@@ -101,17 +161,19 @@ def _second(chain: SerialChain) -> Line | None:
     return Line(point=joint.point, direction=joint.axis).moved(chain.joints[0].T_parent_link @ joint.T_parent_link)
 
 
-def _height(chain: SerialChain, index: int, T: Array) -> float | None:
+def _height(chain: SerialChain, index: int, T: Array, path: ArmPath) -> float | None:
     """Return how far along the axis the next joint is, where a free foot should be there; None: it should not.
 
     At the base, so that the column's height is in the first row; and before a sliding joint, so that its coordinate
-    is all there is of d. Everywhere else d is zero where it can be, and the last of parallel axes takes it all.
+    is all there is of d. Everywhere else d is zero where it can be, and the last of parallel axes takes it all. A
+    file may put a joint far along its axis; that is no place for a frame.
     """
     joint, following = chain.joints[index], chain.joints[index + 1]
     if not joint.type.turns or (index > 0 and following.type.turns):
         return None
     place = following.T_parent_link[:3, :3] @ following.point + following.T_parent_link[:3, 3]
-    return float((place - T[:3, 3]) @ joint.axis)
+    far = path.is_far_along_axis(index + 1, _height_of(joint, place))
+    return None if far else float((place - T[:3, 3]) @ joint.axis)
 
 
 def _joint_part(T: Array, passage: Passage) -> JointPart:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from dh2sim.kinematics.arm_path import arm_path
 from dh2sim.kinematics.frame_assignment.assign import assign_frames
 from dh2sim.kinematics.frame_assignment.result import Assignment, JointPart, LinkPart, Tolerances
 from dh2sim.kinematics.frame_assignment.rounding import simple_angle, simple_angles, simple_length, simple_vector
@@ -188,7 +189,7 @@ class Recovery:
     tolerances: Tolerances
     """By what numbers were changed to make them simple."""
     reach: float
-    """m: the way along the chain at coordinate zero; residuals are compared with it."""
+    """m, of ``bounded_reach``; residuals are compared with it."""
 
 
 def recover_table(
@@ -218,7 +219,7 @@ def recover_table(
     """
     if convention is Convention.HAYATI:
         raise ValueError("a table is made in the standard or the modified convention")
-    reach = chain_reach(chain)
+    reach = bounded_reach(chain)
     scale = reach or 1.0
     best: Recovery | None = None
     for share in (*_SHARES, 0.0):
@@ -238,6 +239,17 @@ def recover_table(
 def within(residual: Residual, tolerance: float, reach: float) -> bool:
     """Whether a residual is small enough; not where it is NaN."""
     return residual.rotation <= tolerance and residual.position <= tolerance * max(1.0, reach)
+
+
+def bounded_reach(chain: SerialChain) -> float:
+    """Return an upper bound of how far the tip can be from the base while sliding joints are at zero, m.
+
+    The way over where the file says that joints are, or the way that the axes alone make, whichever is shorter: a
+    file may put joints far along their axes.
+    """
+    path = arm_path(chain)
+    by_axes = path.mounting + path.reach
+    return min(chain_reach(chain), by_axes) if by_axes > 0.0 else chain_reach(chain)
 
 
 def chain_reach(chain: SerialChain) -> float:
@@ -264,5 +276,5 @@ def _recover(chain: SerialChain, convention: Convention, tolerances: Tolerances,
         T_link_dh=frames_on_links(assignment, convention),
         residual=measure_residual(spec, chain, _TRIALS, tolerances.reach),
         tolerances=tolerances,
-        reach=chain_reach(chain),
+        reach=bounded_reach(chain),
     )

@@ -11,8 +11,6 @@ from dh2sim.typing import Array
 LOOSE = 1e-6
 """rad, and of the reach: decisions that cost no accuracy, such as which way x points, are made with this, so that
 noise far below it does not change them. Axes turned by less but not parallel are nearly parallel."""
-FAR = 10.0
-"""In reaches: where a or d would be greater, Hayati's row is used."""
 LEAST_VOLUME = 1e-3
 """Of the box spanned by three directions, for a line that meets two others to be well determined."""
 
@@ -32,11 +30,6 @@ class Tolerances:
     def near(self) -> float:
         """Lengths below this, m, decide nothing."""
         return LOOSE * self.reach
-
-    @property
-    def far(self) -> float:
-        """Lengths above this, m, are not for a table."""
-        return FAR * self.reach
 
 
 class BaseRule(StrEnum):

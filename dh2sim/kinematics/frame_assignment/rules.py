@@ -6,10 +6,12 @@ The axes leave much of the first and the last frame open, and only the direction
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from dh2sim.kinematics.arm_path import ArmPath
 from dh2sim.kinematics.frame_assignment.lines import (
     Case,
     Line,
@@ -57,7 +59,15 @@ class Passage:
     """How far the common normal of nearly parallel axes is from the joint, m."""
 
 
-def lead(T: Array, own: Line, following: Line, *, height: float | None, tolerances: Tolerances) -> Passage:
+def lead(
+    T: Array,
+    own: Line,
+    following: Line,
+    *,
+    height: float | None,
+    is_away: Callable[[Array], bool],
+    tolerances: Tolerances,
+) -> Passage:
     """Choose the frame on a link's own axis, and the link part from there to the next axis.
 
     Args:
@@ -66,17 +76,28 @@ def lead(T: Array, own: Line, following: Line, *, height: float | None, toleranc
         following: The next joint's axis in the link's frame.
         height: Where x may begin if the axes leave it free, m along the own axis from the frame ``T``; None: at its
             origin.
-        tolerances: What counts as parallel and as far.
+        is_away: Whether a point of the own axis is too far from the arm for x to begin there.
+        tolerances: What counts as parallel.
     """
-    if sine_between(own, following) <= tolerances.angle:
+    sine, cosine = sine_between(own, following), float(own.direction @ following.direction)
+    if sine <= tolerances.angle:
         return _parallel(T, own, following, height, tolerances)
-    if sine_between(own, following) > LOOSE:
-        normal = common_normal(own, following)
-        far = max(length(normal.foot - T[:3, 3]), length(normal.next_foot - following.point))
-        if far <= tolerances.far and length(normal.next_foot - normal.foot) <= tolerances.far:
-            return _at_common_normal(T, own, following, tolerances)
-        return _nearly_parallel(T, own, following, far, tolerances)
-    return _nearly_parallel(T, own, following, None, tolerances)
+    if sine >= abs(cosine):
+        return _at_common_normal(T, own, following, tolerances)
+    normal = common_normal(own, following)
+    noise = sine <= LOOSE and length(normal.next_foot - normal.foot) <= tolerances.near
+    if not (noise or is_away(normal.foot)):
+        return _at_common_normal(T, own, following, tolerances)
+    far = max(length(normal.foot - T[:3, 3]), length(normal.next_foot - following.point))
+    return _nearly_parallel(T, own, following, None if sine <= LOOSE else far, tolerances)
+
+
+def is_nearly_parallel(angle: float, case: Case) -> bool:
+    """Whether a Hayati row between two axes, ``angle`` rad apart, is the better one if the common normal is far away.
+
+    Within 45 degrees the plane across the first axis meets the second nearer than the common normal does.
+    """
+    return case not in (Case.PARALLEL, Case.COINCIDENT) and abs(math.cos(angle)) > math.sin(angle)
 
 
 def _parallel(T: Array, own: Line, following: Line, height: float | None, tolerances: Tolerances) -> Passage:
@@ -167,7 +188,7 @@ def _sense(
 
 
 def place_slide(
-    chain: SerialChain, index: int, previous: Line | None, origin: Array, tolerances: Tolerances
+    chain: SerialChain, index: int, previous: Line | None, origin: Array, path: ArmPath
 ) -> tuple[Line, SlideRule]:
     """Choose the axis of a sliding joint so that as many numbers as possible are zero.
 
@@ -180,7 +201,7 @@ def place_slide(
         index: Of the joint, from 0.
         previous: The axis before, in the parent link's frame; None for the first joint.
         origin: The previous frame's origin on it (the base's origin), m, shape (3,).
-        tolerances: What counts as parallel and as near.
+        path: Where the arm runs.
 
     Returns:
         The axis at coordinate zero in the parent link's frame, and the rule that placed it.
@@ -199,7 +220,8 @@ def place_slide(
         return _through(origin, given), SlideRule.PREVIOUS_AXIS
     if following is not None:
         meeting = transversal(previous, following, given.direction, LEAST_VOLUME)
-        if meeting is not None and length(meeting - origin) <= tolerances.far:
+        before = chain.joints[index - 1]
+        if meeting is not None and not path.is_far_along_axis(index, float((meeting - before.point) @ before.axis)):
             return _through(meeting, given), SlideRule.MEETS_BOTH
     return _through(origin, given), SlideRule.PREVIOUS_ORIGIN
 

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dh2sim.kinematics.chain import build_chain
+from dh2sim.kinematics.compaction import far_frames
 from dh2sim.kinematics.frame_assignment.recover import chain_reach, measure_residual, recover_table, within
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
@@ -19,6 +20,7 @@ from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import Convention, JointType, RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.kinematics.frame_assignment.chains import Axis, chain_of, pose, random_axes, tip_by_exponentials, unit
+from tests.kinematics.perturbed_arms import KINDS, REACHES, perturbed
 
 CONVENTIONS = (Convention.STANDARD, Convention.MODIFIED)
 Z = np.array([0.0, 0.0, 1.0])
@@ -120,6 +122,51 @@ def test_nearly_parallel_axes_make_a_hayati_row_and_no_distant_normal() -> None:
     assert normal_at is not None
     assert normal_at > 10 * recovery.reach
     assert _off_by(recovery.spec, axes, T_base_tip, np.random.default_rng(0)) < 2e-12
+
+
+@pytest.mark.parametrize("convention", [Convention.STANDARD, Convention.MODIFIED])
+@pytest.mark.parametrize("size", [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1])
+@pytest.mark.parametrize("kind", KINDS)
+def test_frames_remain_within_reach_however_little_axes_are_turned(
+    kind: str, size: float, convention: Convention
+) -> None:
+    for seed in range(2):
+        axes, T_base_tip = perturbed(kind, size, seed)
+        recovery = recover_table(chain_of(axes, T_base_tip), convention=convention)
+        assert recovery.residual.largest < 1e-9
+        assert _off_by(recovery.spec, axes, T_base_tip, np.random.default_rng(seed)) < 1e-9
+        exact = recover_table(chain_of(axes, T_base_tip), convention=convention, tolerance=1e-13)
+        assert exact.residual.largest < 3e-13
+        q = np.random.default_rng(seed).uniform(-3, 3, (100, len(axes)))
+        q[:, [axis.type is JointType.PRISMATIC for axis in axes]] *= 0.03
+        for spec in (recovery.spec, exact.spec):
+            assert np.linalg.norm(table_frame_poses(spec, q)[..., :3, 3], axis=-1).max() < REACHES[kind]
+            assert not far_frames(spec).frames
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-4])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_file_that_puts_joints_far_along_their_axes_makes_no_far_frames(kind: str, size: float) -> None:
+    axes, T_base_tip = perturbed(kind, size, 0)
+    slid = [
+        Axis(point=axis.point + 300.0 * (-1) ** i * axis.direction, direction=axis.direction, type=axis.type)
+        for i, axis in enumerate(axes)
+    ]
+    recovery = recover_table(chain_of(slid, T_base_tip))
+    assert recovery.residual.largest < 1e-9
+    q = np.zeros(len(axes))
+    assert np.linalg.norm(table_frame_poses(recovery.spec, q)[..., :3, 3], axis=-1).max() < REACHES[kind]
+    assert recovery.reach == pytest.approx(recover_table(chain_of(axes, T_base_tip)).reach, rel=0.05)
+
+
+def test_axes_turned_a_little_about_their_common_normal_make_a_standard_row() -> None:
+    for angle in (1e-7, 1e-3):
+        axes = [Axis(np.zeros(3), Z), Axis(np.array([0.4, 0.0, 0.1]), unit([0.0, -angle, 1.0]))]
+        recovery = recover_table(chain_of(axes, pose(np.eye(3), np.array([0.6, 0.0, 0.1]))), tolerance=1e-12)
+        first = recovery.spec.rows[0]
+        assert first.convention is Convention.STANDARD
+        assert (first.a, first.d) == (0.4, 0.1)
+        assert first.alpha == pytest.approx(angle, rel=1e-5)
 
 
 def test_of_a_modified_table_the_rows_before_a_hayati_row_are_standard_ones() -> None:
