@@ -153,7 +153,7 @@ def test_wrong_numbers_are_reported_in_plain_words(arguments: list[str], message
 @pytest.mark.parametrize(
     ("arguments", "option", "allowed", "meant"),
     [
-        (["convert", "stanford", "--to", "craig"], "--to", "standard, modified", "modified"),
+        (["convert", "stanford", "--to", "craig"], "--to", "standard, modified, compact", "modified"),
         (["new", "arm", "--convention", "MDH"], "--convention", "standard, modified, hayati", "modified"),
         (["import", "a.md", "--convention", "spong"], "--convention", "standard, modified", "standard"),
         (["frames", "a.yaml", "--convention", "dh"], "--convention", "standard, modified", "standard"),
