@@ -180,7 +180,8 @@ WRONG: list[tuple[Callable[[], object], str]] = [
     (lambda: link(mesh="a.stl"), "joints[0].link.mesh: expected a MeshSpec, found 'a.stl'"),
     (
         lambda: link(mesh=MeshSpec(file=Path("a.step"))),
-        "joints[0].link.mesh.file: 'a.step' is not a mesh file that can be read; allowed: .stl, .obj, .ply, .glb",
+        "joints[0].link.mesh.file: 'a.step' is not a mesh file that can be read; "
+        "allowed: .stl, .obj, .ply, .glb, .dae",
     ),
     (lambda: row(link="steel"), "joints[0].link: expected a LinkSpec, found 'steel'"),
     # actuators

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Final, TypeAlias
@@ -12,6 +13,7 @@ FindMesh: TypeAlias = Callable[[str], Path | None]
 """Returns the file of a mesh name, or None."""
 
 _PACKAGES: Final = ("package://", "model://")
+_NAME: Final = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
 _MAX_FOLDERS: Final = 1000
 """Searched for a package one level further down: a workspace groups packages in repositories."""
 
@@ -21,8 +23,9 @@ def mesh_finder(directory: Path, package_paths: Sequence[Path] = ()) -> FindMesh
 
     ``package://pkg/rest`` and ``model://pkg/rest`` are looked for in the given folders, then in those of
     ``ROS_PACKAGE_PATH`` and ``AMENT_PREFIX_PATH`` (``share``), then in the file's own folder and those above it. In
-    each, the package is a folder ``pkg``, the folder itself if it is called so, or, save above the file, a folder
-    ``pkg`` one level further down. ``file://`` names and plain ones are paths, relative ones to the file's folder.
+    each, the package is a folder ``pkg``, the folder itself if it is called so or has a ``package.xml`` that says so,
+    or, save above the file, a folder ``pkg`` one level further down. ``file://`` names and plain ones are paths,
+    relative ones to the file's folder.
 
     Args:
         directory: The folder of the file that names the meshes.
@@ -86,8 +89,18 @@ def _folders(package: str, roots: Sequence[Path], home: Path) -> Iterator[Path]:
 def _in(folder: Path, package: str) -> Iterator[Path]:
     if (folder / package).is_dir():
         yield folder / package
-    if folder.name == package:
+    if package in (folder.name, package_name(folder)):
         yield folder
+
+
+def package_name(folder: Path) -> str | None:
+    """Return the name that a folder's ``package.xml`` gives it; None where there is none."""
+    try:
+        with (folder / "package.xml").open("rb") as stream:
+            found = _NAME.search(stream.read(100_000))
+    except OSError:
+        return None
+    return found.group(1).decode("utf-8", "replace") if found else None
 
 
 def _subfolders(root: Path) -> list[Path]:

@@ -25,6 +25,7 @@ from typing import Any, Final
 from xml.dom import expatbuilder, minidom
 
 from dh2sim.errors import ImportedFileError, Problem
+from dh2sim.formats.mesh_paths import package_name
 from dh2sim.formats.xml_read import MAX_BYTES, parse_xml, tolerated
 from dh2sim.messages import did_you_mean, listed, shown
 
@@ -90,7 +91,8 @@ class _Files:
         """Return what messages call a file."""
         if os.path.abspath(path) == self.main:
             return self.file
-        return os.path.join(os.path.dirname(self.file), os.path.relpath(path, os.path.dirname(self.main)))
+        relative = os.path.relpath(path, os.path.dirname(self.main))
+        return os.path.normpath(os.path.join(os.path.dirname(self.file), relative))
 
     def read(self, path: str) -> bytes:
         """Return a file's content."""
@@ -127,14 +129,14 @@ class _Files:
         if self._packages is None:
             self._packages = {}
             for folder in _folders(self.root):
-                name = _package_name(folder)
+                name = package_name(Path(folder))
                 if name:
                     self._packages.setdefault(name, folder)
                 self._packages.setdefault(f"/{os.path.basename(folder)}", folder)
         found = self._packages.get(package) or self._packages.get(f"/{package}")
         if found is None:
-            above = [str(folder) for folder in Path(self.main).parents]
-            hint = next((self._hint(f) for f in above if package in (_package_name(f), os.path.basename(f))), "")
+            above = Path(self.main).parents
+            hint = next((self._hint(str(f)) for f in above if package in (f.name, package_name(f))), "")
             raise _ForbiddenError(f"no package {shown(package)} in {self.allowed} and those below it{hint}")
         return found
 
@@ -146,7 +148,7 @@ class _Files:
         """Return how to allow a folder; nothing for a whole disk."""
         if folder == os.path.dirname(folder):
             return ""
-        return f"; allow others with root={os.path.normpath(self.label(folder))!r}"
+        return f"; allow others with root={self.label(folder)!r}"
 
 
 def _folders(root: str) -> Iterator[str]:
@@ -160,15 +162,6 @@ def _folders(root: str) -> Iterator[str]:
         with contextlib.suppress(OSError), os.scandir(folder) as entries:
             inside = [e.path for e in entries if e.is_dir(follow_symlinks=False) and not e.name.startswith(".")]
             waiting += sorted(inside)
-
-
-def _package_name(folder: str) -> str:
-    try:
-        with open(os.path.join(folder, "package.xml"), "rb") as stream:
-            found = re.search(rb"<name>\s*([^<\s]+)\s*</name>", stream.read(100_000))
-    except OSError:
-        return ""
-    return found.group(1).decode("utf-8", "replace") if found else ""
 
 
 class _Placed(expatbuilder.ExpatBuilderNS):  # type: ignore[misc, unused-ignore]
@@ -279,7 +272,9 @@ class _Expansion:
 
     def _problem(self, error: Exception) -> Problem:
         file, line, column = _place_of(error) or (self._files.file, 1, 1)
-        text = str(error).replace("\n", ", ").replace(", when evaluating", ", evaluating")
+        missing = next((cause for cause in _causes(error) if isinstance(cause, FileNotFoundError)), None)
+        text = str(error) if missing is None else f"{missing.filename}: no such file"
+        text = text.replace("\n", ", ").replace(", when evaluating", ", evaluating")
         for cause in _causes(error):
             match cause:
                 case _ForbiddenError():

@@ -137,7 +137,7 @@ def parse_xml(data: bytes, *, file: str, places: Sequence[Place] = ()) -> Elemen
     except _RefusedError as error:
         raise _error(file, error.line, error.column, error.message) from None
     except expat.ExpatError as error:
-        message = _not_utf_8(builder, data) or _of_comment(builder, data)
+        message = _not_utf_8(builder, data) or _of_markup(builder, data)
         message = message or f"not well-formed XML: {expat.ErrorString(error.code)}"
         raise _error(file, error.lineno, error.offset + 1, message) from None
     return builder.root()
@@ -293,9 +293,11 @@ def _not_utf_8(builder: _Builder, data: bytes) -> str | None:
     return None
 
 
-def _of_comment(builder: _Builder, data: bytes) -> str | None:
-    """Return the message where a comment is what is wrong, else None."""
+def _of_markup(builder: _Builder, data: bytes) -> str | None:
+    """Return the message where a comment is what is wrong, or a merge, else None."""
     at = builder.parser.ErrorByteIndex
+    if data[data.rfind(b"\n", 0, at) + 1 :].startswith(b"<<<<<<< "):
+        return "not well-formed XML: a line of a merge that was not resolved"
     start = data.rfind(b"<!--", 0, at + 4)
     if start >= 0 and b"-->" not in data[start + 4 :]:
         line = data.count(b"\n", 0, start) + 1

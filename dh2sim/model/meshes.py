@@ -1,4 +1,4 @@
-"""Meshes that show links, read with trimesh and converted to binary STL, which every engine reads."""
+"""Meshes that show links, converted to binary STL, which every engine reads; trimesh reads all but COLLADA."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dh2sim.errors import MeshError
 from dh2sim.kinematics.transforms import pose_from_rpy
+from dh2sim.model.collada import read_collada
 from dh2sim.robot.spec import MeshSpec
 from dh2sim.typing import Array
 
@@ -53,7 +54,7 @@ def load_mesh(mesh: MeshSpec, link_name: str) -> MeshAsset:
     place = mesh.location or link_name
     try:
         original = mesh.file.read_bytes()
-        surface = _read(mesh)
+        surface = _read(mesh, original)
     except Exception as error:  # trimesh's readers raise many types
         raise MeshError(f"{place}: cannot read the mesh '{mesh.file}': {_words(error)}") from error
     _check(surface, mesh, place)
@@ -71,9 +72,12 @@ def load_mesh(mesh: MeshSpec, link_name: str) -> MeshAsset:
     )
 
 
-def _read(mesh: MeshSpec) -> trimesh.Trimesh:
+def _read(mesh: MeshSpec, data: bytes) -> trimesh.Trimesh:
     import trimesh  # takes seconds: only robots with meshes pay for it
 
+    if mesh.file.suffix.lower() == ".dae":
+        vertices, faces = read_collada(data)
+        return trimesh.Trimesh(vertices, faces, process=False)
     return trimesh.load_mesh(mesh.file, process=False)
 
 

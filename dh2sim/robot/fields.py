@@ -28,7 +28,7 @@ WRONG: Final = object()
 NAME_PATTERN: Final = "^[A-Za-z][A-Za-z0-9_-]*$"
 LONGEST_NAME: Final = 100
 _RESERVED: Final = r"base_link-base|flange-tool0|base_link-dh_0|link_[0-9]+-(flange|tool|dh_[0-9]+)"
-MESH_SUFFIXES: Final = (".stl", ".obj", ".ply", ".glb")
+MESH_SUFFIXES: Final = (".stl", ".obj", ".ply", ".glb", ".dae")
 
 
 class Dimension(Enum):

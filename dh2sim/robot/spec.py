@@ -192,9 +192,13 @@ class Pose:
 class MeshSpec:
     """A mesh file that shows a link."""
 
-    file: Annotated[Path, MeshFile("STL, OBJ, PLY or GLB file; relative to the folder of this file.", required=True)]
+    file: Annotated[
+        Path, MeshFile("STL, OBJ, PLY, GLB or DAE file; relative to the folder of this file.", required=True)
+    ]
     """Of a robot that was read from a file: absolute, and known to have existed then."""
-    scale: Annotated[float, Number("Metres per unit of the mesh file.", above=0)] = 1.0
+    scale: Annotated[
+        float, Number("Metres per unit of the mesh file; a DAE file has its own unit already.", above=0)
+    ] = 1.0
     pose: Annotated[Pose, Part("Pose of the mesh file's own frame in the DH frame.", Pose, inline=True)] = field(
         default_factory=Pose
     )

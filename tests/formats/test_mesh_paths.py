@@ -119,3 +119,14 @@ def test_a_name_that_no_mesh_can_have_is_not_found_and_raises_nothing(tmp_path: 
     mesh(tmp_path / "a.stl")
     mesh(tmp_path / "meshes" / "a.stl")
     assert mesh_finder(tmp_path, [tmp_path])(uri) is None
+
+
+def test_a_package_may_be_in_a_folder_of_another_name(tmp_path: Path) -> None:
+    folder = tmp_path / "a_clone" / "urdf"
+    (tmp_path / "a_clone" / "meshes").mkdir(parents=True)
+    folder.mkdir()
+    (tmp_path / "a_clone" / "package.xml").write_text("<package><name> my_arm </name></package>", encoding="utf-8")
+    (tmp_path / "a_clone" / "meshes" / "a.stl").write_bytes(b"")
+    assert mesh_finder(folder)("package://my_arm/meshes/a.stl") == tmp_path / "a_clone" / "meshes" / "a.stl"
+    assert mesh_finder(folder)("package://other/meshes/a.stl") is None
+    assert mesh_finder(tmp_path, [tmp_path / "a_clone"])("package://my_arm/meshes/a.stl") is not None

@@ -279,7 +279,7 @@ def test_mesh_files_are_looked_for_beside_the_robot_file(tmp_path: Path) -> None
     for name, message in {
         "c.stl": f"file 'c.stl' not found in {tmp_path}",
         "d.stl": f"file 'd.stl' not found in {tmp_path}",
-        "b.txt": "'b.txt' is not a mesh file that can be read; allowed: .stl, .obj, .ply, .glb",
+        "b.txt": "'b.txt' is not a mesh file that can be read; allowed: .stl, .obj, .ply, .glb, .dae",
         "12": "expected text, found 12; put it in quotes",
         "package://x/b.stl": f"file 'package://x/b.stl' not found in {tmp_path}",
     }.items():

@@ -101,7 +101,8 @@ def test_all_problems_are_reported_at_once_with_their_paths() -> None:
         "joints[1].limits.velocity: must be greater than 0, found 0",
         "joints[2].link.mass: must not be negative, found -1",
         "joints[2].link.com: expected a list of 3 numbers (x, y, z), found a list of 2",
-        "joints[2].link.mesh.file: 'b.txt' is not a mesh file that can be read; allowed: .stl, .obj, .ply, .glb",
+        "joints[2].link.mesh.file: 'b.txt' is not a mesh file that can be read; "
+        "allowed: .stl, .obj, .ply, .glb, .dae",
     ]
 
 

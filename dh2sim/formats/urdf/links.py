@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Final
 
 import numpy as np
@@ -15,8 +15,9 @@ from dh2sim.formats.serial_robot import Inertial, Look, SerialMesh, can_show, po
 from dh2sim.formats.urdf.chain import Selection
 from dh2sim.formats.urdf.tree import UrdfJoint, UrdfTree, read_number, read_numbers, read_only_child, read_pose
 from dh2sim.formats.xml_read import Element, XmlReport, place
-from dh2sim.kinematics.transforms import compose, identity, move_point, rotate_tensor
+from dh2sim.kinematics.transforms import compose, identity, invert, move_point, rotate_tensor
 from dh2sim.messages import Notes, shown
+from dh2sim.model.collada import T_read_file
 from dh2sim.model.mass import MassProperties, combine, thickened
 from dh2sim.model.robot_model import Color
 from dh2sim.typing import Array, read_only
@@ -251,8 +252,21 @@ def _mesh(
     elif (file := find_mesh(uri)) is None:
         notes.group(f"Meshes were not found in {_folder(uri)}, of links {{}}.", part.name)
     else:
-        return SerialMesh(uri=uri, path=file, scale=scale[0], T_link_mesh=T)
+        return SerialMesh(uri=uri, path=file, scale=scale[0], T_link_mesh=_unturned(file, T, part.name, notes))
     return None
+
+
+def _unturned(file: Path, T: Array, name: str, notes: Notes) -> Array:
+    """Return the pose of a mesh; readers of URDF take no notice of the up axis of a COLLADA file."""
+    if file.suffix.lower() != ".dae":
+        return T
+    try:
+        T_file = T_read_file(file.read_bytes())
+    except (OSError, ValueError):  # which the export will report
+        return T
+    if not np.array_equal(T_file, identity()):
+        notes.group("The up axis of COLLADA meshes is not applied, as URDF has it, of links {}.", name)
+    return compose(T, invert(T_file))
 
 
 def _folder(uri: str) -> str:

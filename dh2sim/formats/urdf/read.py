@@ -82,7 +82,7 @@ def read_urdf(
 
     Fixed joints are merged: poses are multiplied, and masses are combined into the link that carries them. Link
     frames are those of the URDF. What is not on the arm must be part of the tree, but its numbers do not matter.
-    No file is opened; ``find_mesh`` may look for files.
+    ``find_mesh`` may look for files; only COLLADA meshes are opened, for their up axis.
 
     Args:
         data: The file's content, or its root element.

@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from dh2sim.formats.serial_robot import SerialMesh, SerialRobot
 from dh2sim.formats.urdf.read import read_urdf
 from dh2sim.kinematics.transforms import pose_from_rpy
+from dh2sim.model.collada import read_collada
 from tests.formats.urdf.samples import joint, links, nowhere, robot
 
 I_OWN = '<inertia ixx="0.2" ixy="0.01" ixz="0" iyy="0.3" iyz="-0.02" izz="0.25"/>'
@@ -47,7 +49,7 @@ def test_the_first_mesh_that_can_be_used_is_carried_over() -> None:
     pose = '<origin xyz="1 2 3" rpy="0 0 0.5"/>'
     found = looking(
         '<visual><geometry><box size="1 1 1"/></geometry></visual>',
-        mesh("found/a.dae"),
+        mesh("found/a.step"),
         mesh("package://pkg/meshes/a.stl"),
         mesh("meshes/a.stl"),
         mesh("a.stl"),
@@ -55,7 +57,7 @@ def test_the_first_mesh_that_can_be_used_is_carried_over() -> None:
         mesh("found/a.stl", scale="1 2 1"),
         mesh("found/b.STL", rest=pose, scale="0.001 0.001 0.001"),
         mesh("found/c.stl"),
-        mesh("d.dae"),
+        mesh("d.step"),
         tail=mesh("found/e.stl"),
     )
     chosen = the_mesh(found)
@@ -63,7 +65,7 @@ def test_the_first_mesh_that_can_be_used_is_carried_over() -> None:
     np.testing.assert_array_equal(chosen.T_link_mesh, pose_from_rpy([1, 2, 3], [0, 0, 0.5]))
     assert notes(found) == [
         "Shapes that are no meshes are not carried over: 'b' (box).",
-        "Meshes are not carried over that are none of .stl, .obj, .ply, .glb: those of links 'b' (.dae).",
+        "Meshes are not carried over that are none of .stl, .obj, .ply, .glb, .dae: those of links 'b' (.step).",
         "Meshes were not found in 'package://pkg', of links 'b'.",
         "Meshes were not found in 'meshes', of links 'b'.",
         "Meshes were not found in the file's folder, of links 'b'.",
@@ -114,3 +116,24 @@ def test_collision_shapes_are_noted_once() -> None:
     )
     found = read_urdf(text.encode(), file="arm.urdf", find_mesh=nowhere)
     assert [note for note in found.notes if "ollision" in note] == ["Collision shapes are not carried over."]
+
+
+@pytest.mark.parametrize(("axis", "turned"), [("Z_UP", False), ("Y_UP", True), ("X_UP", True)])
+def test_the_up_axis_of_a_collada_mesh_is_not_applied_as_in_other_readers(
+    tmp_path: Path, axis: str, turned: bool
+) -> None:
+    header = f"<COLLADA><asset><up_axis>{axis}</up_axis></asset>"
+    positions = '<source id="p"><float_array>1 2 3 4 5 6 7 8 10</float_array></source>'
+    vertices = '<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>'
+    part = '<triangles><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles>'
+    geometry = (
+        f"<library_geometries><geometry><mesh>{positions}{vertices}{part}</mesh></geometry></library_geometries>"
+    )
+    path = tmp_path / "part.dae"
+    path.write_text(f"{header}{geometry}</COLLADA>", encoding="utf-8")
+    text = robot(links("a"), f'<link name="b">{mesh("part.dae")}</link>', joint("j", "a", "b"))
+    found = read_urdf(text.encode(), file="arm.urdf", find_mesh=lambda _: path)
+    T = the_mesh(found).T_link_mesh
+    corner = T[:3, :3] @ read_collada(path.read_bytes()).vertices[0] + T[:3, 3]
+    np.testing.assert_allclose(corner, [1, 2, 3], atol=1e-15)
+    assert ("The up axis of COLLADA meshes is not applied, as URDF has it, of links 'b'." in found.notes) == turned
