@@ -20,7 +20,7 @@ _NUMERIC: Final = re.compile(rf"[-+(]*(?:[\d.,]|pi\b)[-+*/().,\deEpi\s]*(?:{UNIT
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Given:
-    """What is known of a table besides its cells, where a script or a file of data holds it."""
+    """What is known of a table besides its cells, where a script makes it."""
 
     by: str
     """What gives it, for messages, such as ``SerialLink``."""
@@ -32,8 +32,6 @@ class Given:
     """Pose of tool0 in DH frame n, 4 x 4, in the table's unit of length."""
     configurations: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """Joint vectors, in rad and the table's unit of length."""
-    problems: tuple[tuple[int, int, str], ...] = ()
-    """Line, column and what is wrong."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,6 +43,8 @@ class Table:
     grid: Grid = field(repr=False)
     notes: tuple[str, ...] = ()
     """What was done to its rows, a sentence each."""
+    problems: tuple[tuple[int, int, str], ...] = ()
+    """Line, column and what is wrong with what it was made of."""
     extent: range | None = None
     """Numbers of its lines, where these are not those from its headings to its last row."""
     given: Given | None = field(default=None, repr=False)

@@ -188,12 +188,12 @@ class Columns:
         return None if index is None else row[index]
 
 
-def parameters_in(row: Cells) -> int:
+def parameters_in(row: Sequence[Cell]) -> int:
     """Return how many different DH parameters a row of cells has as headings."""
     return len({read_heading(cell).quantity for cell in row} & set(PARAMETERS))
 
 
-def are_headings(row: Cells) -> bool:
+def are_headings(row: Sequence[Cell]) -> bool:
     """Whether a row of cells is the headings of a table of DH parameters."""
     return parameters_in(row) >= _FEWEST_PARAMETERS
 

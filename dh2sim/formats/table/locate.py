@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePath
 from typing import Final
 
+from dh2sim.formats.table.data_tables import data_tables
 from dh2sim.formats.table.dh_table import Located, Table, make_table, transposed
 from dh2sim.formats.table.grid import (
     MAX_COLUMNS,
@@ -39,16 +40,20 @@ def locate(lines: Sequence[str], file: str) -> Located:
     """
     pipes = tuple(pipe_grids(lines))
     scripts, problems = script_tables(lines, file)
+    suffix = PurePath(file).suffix.casefold()
+    if not scripts:
+        scripts, unnamed = data_tables(lines, suffix)
+        problems += unnamed
     marked = [*_in_grids(pipes), *_in_grids(latex_grids(lines)), *_in_grids(html_grids(lines)), *scripts]
     taken = {number for table in marked for number in table.lines}
     separated = list(_between_separators(lines, taken))
     even = [table for table in separated if _is_even(table)]
-    if PurePath(file).suffix.casefold() in _SEPARATED:
+    if suffix in _SEPARATED:
         found = even or separated[:1] or marked
     else:
         found = sorted([*marked, *even], key=lambda table: table.lines.start)
         found = found or ([] if problems else separated[:1])
-    found = sorted(found, key=lambda table: table.given is None and is_comment(lines[table.lines.start - 1]))
+    found = sorted(found, key=lambda table: table.extent is None and is_comment(lines[table.lines.start - 1]))
     alike = [] if found or problems else _most_alike(lines, pipes)
     return Located(tables=(*found, *alike), pipes=pipes, problems=tuple(problems))
 

@@ -206,7 +206,7 @@ class _Reader:
         self._findings = findings
         self._given = table.given
         self._printout = find_printout(lines, table.lines) if table.given is None else None
-        for line, column, message in table.given.problems if table.given else ():
+        for line, column, message in table.problems:
             findings.wrong_at(line, column, "", message)
         self._columns = find_columns(table.header[:MAX_COLUMNS], table.rows[:MAX_ROWS], findings)
         check_shape(table, findings)

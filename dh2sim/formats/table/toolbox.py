@@ -380,6 +380,7 @@ def table_of(robot: ToolboxRobot, *, by: str, wrong: Sequence[tuple[int, int, st
         rows=tuple(rows),
         grid=Grid(rows=(header, *rows), separator=""),
         notes=tuple(notes),
+        problems=tuple(problems),
         extent=range(line, last + 1),
         given=Given(
             by=by,
@@ -388,7 +389,6 @@ def table_of(robot: ToolboxRobot, *, by: str, wrong: Sequence[tuple[int, int, st
             base=robot.base,
             tool=robot.tool,
             configurations=robot.configurations,
-            problems=tuple(problems),
         ),
     )
 
