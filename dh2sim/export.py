@@ -5,7 +5,7 @@ Every export reports what its formats cannot hold of the robot file, so that not
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from pathlib import Path
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from dh2sim.errors import EngineError, MismatchError, ModelError
-from dh2sim.files import atomic_files
+from dh2sim.files import atomic_files, finish_interrupted
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.tree import DYNAMICS as URDF_DYNAMICS
@@ -253,6 +253,8 @@ def export_robot(
     formats: Collection[Format] = ALL_FORMATS,
     dh_frames: bool = True,
     verified: bool = True,
+    wait: bool = True,
+    waiting: Callable[[Path], None] | None = None,
 ) -> ExportReport:
     """Write a robot's files to ``out``/<name>/, all of them or none; a file that is the same already is left alone.
 
@@ -262,6 +264,8 @@ def export_robot(
         formats: what to write.
         dh_frames: whether the URDF has a link for every DH frame.
         verified: whether to compare the written files with the table before they are put in place.
+        wait: whether to wait while another process writes the files of this robot, or to raise an error.
+        waiting: called once with the folder if that takes longer than a moment.
 
     Returns:
         What was written, how well it matches, and what the formats cannot hold.
@@ -274,14 +278,12 @@ def export_robot(
     """
     files = render(model, formats, dh_frames=dh_frames)
     target = out / model.name
-    with atomic_files(out, model.name) as staging:
+    with atomic_files(out, model.name, wait=wait, waiting=waiting) as staging:
         for relative, data in files.items():
             (staging / relative).parent.mkdir(parents=True, exist_ok=True)
             (staging / relative).write_bytes(data)
         checks = verify(model, staging, formats) if verified else []
         unchanged = {relative for relative, data in files.items() if _holds(target / relative, data)}
-        for relative in unchanged:
-            (staging / relative).unlink()
     return ExportReport(
         name=model.name,
         files=tuple(
@@ -300,9 +302,13 @@ def drift(
 ) -> list[Drift]:
     """Compare ``out``/<name>/ with what an export would write there, byte for byte.
 
+    Files of an export that was killed while it moved them are put in place first.
+
     Raises:
         ModelError: a format cannot hold the robot.
+        OutputError: the rest of an export that was killed cannot be put in place.
     """
+    finish_interrupted(out, model.name)
     found = []
     for relative, expected in render(model, formats, dh_frames=dh_frames).items():
         path = out / model.name / relative

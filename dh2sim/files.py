@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, folder locks, and signals deferred while files change places.
+"""Files that appear whole or not at all, and signals deferred while files change places.
 
 Three primitives write files: ``atomic_file`` one that somebody else fills (a library, an encoder), ``atomic_files``
 several that belong together, and ``write_file`` bytes that must survive a power cut once the call returns.
@@ -7,30 +7,27 @@ several that belong together, and ``write_file`` bytes that must survive a power
 from __future__ import annotations
 
 import errno
+import filecmp
+import json
 import os
 import secrets
 import shutil
 import signal
 import stat
-import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import BinaryIO, Final
 
 from dh2sim.errors import OutputError
-
-try:
-    import fcntl
-except ImportError:  # on Windows
-    _HAS_LOCKS = False
-else:
-    _HAS_LOCKS = True
+from dh2sim.locks import FolderLock, leftovers, lock_folder, make_hidden
 
 PARTIAL: Final = ".partial"
 """Suffix of files and folders that are being written; their names begin with a dot."""
+_JOURNAL: Final = "journal"
+"""File in a folder of files that are being moved: what is moved, so that another process can finish the work."""
 
 
 def open_plain_file(path: Path) -> BinaryIO:
@@ -114,28 +111,33 @@ def atomic_file(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic_files(out: Path, name: str = "") -> Iterator[Path]:
+def atomic_files(
+    out: Path, name: str = "", *, wait: bool = True, waiting: Callable[[Path], None] | None = None
+) -> Iterator[Path]:
     """Yield an empty folder to write to; when the block ends well, all of its files are moved to ``out``/``name``.
 
-    They are moved all or none, one rename right after the other and with signals deferred: only a process that is
-    killed between two renames leaves old files beside new ones, each of them whole. Missing folders are made.
+    They are moved all or none, one rename right after the other, with signals deferred and with the folder locked
+    against other writers. A file that is the same already stays. If the process is killed between two renames, the
+    next one that writes or reads there finishes the work (``finish_interrupted``). Missing folders are made.
 
     Args:
         out: The folder that receives the files, or the folder named ``name`` that does. The temporary folder is made
             here, on the same file system.
         name: Folder in ``out``; empty for ``out`` itself.
+        wait: Whether to wait while another process writes there, or to raise an error.
+        waiting: Called once with the folder if that takes longer than a moment.
 
     Raises:
-        OutputError: A file cannot be written or moved; what was there is unchanged.
+        OutputError: A file cannot be written or moved, or another process is writing; what was there is unchanged.
     """
     made: list[Path] = []
-    temporary: Path | None = None
+    hidden: tuple[Path, FolderLock] | None = None
     try:
         try:
             with signals_deferred():
                 made += make_folders(out)
-                temporary = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=out))
-            staging = temporary / "new"
+                hidden = make_hidden(out / (name or _SEVERAL), PARTIAL)
+            staging = hidden[0] / "new"
             staging.mkdir()
             yield staging
             files = sorted(path.relative_to(staging) for path in staging.rglob("*") if not path.is_dir())
@@ -143,35 +145,129 @@ def atomic_files(out: Path, name: str = "") -> Iterator[Path]:
                 sync(staging / file)
         except OSError as error:
             raise OutputError(f"cannot write to '{out}': {_reason(error)}; nothing was changed") from error
-        _move_all(files, staging, out / name, kept=temporary / "old")
+        with _target(out / name, made, wait=wait, waiting=waiting):
+            _finish(out, name)
+            changed = [file for file in files if not _same(staging / file, out / name / file)]
+            _move_all(changed, hidden[0], out / name)
     finally:
         with signals_deferred():
-            if temporary is not None:
-                shutil.rmtree(temporary, ignore_errors=True)
+            if hidden is not None:
+                shutil.rmtree(hidden[0], ignore_errors=True)
+                hidden[1].release()
             remove_empty(made)
 
 
-def _move_all(files: list[Path], staging: Path, target: Path, *, kept: Path) -> None:
-    """Rename files from ``staging`` to ``target``; if one fails, restore those before it from ``kept``."""
+def finish_interrupted(out: Path, name: str) -> None:
+    """Move the rest of the files that a process which was killed was moving to ``out``/``name``.
+
+    Raises:
+        OutputError: There are such files, and they cannot be moved.
+    """
+    found = [lock for _, lock in leftovers(out / name, PARTIAL)]
+    for lock in found:
+        lock.release()
+    if not found:
+        return
+    with _target(out / name, [], wait=True, waiting=None):
+        _finish(out, name)
+
+
+_SEVERAL: Final = "files"
+"""Stands for the name of a folder whose files are moved, where that is the folder given."""
+
+
+@contextmanager
+def _target(folder: Path, made: list[Path], *, wait: bool, waiting: Callable[[Path], None] | None) -> Iterator[None]:
+    """Lock the folder that receives files, which is made if it is missing."""
+    try:
+        while True:
+            made += make_folders(folder)
+            with suppress(FileNotFoundError):  # another process removed the empty folder that it had made
+                lock = lock_folder(folder, wait=wait, waiting=waiting)
+                break
+    except BlockingIOError as error:
+        raise OutputError(f"another process is writing to '{folder}'; nothing was changed") from error
+    except OSError as error:
+        raise OutputError(f"cannot write '{folder}': {_reason(error)}; the existing files are unchanged") from error
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def _finish(out: Path, name: str) -> None:
+    """Finish what dead writers began, and remove what they left."""
+    for folder, lock in leftovers(out / (name or _SEVERAL), PARTIAL):
+        try:
+            if (folder / _JOURNAL).exists():
+                journal = json.loads((folder / _JOURNAL).read_text(encoding="utf-8"))
+                _follow(folder, out / name, **journal)
+        except (OSError, ValueError, TypeError) as error:
+            raise OutputError(
+                f"'{out / name}' contains files of two exports, since a process was killed while it wrote them; "
+                f"the rest in '{folder}' cannot be moved: {error}"
+            ) from error
+        finally:
+            lock.release()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _follow(folder: Path, target: Path, *, take: str, files: list[str]) -> None:
+    """Move files that are still to be moved: new ones, or old ones if the move had failed."""
+    for file in files:
+        source = folder / take / file
+        if os.path.lexists(source):
+            (target / file).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(source, target / file)
+        elif take == "old":
+            (target / file).unlink(missing_ok=True)
+    sync(target)
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        return not other.is_symlink() and filecmp.cmp(one, other, shallow=False)
+    except OSError:
+        return False
+
+
+def _move_all(files: list[Path], hidden: Path, target: Path) -> None:
+    """Rename files from ``hidden``/new to ``target``; if one fails, restore those before it from ``hidden``/old.
+
+    A journal in ``hidden`` says what is being done, from before the first rename until after the last.
+    """
     made: list[Path] = []
     moved: list[Path] = []
+    if not files:
+        return
     with signals_deferred():
         try:
             for file in files:
                 made += make_folders((target / file).parent)
                 if os.path.lexists(target / file):
-                    _keep(target / file, kept / file)
+                    _keep(target / file, hidden / "old" / file)
+            _write_journal(hidden, "new", files)
             for file in files:
-                os.replace(staging / file, target / file)
+                os.replace(hidden / "new" / file, target / file)
                 moved.append(file)
+            sync(target)
+            (hidden / _JOURNAL).unlink()
         except OSError as error:
+            if moved:
+                _write_journal(hidden, "old", moved)
             for file in reversed(moved):
-                _restore(kept / file, target / file)
+                _restore(hidden / "old" / file, target / file)
+            (hidden / _JOURNAL).unlink(missing_ok=True)
             remove_empty(made)
             raise OutputError(
                 f"cannot write '{error.filename2 or error.filename or target}': {_reason(error)}; "
                 "the existing files are unchanged"
             ) from error
+
+
+def _write_journal(hidden: Path, take: str, files: list[Path]) -> None:
+    text = json.dumps({"take": take, "files": [file.as_posix() for file in files]})
+    write_file(hidden / _JOURNAL, text.encode())
 
 
 def _keep(path: Path, kept: Path) -> None:
@@ -238,51 +334,6 @@ def remove_empty(folders: list[Path]) -> None:
     for folder in reversed(folders):
         with suppress(OSError):
             folder.rmdir()
-
-
-class FolderLock:
-    """An exclusive lock on a folder among processes that use this class; the system drops it when a process ends.
-
-    Where the system or the file system has no such locks, every lock is granted.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        """Lock a folder.
-
-        Raises:
-            BlockingIOError: It is locked.
-            OSError: It cannot be opened.
-        """
-        self._handle: int | None = None
-        if not _HAS_LOCKS:
-            return
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            os.close(handle)
-            if isinstance(error, BlockingIOError):
-                raise
-        else:
-            self._handle = handle
-
-    @property
-    def effective(self) -> bool:
-        """Whether the lock keeps others out."""
-        return self._handle is not None
-
-    def holds(self, folder: Path) -> bool:
-        """Return whether the locked folder is still the one at this path, and no other was put in its place."""
-        try:
-            return self._handle is None or os.path.samestat(os.fstat(self._handle), os.stat(folder))
-        except FileNotFoundError:
-            return False
-
-    def release(self) -> None:
-        """Give the lock back."""
-        if self._handle is not None:
-            os.close(self._handle)
-            self._handle = None
 
 
 def _reason(error: OSError) -> str:

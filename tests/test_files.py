@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from dh2sim.errors import OutputError
-from dh2sim.files import FolderLock, atomic_file, atomic_files, partial_path, signals_deferred, write_file
+from dh2sim.files import atomic_file, atomic_files, partial_path, signals_deferred, write_file
+from dh2sim.locks import FolderLock
 from tests.program import contents
 
 NEW = {"a.txt": b"new a", "meshes/b.txt": b"new b", "c.txt": b"new c"}

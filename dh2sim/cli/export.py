@@ -41,6 +41,9 @@ def export(
         bool, typer.Option("--no-dh-frames", help="Leave the links dh_0 … dh_n out of the URDF.")
     ] = False,
     strict: StrictOption = False,
+    no_wait: Annotated[
+        bool, typer.Option("--no-wait", help="Fail if another process is writing the files of the same robot.")
+    ] = False,
 ) -> int:
     """Write a robot as URDF and MJCF, and verify them against its table.
 
@@ -62,7 +65,15 @@ def export(
     status = DONE
     for model in models:
         try:
-            report = export_robot(model, out, formats=chosen, dh_frames=not no_dh_frames, verified=not no_verify)
+            report = export_robot(
+                model,
+                out,
+                formats=chosen,
+                dh_frames=not no_dh_frames,
+                verified=not no_verify,
+                wait=not no_wait,
+                waiting=_report_waiting,
+            )
         except OutputError:
             raise  # the next robot would fare no better
         except Dh2simError as error:
@@ -70,6 +81,10 @@ def export(
         else:
             _print_report(report, out, model)
     return status
+
+
+def _report_waiting(folder: Path) -> None:
+    print(f"dh2sim: waiting for another process that is writing to '{folder}'", file=sys.stderr)
 
 
 def _formats(names: list[str] | None) -> list[Format]:

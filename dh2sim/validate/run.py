@@ -16,7 +16,7 @@ from dh2sim.engines.pybullet_engine import PybulletEngine
 from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
 from dh2sim.errors import Dh2simError, EngineCapacityError, EngineError
 from dh2sim.export import export_robot
-from dh2sim.files import signals_deferred
+from dh2sim.files import finish_interrupted, signals_deferred
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.robot_model import RobotModel
@@ -86,6 +86,7 @@ def validate_robot(
         raise Dh2simError(f"samples must be a whole number of at least 1, got {samples!r}")
     model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
     if folder is not None:
+        finish_interrupted(folder.parent, folder.name)
         return _validate(model, folder, samples, seed, tolerance, advance)
     with TemporaryDirectory(prefix="dh2sim-") as temporary:
         export_robot(model, Path(temporary), verified=False)

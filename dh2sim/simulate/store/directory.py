@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import os
-import re
-import secrets
 import shutil
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
 from dh2sim.errors import RunBusyError, RunError, RunExistsError, RunOutputError
-from dh2sim.files import PARTIAL, FolderLock, make_folders, remove_empty, signals_deferred, sync
+from dh2sim.files import PARTIAL, make_folders, remove_empty, signals_deferred, sync
+from dh2sim.locks import FolderLock, hidden_path, leftovers, lock_folder, make_hidden
 from dh2sim.simulate.store.manifest import is_run
 
 _OLD: Final = ".old"
 """Suffix of a run that is being replaced."""
-_MOST_TRIES: Final = 100
 
 
 def is_vacant(path: Path) -> bool:
@@ -39,16 +36,11 @@ def lock_run(path: Path) -> FolderLock:
         RunError: It cannot be opened.
     """
     try:
-        for _ in range(_MOST_TRIES):
-            lock = FolderLock(path)
-            if lock.holds(path):
-                return lock
-            lock.release()  # another run was put in its place meanwhile
+        return lock_folder(path)
     except BlockingIOError as error:
         raise RunBusyError(f"another process is writing to '{path}'") from error
     except OSError as error:
         raise RunError(f"cannot read '{path}': {error.strerror or error}") from error
-    raise RunBusyError(f"another process is writing to '{path}'")
 
 
 def create_run(path: Path, files: Mapping[str, bytes], *, overwrite: bool) -> FolderLock:
@@ -71,8 +63,10 @@ def create_run(path: Path, files: Mapping[str, bytes], *, overwrite: bool) -> Fo
         if not is_vacant(target):
             _check_replaceable(path, overwrite=overwrite)
         made = make_folders(target.parent)
-        _remove_leftovers(target)
-        new = _make_hidden(target)
+        for leftover, lock in leftovers(target, PARTIAL, _OLD):
+            shutil.rmtree(leftover, ignore_errors=True)
+            lock.release()
+        new = make_hidden(target, PARTIAL)
         _write_all(new[0], files)
         _put_in_place(path, target, new[0])
         for folder in made:
@@ -97,18 +91,6 @@ def _check_replaceable(path: Path, *, overwrite: bool) -> None:
         raise RunExistsError(f"'{path}' already exists; resume it, overwrite it, or choose another folder")
 
 
-def _make_hidden(target: Path) -> tuple[Path, FolderLock]:
-    """Make a locked folder beside a path; the lock shows that it is not a leftover."""
-    while True:
-        folder = _hidden(target, PARTIAL)
-        folder.mkdir()
-        with suppress(FileNotFoundError, BlockingIOError):
-            lock = FolderLock(folder)
-            if lock.holds(folder):
-                return folder, lock
-            lock.release()
-
-
 def _write_all(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write files by relative path into a folder that nobody else knows, and bring them to the disk."""
     for relative, data in files.items():
@@ -124,7 +106,7 @@ def _put_in_place(path: Path, target: Path, new: Path) -> None:
     if is_vacant(target):
         _rename(path, target, new)
         return
-    old, lock = _hidden(target, _OLD), lock_run(target)
+    old, lock = hidden_path(target, _OLD), lock_run(target)
     try:
         with signals_deferred():
             os.rename(target, old)
@@ -150,20 +132,3 @@ def _rename(path: Path, target: Path, new: Path) -> None:
             ) from error
         raise
     sync(target.parent)
-
-
-def _hidden(target: Path, suffix: str) -> Path:
-    return target.with_name(f".{target.name}-{secrets.token_hex(4)}{suffix}")
-
-
-def _remove_leftovers(target: Path) -> None:
-    """Remove the hidden folders of processes that were killed while they made or replaced a run here."""
-    ours = re.compile(rf"\.{re.escape(target.name)}-[0-9a-f]{{8}}({re.escape(PARTIAL)}|{re.escape(_OLD)})")
-    with suppress(OSError):
-        for name in filter(ours.fullmatch, os.listdir(target.parent)):
-            folder = target.with_name(name)
-            with suppress(BlockingIOError):  # it is being made
-                lock = FolderLock(folder)
-                if lock.effective:
-                    shutil.rmtree(folder, ignore_errors=True)
-                lock.release()

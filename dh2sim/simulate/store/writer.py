@@ -15,7 +15,8 @@ from typing import Any, Final, TypeVar
 from numpy.typing import NDArray
 
 from dh2sim.errors import RunDiffersError, RunOutputError
-from dh2sim.files import PARTIAL, FolderLock, partial_path, write_file
+from dh2sim.files import PARTIAL, partial_path, write_file
+from dh2sim.locks import FolderLock
 from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.store.codec import checksum_bytes, encode, encode_text
 from dh2sim.simulate.store.compatibility import differences
