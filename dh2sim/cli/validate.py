@@ -211,6 +211,8 @@ def _remarks(robot: RobotReport) -> Iterator[tuple[str, str]]:
             yield f"{check.engine}, {check.quantity.value}: {failure_text(check)}", "red"
         elif check.ok is None:
             yield f"{check.engine}: {check.reason}", "yellow"
+        if check.left_out is not None:
+            yield f"{check.engine}, {check.quantity.value}: {check.left_out}", "yellow"
 
 
 def _compared(check: Check) -> str:

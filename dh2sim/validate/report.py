@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -43,6 +44,21 @@ class Worst:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LeftOut:
+    """Rollouts that a check leaves out, as the controls of joints were clipped: their motors are too weak."""
+
+    rollouts: int
+    joints: Mapping[str, int]
+    """Number of them by joint."""
+
+    def __str__(self) -> str:
+        """Return how many rollouts are left out, and the joints."""
+        joints = ", ".join(f"{joint} in {count}" for joint, count in self.joints.items())
+        were = "rollout was" if self.rollouts == 1 else "rollouts were"
+        return f"{self.rollouts} {were} left out, where a motor is too weak: {joints}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
     """Comparison of one quantity of one engine with its reference."""
 
@@ -64,6 +80,7 @@ class Check:
     """Positions and the linear part of a Jacobian may differ by this times the larger of 1 m and the reach."""
     reason: str | None = None
     worst: Worst | None = None
+    left_out: LeftOut | None = None
     seconds: float = field(default=0.0, compare=False)
     """Time that the comparison took."""
 
@@ -84,6 +101,8 @@ class Check:
         entry["ok"] = self.ok
         if self.reason is not None:
             entry["reason"] = self.reason
+        if self.left_out is not None:
+            entry["left_out"] = {"rollouts": self.left_out.rollouts, "joints": dict(self.left_out.joints)}
         if self.ok is False and self.worst is not None:
             entry["worst"] = {
                 "where": self.worst.where,
@@ -158,6 +177,7 @@ def finding(
     failure: str,
     reference: str = "physics",
     worst: Worst | None = None,
+    left_out: LeftOut | None = None,
 ) -> Check:
     """Return a check of a motion; ``failure`` is the reason if the error exceeds the tolerance."""
     ok = bool(error <= tolerance)
@@ -171,12 +191,15 @@ def finding(
         tolerance=tolerance,
         reason=None if ok else failure,
         worst=worst,
+        left_out=left_out,
     )
 
 
-def impossible(quantity: Quantity, reason: str) -> Check:
+def impossible(quantity: Quantity, reason: str, left_out: LeftOut | None = None) -> Check:
     """Return a check of a motion that could not be made."""
-    return Check(engine=MOTION_ENGINE, quantity=quantity, ok=None, reason=f"{quantity.value}: {reason}")
+    return Check(
+        engine=MOTION_ENGINE, quantity=quantity, ok=None, reason=f"{quantity.value}: {reason}", left_out=left_out
+    )
 
 
 _UNWRITABLE = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -200,6 +223,8 @@ def to_junit(report: ValidationReport) -> str:
                 ET.SubElement(case, "skipped", message=_writable(check.reason or ""))
             elif not check.ok:
                 ET.SubElement(case, "failure", message=_writable(failure_text(check)))
+            if check.left_out is not None:
+                ET.SubElement(case, "system-out").text = _writable(str(check.left_out))
     ET.indent(root)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 

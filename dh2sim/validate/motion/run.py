@@ -38,11 +38,12 @@ def check_motion(model: RobotModel, *, seed: int = 0) -> tuple[Check, ...]:
         A check each of energy, momentum, rest, tracking, inverse dynamics and self-contact. One that cannot be made
         of this robot has ``ok`` None, and the reason.
     """
+    assumed = {joint.name for joint in model.moving_joints if "effort" in joint.assumed}
     checks: dict[Quantity, Callable[[], Check]] = {
         Quantity.ENERGY: lambda: check_energy(model, free_model(model), seed=seed),
         Quantity.MOMENTUM: lambda: check_momentum(model, free_model(model, floating_base=True), seed=seed),
-        Quantity.REST: lambda: check_rest(resting_rollouts(model, seed=seed)),
-        Quantity.TRACKING: lambda: check_tracking(tracking_rollouts(model, seed=seed)),
+        Quantity.REST: lambda: check_rest(resting_rollouts(model, seed=seed), assumed),
+        Quantity.TRACKING: lambda: check_tracking(tracking_rollouts(model, seed=seed), assumed),
         Quantity.INVERSE: lambda: check_inverse(recorded_rollouts(model, seed=seed)),
         Quantity.SELF_CONTACT: lambda: check_self_contact(model, compile_model(model), seed=seed),
     }

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Set
 from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
+from dh2sim.messages import listed
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.simulate.run import rollout
 from dh2sim.typing import Array
 from dh2sim.validate.motion.free_motion import frictionless, without_contacts, without_dry_friction
-from dh2sim.validate.report import Check, Quantity, Worst, finding, impossible
+from dh2sim.validate.report import Check, LeftOut, Quantity, Worst, finding, impossible
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -131,18 +135,23 @@ def resting_rollouts(model: RobotModel, *, controller: str = "gravity-compensati
     )
 
 
-def check_rest(run: xr.Dataset) -> Check:
+def check_rest(run: xr.Dataset, assumed: Set[str] = frozenset()) -> Check:
     """Require an arm to stay where it started.
 
     Args:
-        run: The result of ``resting_rollouts``. Rollouts in which a motor is too weak to hold its load are left out.
+        run: The result of ``resting_rollouts``. Rollouts in which a motor is too weak to hold its load are left out,
+            and reported.
+        assumed: Joints whose effort limit was assumed, and must not be too weak.
 
     Returns:
         A check whose error is the greatest motion of a joint in a second, rad or m.
     """
-    held = ~(run["saturation"].values > 0).any(axis=1)
+    held, left_out = _strong(run)
+    if left_out is not None and not assumed.isdisjoint(left_out.joints):
+        return _assumed_too_weak(Quantity.REST, REST_TOLERANCE, left_out, assumed)
     if not held.any():
-        return impossible(Quantity.REST, "the motors are too weak to carry the arm in any of its random poses")
+        reason = "the motors are too weak to carry the arm in any of its random poses"
+        return impossible(Quantity.REST, reason, left_out)
     run = run.isel(rollout=held)
     q = run["qpos"].values
     moved = np.abs(q - q[:, :1])
@@ -158,6 +167,28 @@ def check_rest(run: xr.Dataset) -> Check:
         failure=f"{name} moves by {farthest:.2g} {unit} (tolerance {REST_TOLERANCE:g}) "
         "though its motor balances gravity",
         worst=Worst(where=name, q=tuple(q[row, 0].tolist()), sample=int(run["rollout"].values[row])),
+        left_out=left_out,
+    )
+
+
+def _strong(run: xr.Dataset) -> tuple[NDArray[np.bool_], LeftOut | None]:
+    """Return in which rollouts no control was clipped, shape (rollouts,), and the others, if there are any."""
+    clipped = run["saturation"].values > 0
+    weak = clipped.any(axis=1)
+    names = [str(name).rpartition("_")[0] for name in run["actuator"].values]
+    joints = {name: int(count) for name, count in zip(names, clipped.sum(axis=0), strict=True) if count}
+    return ~weak, LeftOut(rollouts=int(weak.sum()), joints=joints) if joints else None
+
+
+def _assumed_too_weak(quantity: Quantity, tolerance: float, left_out: LeftOut, assumed: Set[str]) -> Check:
+    joints = [joint for joint in left_out.joints if joint in assumed]
+    return finding(
+        quantity,
+        math.inf,
+        tolerance,
+        samples=0,
+        failure=f"the effort that was assumed for {listed(joints)} is too small; give it in the robot file",
+        left_out=left_out,
     )
 
 
@@ -193,19 +224,22 @@ def tracking_rollouts(model: RobotModel, *, controller: str = "computed-torque",
     return run
 
 
-def check_tracking(run: xr.Dataset) -> Check:
+def check_tracking(run: xr.Dataset, assumed: Set[str] = frozenset()) -> Check:
     """Require every joint to stay close to its reference.
 
     Args:
-        run: The result of ``tracking_rollouts``. Rollouts in which a motor is too weak are left out.
+        run: The result of ``tracking_rollouts``. Rollouts in which a motor is too weak are left out, and reported.
+        assumed: Joints whose effort limit was assumed, and must not be too weak.
 
     Returns:
         A check whose error is in units of the distance that the joint moves in a time step at its greatest speed, so
         that it is comparable for prismatic and revolute joints, and for small and large robots.
     """
-    strong = ~(run["saturation"].values > 0).any(axis=1)
+    strong, left_out = _strong(run)
+    if left_out is not None and not assumed.isdisjoint(left_out.joints):
+        return _assumed_too_weak(Quantity.TRACKING, TRACKING_TOLERANCE, left_out, assumed)
     if not strong.any():
-        return impossible(Quantity.TRACKING, "the motors are too weak for any motion that was tried")
+        return impossible(Quantity.TRACKING, "the motors are too weak for any motion that was tried", left_out)
     run = run.isel(rollout=strong)
     error = np.abs(run["qpos"].values - run["qpos_ref"].values)
     error = np.where(np.isfinite(error), error, np.inf).max(axis=1)
@@ -221,4 +255,5 @@ def check_tracking(run: xr.Dataset) -> Check:
         failure=f"{name} is {error[row, joint]:.2g} {unit} off its reference, {relative[row, joint]:.2g} of its "
         f"motion in a time step (tolerance {TRACKING_TOLERANCE:g})",
         worst=Worst(where=name, q=tuple(run["qpos"].values[row, 0].tolist()), sample=int(run["rollout"].values[row])),
+        left_out=left_out,
     )

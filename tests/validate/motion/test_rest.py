@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dh2sim.validate.motion.tracking import check_rest, resting_rollouts
+from dh2sim.validate.report import LeftOut
 from tests.robot_files import ODD
 from tests.sample_robots import NAMES
 from tests.validate.motion.robots import FRICTION, WEAK, built
@@ -50,6 +51,9 @@ def test_motors_that_cannot_carry_the_arm_are_reported() -> None:
     check = check_rest(resting_rollouts(built(WEAK)))
     assert check.ok is None
     assert check.reason == "rest: the motors are too weak to carry the arm in any of its random poses"
+    assert check.left_out is not None
+    assert check.left_out.rollouts == 8
+    assert check.to_json()["left_out"] == {"rollouts": 8, "joints": dict(check.left_out.joints)}
 
 
 def test_poses_in_which_a_motor_is_too_weak_are_left_out() -> None:
@@ -59,3 +63,15 @@ def test_poses_in_which_a_motor_is_too_weak_are_left_out() -> None:
     assert check.ok
     assert 0 < check.samples < 8
     assert check.samples == np.count_nonzero(run["saturation"].values[:, 0] == 0)
+    out = 8 - check.samples
+    assert check.left_out == LeftOut(rollouts=out, joints={"joint_1": out})
+    were = "rollout was" if out == 1 else "rollouts were"
+    assert str(check.left_out) == f"{out} {were} left out, where a motor is too weak: joint_1 in {out}"
+
+
+def test_an_assumed_effort_that_is_too_weak_fails() -> None:
+    run = resting_rollouts(built(WEAK))
+    check = check_rest(run, {"joint_1", "joint_9"})
+    assert check.ok is False
+    assert check.reason == "the effort that was assumed for joint_1 is too small; give it in the robot file"
+    assert check_rest(run, {"joint_9"}).ok is None

@@ -83,7 +83,7 @@ def test_a_model_that_mujoco_refuses_is_reported() -> None:
 
 
 def test_a_check_that_breaks_down_has_failed_and_the_others_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(run: object) -> None:
+    def broken(*_: object) -> None:
         raise KeyError("qpos")
 
     monkeypatch.setattr(physics, "check_rest", broken)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -22,13 +24,16 @@ def test_a_robot_follows_its_reference(robot: str) -> None:
 
 def test_the_error_of_an_arm_is_that_of_a_unit_mass_under_the_same_sampled_control() -> None:
     run = tracking_rollouts(built("puma560"))
-    assert run.attrs["controller"] == "computed-torque:bandwidth=20,period=1"
-    h, kp, kd = run.attrs["timestep"], 20.0**2, 2 * 20.0
+    found = re.fullmatch("computed-torque:bandwidth=(.+),period=(.+)", run.attrs["controller"])
+    assert found is not None
+    bandwidth, period = map(float, found.groups())
+    assert bandwidth * period == 20.0
+    h, kp, kd = run.attrs["timestep"], bandwidth**2, 2 * bandwidth
     reference, rate = run["qpos_ref"].values, run["qvel_ref"].values
     # the minimum-jerk curve's acceleration, Δ/T² (60 s - 180 s² + 120 s³), from the waypoints that were recorded
-    s = np.arange(500) * h % 1.0
+    s = np.arange(500) * h / period % 1.0
     way = np.repeat(reference[:, [250, 500]] - reference[:, [0, 250]], 250, axis=1)
-    acceleration = way * (60 * s - 180 * s**2 + 120 * s**3)[None, :, None]
+    acceleration = way * (60 * s - 180 * s**2 + 120 * s**3)[None, :, None] / period**2
     q, v = reference[:, 0].copy(), rate[:, 0].copy()
     for k in range(500):
         v += h * (acceleration[:, k] + kd * (rate[:, k] - v) + kp * (reference[:, k] - q))
@@ -47,6 +52,14 @@ def test_motors_that_are_too_weak_for_any_motion_are_reported() -> None:
     check = check_tracking(tracking_rollouts(built(WEAK)))
     assert check.ok is None
     assert check.reason == "tracking: the motors are too weak for any motion that was tried"
+    assert check.left_out is not None
+    assert check.left_out.rollouts == 8
+
+
+def test_an_assumed_effort_that_no_motion_is_slow_enough_for_fails() -> None:
+    check = check_tracking(tracking_rollouts(built(WEAK)), {"joint_1"})
+    assert check.ok is False
+    assert check.reason == "the effort that was assumed for joint_1 is too small; give it in the robot file"
 
 
 def test_a_controller_that_forgets_coriolis_forces_is_found_out() -> None:
