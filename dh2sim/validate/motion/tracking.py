@@ -174,7 +174,7 @@ def check_rest(run: xr.Dataset, assumed: Set[str] = frozenset()) -> Check:
 def _strong(run: xr.Dataset) -> tuple[NDArray[np.bool_], LeftOut | None]:
     """Return in which rollouts no control was clipped, shape (rollouts,), and the others, if there are any."""
     clipped = run["saturation"].values > 0
-    weak = clipped.any(axis=1)
+    weak: NDArray[np.bool_] = np.any(clipped, axis=1)
     names = [str(name).rpartition("_")[0] for name in run["actuator"].values]
     joints = {name: int(count) for name, count in zip(names, clipped.sum(axis=0), strict=True) if count}
     return ~weak, LeftOut(rollouts=int(weak.sum()), joints=joints) if joints else None
