@@ -44,8 +44,9 @@ def banner(content: str, *, error: bool = False, name: str = "") -> str:
         return note("", name=name)
     border = "#b42318" if error else "#235394"
     style = (
-        "position:fixed;left:1rem;bottom:1rem;z-index:50;max-width:min(34rem,calc(100vw - 2rem));max-height:50vh;"
-        f"overflow:auto;background:#fff;border:1px solid #d5dae1;border-left:4px solid {border};border-radius:4px"
+        "position:fixed;left:1rem;bottom:1rem;z-index:50;max-height:50vh;overflow:auto;"
+        "max-width:max(14rem,min(34rem,calc(100vw - 27rem)));"  # beside the panel
+        f"background:#fff;border:1px solid #d5dae1;border-left:4px solid {border};border-radius:4px"
     )
     return f'<div style="{style}">{note(content, error=error, name=name)}</div>'
 
