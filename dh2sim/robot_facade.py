@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
     from dh2sim.export import ExportReport, Format
     from dh2sim.importing.sources import ImportOptions
-    from dh2sim.kinematics.chain import KinematicChain
+    from dh2sim.kinematics.chain import KinematicChain, SpecLike
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.model.slips import Slip
     from dh2sim.simulate.options import RolloutKeywords
@@ -319,6 +319,34 @@ class Robot:
             tolerance=tolerance,
             name=name,
         )
+        return cls._imported(path, options)
+
+    @classmethod
+    def from_calibration(
+        cls,
+        path: FilePath,
+        *,
+        nominal: SpecLike | FilePath | None = None,
+        convention: Convention | str | None = None,
+        tolerance: float = 1e-9,
+        name: str | None = None,
+    ) -> Self:
+        """Read a maker's calibration file: a UR's calibration.yaml or calibration.conf, a Franka's kinematics.yaml.
+
+        Args:
+            path: The file.
+            nominal: The robot that it is of, a robot file, or the name of one that comes with dh2sim: gives limits,
+                masses, names; a calibration.conf holds only what is to be added to its table.
+            convention: Of the table: 'standard' or 'modified'; by default the nominal robot's.
+            tolerance: Greatest residual, rad, and m for a reach of up to 1 m, then of the reach.
+            name: Of the robot.
+
+        Raises:
+            Dh2simError: The file is wrong, or is another robot's; the text says what and where.
+        """
+        from dh2sim.importing.sources import ImportOptions
+
+        options = ImportOptions(nominal=nominal, convention=convention, tolerance=tolerance, name=name)
         return cls._imported(path, options)
 
     @classmethod

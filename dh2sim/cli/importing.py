@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, choice, load_all, other_format, tolerance_of
+from dh2sim.cli.common import RobotArgument, choice, complete_robot, load_all, other_format, tolerance_of
 from dh2sim.cli.output import hand_over, require_free
 from dh2sim.errors import Dh2simError, ImportedFileError, MissingExtraError
 
@@ -39,7 +39,7 @@ def import_robot(
         str,
         typer.Argument(
             metavar="FILE",
-            help="A URDF, an MJCF, or a table in Markdown, CSV or TSV; - reads a table from standard input.",
+            help="A URDF, an MJCF, a table in Markdown, CSV or TSV, or a calibration; - reads from standard input.",
         ),
     ],
     base: Annotated[
@@ -78,13 +78,21 @@ def import_robot(
         list[str] | None,
         typer.Option(metavar="NAME:=VALUE", help="Argument of a xacro file; may be repeated."),
     ] = None,
+    nominal: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROBOT",
+            help="Robot that a calibration file is of: gives the nominal table, limits, masses.",
+            autocompletion=complete_robot,
+        ),
+    ] = None,
     name: Annotated[str | None, typer.Option(metavar="NAME", help="Name of the robot. [default: the file's]")] = None,
     out: OutOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a robot file from a URDF, an MJCF, or a table.
+    """Make a robot file from a URDF, an MJCF, a table, or a maker's calibration file.
 
     The joints of a URDF or an MJCF become DH rows, however their axes lie; where axes are nearly parallel, Hayati's
     row is used. All joint axes and the tip are compared with the file's own kinematics at 1000 random
@@ -98,6 +106,8 @@ def import_robot(
       dh2sim import urdf/ur.urdf.xacro --root . --arg ur_type:=ur5e --arg name:=ur
       dh2sim import table.md --convention modified --angle deg -o arm.yaml
       dh2sim import README.md --table 2
+      dh2sim import my_robot_calibration.yaml --nominal ur5e -o my_ur5e.yaml
+      dh2sim import calibration.conf --nominal ur10e
       dh2sim import - --convention standard < table.csv
     """
     from dh2sim.importing.sources import STDIN, ImportOptions, import_data, read_file
@@ -117,6 +127,7 @@ def import_robot(
         package_paths=tuple(package_path or ()),
         root=root,
         arguments=dict(map(_argument, arg or ())),
+        nominal=nominal,
         name=name,
     )
     folder = Path.cwd() if out is None else out.resolve().parent
@@ -127,6 +138,9 @@ def import_robot(
         raise ImportedFileError(
             replace(problem, message=_with_options(problem.message)) for problem in error.problems
         ) from error
+    except Dh2simError as error:
+        error.args = (_with_options(str(error)),)
+        raise
     notes = [_with_options(note) for note in imported.notes]
     if as_json:
         hand_over_json(imported.text, out, imported.spec, notes, _residual(imported))
@@ -174,7 +188,7 @@ def _argument(text: str) -> tuple[str, str]:
 
 
 _XACRO = re.compile(r"arguments=\{'([^']*)': \.\.\.\}")
-_ARGUMENT = re.compile(r"\b(tip|convention|angle|length|root|table)=('[^']*'|\"[^\"]*\"|\d+)")
+_ARGUMENT = re.compile(r"\b(tip|nominal|convention|angle|length|root|table)=('[^']*'|\"[^\"]*\"|\d+)")
 
 
 def _with_options(message: str) -> str:

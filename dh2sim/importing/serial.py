@@ -221,6 +221,7 @@ def import_serial(
     header: Sequence[str] = (),
     source: str = "",
     description: str = "",
+    calibrated: bool = False,
 ) -> Imported:
     """Make a robot file of a serial robot, and compare it with the robot's own kinematics.
 
@@ -235,6 +236,7 @@ def import_serial(
         header: Comment lines for the top of the file.
         source: Origin of the numbers; by default the robot's description.
         description: What the robot is.
+        calibrated: Whether numbers near simple ones were measured, and are meant as they are.
 
     Raises:
         MismatchError: The residual is above the tolerance.
@@ -246,7 +248,7 @@ def import_serial(
     robot = replace(robot, chain=replace(robot.chain, joints=joints))
     recovery = recover_table(robot.chain, convention=convention, tolerance=tolerance, name=own_name)
     spec = assemble(robot, recovery, name=own_name, joint_names=names)
-    hint = simpler_with(spec, tolerance)
+    hint = None if calibrated else simpler_with(spec, tolerance)
     notes = (*robot.notes, *_base_mass(robot), *renamed, *_tilted(recovery), *([hint] if hint else []))
     comments = [*header, *(f"Note: {note}" for note in notes)]
     origin = source or robot.description

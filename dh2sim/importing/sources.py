@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 
 from dh2sim.errors import Dh2simError
+from dh2sim.formats.calibration import is_calibration
 from dh2sim.formats.serial_robot import SerialLink, SerialRobot
 from dh2sim.formats.table.read import read_table
 from dh2sim.formats.xml_read import Element
 from dh2sim.importing.explain import explanation
 from dh2sim.importing.result import Imported
 from dh2sim.importing.serial import import_serial, robot_name
+from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.compaction import far_frames
 from dh2sim.kinematics.frame_assignment.recover import TOLERANCE
 from dh2sim.kinematics.frame_assignment.result import Tolerances
@@ -29,7 +31,7 @@ from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import Choice, member, shown
 from dh2sim.robot.axes_file import AxesSpec
-from dh2sim.robot.read import parse_robot
+from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
 from dh2sim.robot.write import robot_file_text
 from dh2sim.typing import Array, read_only
@@ -178,6 +180,7 @@ def _shift(offset: Array) -> Array:
 
 
 STDIN = "-"
+_NO_HAYATI = "a table is made in the standard or the modified convention; Hayati's rows come by themselves"
 MAX_BYTES = 50_000_000
 _ROOT = re.compile(rb"<\s*([A-Za-z_][\w:.-]*)")
 _XML_NAMES = (".xml", ".urdf", ".xacro", ".sdf", ".mjcf", ".dae")
@@ -212,6 +215,9 @@ class ImportOptions:
     """Folder outside of which an MJCF or a xacro file includes no file; by default the file's own."""
     arguments: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     """Values of a xacro file's arguments, by name."""
+    nominal: SpecLike | str | os.PathLike[str] | None = None
+    """The robot as its maker designed it, which a calibration file is of: a robot, a robot file, or the name of one
+    that comes with dh2sim."""
     name: str | None = None
     """Of the robot, instead of the file's."""
 
@@ -246,7 +252,7 @@ class ImportOptions:
 def import_robot(
     path: str | os.PathLike[str], options: ImportOptions = ImportOptions(), *, folder: Path | None = None
 ) -> Imported:
-    """Make a robot file of a URDF, an MJCF or a Denavit-Hartenberg table.
+    """Make a robot file of a URDF, an MJCF, a Denavit-Hartenberg table or a maker's calibration file.
 
     Args:
         path: The file; its content says what it is.
@@ -283,6 +289,10 @@ def read_file(path: Path) -> bytes:
 def import_data(data: bytes, file: str, options: ImportOptions, *, folder: Path | None = None) -> Imported:
     """Import content that was read already, as ``import_robot``; ``file`` is its path, or '-' for standard input."""
     root = _root_element(data, file)
+    if root is None and is_calibration(data):
+        return _calibration(data, file, options, folder)
+    if options.nominal is not None:
+        raise Dh2simError(f"{file}: nominal is for makers' calibration files; this is none")
     if root is None and file.lower().endswith((".yaml", ".yml")):
         _refuse_yaml(data, file)
     match root:
@@ -383,9 +393,7 @@ def _refuse_units(file: str, kind: str, options: ImportOptions) -> None:
 
 def _serial(robot: SerialRobot, data: bytes, options: ImportOptions, folder: Path | None) -> Imported:
     if options.convention is Convention.HAYATI:
-        raise Dh2simError(
-            "a table is made in the standard or the modified convention; Hayati's rows come by themselves"
-        )
+        raise Dh2simError(_NO_HAYATI)
     given = ", ".join(f"{name}:={value}" for name, value in options.arguments.items())
     expanded = f", expanded by xacro with {given}" if given else ""
     return import_serial(
@@ -395,6 +403,29 @@ def _serial(robot: SerialRobot, data: bytes, options: ImportOptions, folder: Pat
         folder=folder,
         name=options.name,
         source=f"{robot.description}{expanded} (SHA-256 {hashlib.sha256(data).hexdigest()[:16]}…).",
+    )
+
+
+def _calibration(data: bytes, file: str, options: ImportOptions, folder: Path | None) -> Imported:
+    from dh2sim.importing.calibration import import_calibration
+
+    _refuse_units(file, "a maker's calibration", options)
+    if options.base is not None or options.tip is not None:
+        raise Dh2simError(f"{file}: base and tip are links of a URDF or an MJCF; this is a maker's calibration")
+    if options.convention is Convention.HAYATI:
+        raise Dh2simError(_NO_HAYATI)
+    given = options.nominal
+    nominal = load_robot(given) if isinstance(given, str | os.PathLike) else None if given is None else spec_of(given)
+    called = "standard input" if file == STDIN else Path(file).name
+    return import_calibration(
+        data,
+        file=file,
+        nominal=nominal,
+        convention=_choice(Convention, options.convention, "convention"),
+        tolerance=options.tolerance,
+        name=options.name,
+        folder=folder,
+        origin=f"Calibration in {called} (SHA-256 {hashlib.sha256(data).hexdigest()[:16]}…)",
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import sys
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
 from dh2sim.robot.read import load_robot, parse_robot
+from tests.importing.test_calibration import UR5E, calibrated_poses, ur_file
 from tests.program import Outcome, contents, dh2sim, dh2sim_process
 
 CSV = "theta,d (m),a (m),alpha (deg)\nq1,0.4,0,-90\nq2,0.15,0,90\n"
@@ -188,3 +190,38 @@ def test_an_argument_of_xacro_has_a_name_and_a_value(urdf: Path) -> None:
     assert "--arg: expected NAME:=VALUE, found 'tip=hand'" in " ".join(run.err.split())
     run = dh2sim("import", urdf, "--arg", "tip:=hand")
     assert (run.status, run.err) == (2, f"dh2sim: {urdf}: arguments are for xacro files; this one needs no xacro\n")
+
+
+def test_a_calibration_becomes_a_robot_with_the_masses_of_its_nominal_one(tmp_path: Path) -> None:
+    (tmp_path / "cal.yaml").write_bytes(ur_file(calibrated_poses(UR5E, 0)))
+    run = dh2sim("import", tmp_path / "cal.yaml", "--nominal", "ur5e", "-o", tmp_path / "mine.yaml")
+    assert run.status == 0
+    assert run.out.startswith(
+        f"{tmp_path / 'mine.yaml'}: ur5e_calibrated, 6 rows, standard and hayati; off by at most "
+    )
+    assert "from the nominal ur5e's" in " ".join(run.err.split())
+    made = load_robot(tmp_path / "mine.yaml")
+    assert [row.link.mass for row in made.rows] == [row.link.mass for row in load_robot("ur5e").rows]
+    as_json = json.loads(dh2sim("import", tmp_path / "cal.yaml", "--nominal", "ur5e", "--json").out)
+    assert as_json["conventions"] == ["standard", "hayati"]
+    assert as_json["residual"]["position"] < 1e-9
+
+
+def test_deltas_without_a_nominal_robot_name_the_option(tmp_path: Path) -> None:
+    path = tmp_path / "calibration.conf"
+    path.write_text("".join(f"delta_{name} = [0, 0]\n" for name in ("theta", "a", "d", "alpha")))
+    run = dh2sim("import", path)
+    assert run.status == 2
+    assert run.err == (
+        f"dh2sim: {path}: this holds what is to be added to a nominal table; name the robot, as in --nominal ur5e\n"
+    )
+    path.write_text("delta_theta = [0, x]\ndelta_a = [0]\n")
+    run = dh2sim("import", path, "-o", tmp_path / "arm.yaml")
+    assert (run.status, run.out) == (2, "")
+    assert not (tmp_path / "arm.yaml").exists()
+    assert run.err.splitlines() == [
+        f"{path}:1:1: expected as many numbers of each parameter, got 2 of delta_theta, 1 of delta_a",
+        f"{path}:1:19: delta_theta[1]: expected a number, got 'x'",
+        f"{path}:2:14: missing key 'delta_alpha'",
+        f"{path}:2:14: missing key 'delta_d'",
+    ]
