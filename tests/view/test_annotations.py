@@ -15,10 +15,10 @@ from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Row
 from dh2sim.typing import Array
 from dh2sim.view.scene.annotations import COLORS, Quantity, row_annotations
-from dh2sim.view.scene.items import Arrow, Item, Label, Polyline, Scene, Triad, Vector, vector
+from dh2sim.view.scene.items import Arrow, Item, Label, Placed, Polyline, Scene, Triad, Vector, vector
 from tests.sample_robots import HAYATI, MODIFIED, ODD_ROBOT, STANDARD, robot, row
 from tests.strategies import robots_with_joint_vectors
-from tests.view.test_solids import matrix
+from tests.view.test_solids import matrix, pose_in_scene
 
 SIZE = 0.2
 PRODUCTS = {
@@ -31,13 +31,18 @@ ACROSS = {"alpha": (2, 0), "beta": (2, 1), "theta": (0, 2)}
 
 
 def explained(spec: RobotSpec, number: int, q: object, **options: Any) -> Scene:
-    """The drawing of a row, with all points in base_link."""
+    """The drawing of a row, with all points in base_link, by the last parts of the names."""
     scene = row_annotations(spec, build_chain(spec), number, np.asarray(q), SIZE, **options)
-    return {name: in_base_link(item) for name, item in scene.items()}
+    assert all(name.startswith("/row/") for name in scene)
+    return {
+        f"/row/{name.split('/')[-1]}": in_base_link(item, pose_in_scene(scene, name))
+        for name, item in scene.items()
+        if type(item) is not Placed
+    }
 
 
-def in_base_link(item: Item) -> Item:
-    T = matrix(item)
+def in_base_link(item: Item, T: Array) -> Item:
+    """An item that is where it is by its points, in a frame with a pose in base_link."""
 
     def moved(point: Vector) -> Vector:
         return vector(T[:3, :3] @ point + T[:3, 3])
@@ -280,6 +285,16 @@ def test_while_a_joint_moves_only_poses_and_labels_of_another_row_change() -> No
         for name, item in after.items():
             old = before[name]
             assert replace(item, position=old.position, orientation=old.orientation) == old, name
+        unlabelled = {name for name, item in after.items() if item != before[name] and not isinstance(item, Label)}
+        assert unlabelled == ({"/row/0"} if moved < number else set())
+
+
+def test_while_its_own_joint_moves_what_is_fixed_to_either_frame_stays() -> None:
+    spec = robot("puma560_standard")
+    chain, q = build_chain(spec), np.radians([10.0, 35.0, 20.0, 40.0, 50.0, 60.0])
+    before, after = (row_annotations(spec, chain, 1, q + step, SIZE) for step in ([0.0] * 6, [0, 0.5, 0, 0, 0, 0]))
+    changed = {name for name, item in after.items() if item != before[name] and not isinstance(item, Label)}
+    assert changed == {"/row/0/1", *(f"/row/0/theta{end}" for end in ("", "_tip", "_to"))}
 
 
 @given(robots_with_joint_vectors(max_rows=4), st.data())

@@ -34,7 +34,7 @@ from tests.view.on_page import (
 )
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import Locator, Page
 
     from dh2sim.view.page import Page as ServedPage
 
@@ -179,6 +179,44 @@ def test_the_table_is_edited_marked_reread_and_restored(open_page: OpenPage, vie
     wait_until(undo.is_disabled, "all edits are taken back")
     open_tab(page, "Joints")
     wait_for_position(page, spec, HOME)
+
+
+def test_cells_are_a_grid_and_an_error_moves_nothing(open_page: OpenPage) -> None:
+    page = open_page()
+    open_tab(page, "Table")
+    boxes = {label: box_of(field(page, label)) for label in ("a₁", "α₁", "d₁", "θ₁", "a₆", "θ₆")}
+    for row in (("a₁", "α₁", "d₁", "θ₁"), ("a₆", "θ₆")):
+        assert len({boxes[label]["y"] for label in row}) == 1, "a row is a line"
+        edges = [boxes[label]["x"] for label in row]
+        assert edges == sorted(edges)
+    assert boxes["a₁"]["x"] == boxes["a₆"]["x"], "a column, too"
+    panel = page.get_by_role("tab", name="Table").bounding_box()
+    field(page, "α₂").fill("90 +")
+    wait_until(lambda: "it ends too early" in shown(page, "notice"), "the notice")
+    assert page.get_by_role("tab", name="Table").bounding_box() == panel
+    assert {label: box_of(field(page, label)) for label in boxes} == boxes
+    notice = page.locator('[data-dh2sim="notice"]').bounding_box()
+    assert notice is not None
+    assert notice["y"] > 0.7 * 640, "at the bottom of the window"
+
+
+def box_of(cell: Locator) -> dict[str, float]:
+    box = cell.bounding_box()
+    assert box is not None
+    return {"x": box["x"], "y": box["y"], "width": box["width"], "height": box["height"]}
+
+
+def test_a_row_plays_step_by_step(open_page: OpenPage, viewer: Viewer) -> None:
+    page = open_page()
+    (served,) = viewer.pages
+    open_tab(page, "Table")
+    page.get_by_role("button", name="2", exact=True).click()
+    wait_until(lambda: served.state.selected_row == 1, "the button of a row selects it")
+    page.get_by_role("button", name="Play the row's steps").click()
+    wait_until(lambda: "Step 1 of 4: Rz(θ₂* = 50.0°)" in shown(page, "step"), "the first step")
+    assert "/row/moving_frame" in served._painter._drawn
+    wait_until(lambda: "Step 4 of 4: Rx(α₂ = 90°)" in shown(page, "step"), "the last one")
+    wait_until(lambda: not served.state.row_playing, "the end")
 
 
 def test_physics_moves_the_robot_until_manual_mode_is_chosen(open_page: OpenPage, tmp_path: Path) -> None:

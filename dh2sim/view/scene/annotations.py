@@ -21,7 +21,7 @@ from dh2sim.kinematics.forward import frame_poses
 from dh2sim.kinematics.transforms import compose, joint_part, link_part, second_twist
 from dh2sim.robot.spec import AngleUnit, Convention, RobotSpec
 from dh2sim.typing import Array, read_only
-from dh2sim.view.scene.items import ORIGIN, Arrow, Color, Item, Label, Polyline, Scene, Triad, vector
+from dh2sim.view.scene.items import ORIGIN, Arrow, Color, Item, Label, Placed, Polyline, Scene, Triad, vector
 from dh2sim.view.scene.solids import orientation_of, position_of
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
@@ -206,13 +206,13 @@ def step_marks(step: Step, color: Color, size: float) -> dict[str, Item]:
         size: m.
 
     Returns:
-        An arrow or arc named after the quantity, an arc with its ``…_tip``, ``…_from`` and ``…_to``; each with the
-        pose of the frame before, so that only poses change while other joints move.
+        An arrow or arc named after the quantity, an arc with its ``…_tip``, ``…_from`` and ``…_to``; in the frame
+        before.
     """
     name, axis = step.quantity.value, step.quantity.axis
     if not step.quantity.turns:
         end = vector(step.value * np.eye(3)[axis])
-        return {name: Arrow(start=ORIGIN, end=end, color=color, thickness=_THICKNESS * size, **_pose(step.T_before))}
+        return {name: Arrow(start=ORIGIN, end=end, color=color, thickness=_THICKNESS * size)}
     angle, radius = _drawn_angle(step.value), ARC_RADIUS * size
     count = max(2, math.ceil(abs(angle) / _ARC_STEP))
     lines = {
@@ -222,7 +222,7 @@ def step_marks(step: Step, color: Color, size: float) -> dict[str, Item]:
         f"{name}_to": (1.0, [np.zeros(3), _on_circle(axis, angle, _LEG * size)]),
     }
     return {
-        line: Polyline(points=tuple(map(vector, points)), color=color, width=width, **_pose(step.T_before))
+        line: Polyline(points=tuple(map(vector, points)), color=color, width=width)
         for line, (width, points) in lines.items()
     }
 
@@ -274,6 +274,7 @@ COLORS: Final[Mapping[Quantity, Color]] = MappingProxyType(
     }
 )
 """Of the table's columns."""
+_ROOT: Final = "/row"
 AXIS_COLOR: Final[Color] = (0.35, 0.40, 0.50)
 """Of joint axes and of the common normal."""
 _AXIS = 1.8
@@ -309,18 +310,26 @@ def row_annotations(
         done: How many of the steps are done: 1.5 is the first one and half of the second. None for all of them.
 
     Returns:
-        Items below ``/row/``, in base_link: ``axis_before`` and ``axis_after``, the z axes of frames i - 1 and i;
-        ``normal``, the line of a, which is the common normal of those axes unless a Hayati row has a beta; for each
-        quantity its arrow, or its arc with ``_tip``, ``_from`` and ``_to``; labels, ``…_label``; and, with ``done``,
-        ``moving_frame``, the frame that the steps done so far lead to. Steps that have not begun are not drawn.
+        Items below ``/row``, in base_link. ``/row/0`` is frame i - 1, ``/row/0/1`` below it the frame after the first
+        step, and so on to frame i, so that the pose of one of them is all that changes while another joint moves.
+        In these frames: ``axis_before`` and ``axis_after``, the z axes of frames i - 1 and i; ``normal``, the line of
+        a, which is the common normal of those axes unless a Hayati row has a beta; for each quantity its arrow, or
+        its arc with ``_tip``, ``_from`` and ``_to``. In base_link: labels, ``/row/…_label``; and, with ``done``,
+        ``/row/moving_frame``, which the steps done so far lead to. Steps that have not begun are not drawn.
 
     Raises:
         IndexError: There is no such row.
         ConfigurationError: ``q`` has the wrong shape or is not finite.
     """
     steps = row_steps(spec, chain, row, q)
-    axes, ends = _axes(steps, spec.rows[row].convention, size)
-    items: dict[str, Item] = {**axes, "normal": _normal(steps, size)}
+    frames, items = _frames(steps)
+    ends = {}
+    for name, frame, T, (low, high) in _axes(steps, spec.rows[row].convention, size):
+        items[f"{frames[frame]}/{name}"] = _line(2, low, high)
+        ends[name] = T[:3, 3] + (high + 0.2 * size) * T[:3, 2]
+    for before, step in zip(frames, steps, strict=False):
+        if step.quantity is Quantity.A:
+            items[f"{before}/normal"] = _line(0, *_extended(step.value, _NORMAL * size))
     T_moving = steps[0].T_before
     for number, step in enumerate(steps):
         share = 1.0 if done is None else min(done - number, 1.0)
@@ -328,44 +337,47 @@ def row_annotations(
             break
         color, drawn = COLORS[step.quantity], step if share == 1.0 else step.begun(share)
         if drawn.is_drawn:
-            items.update(step_marks(drawn, color, size))
+            items.update({f"{frames[number]}/{name}": mark for name, mark in step_marks(drawn, color, size).items()})
         position = vector(label_place(drawn, size))
-        items[f"{step.quantity.value}_label"] = Label(position=position, text=step.text(angle), color=color)
+        items[f"{_ROOT}/{step.quantity.value}_label"] = Label(position=position, text=step.text(angle), color=color)
         T_moving = drawn.T_after
     if done is not None:
-        items["moving_frame"] = Triad(length=_MOVING * size, **_pose(T_moving))
+        items[f"{_ROOT}/moving_frame"] = Triad(length=_MOVING * size, **_pose(T_moving))
     for name, number in (("axis_before", row), ("axis_after", row + 1)):
-        items[f"{name}_label"] = Label(position=vector(ends[name]), text=f"z{subscript(number)}", color=AXIS_COLOR)
-    return {f"/row/{name}": item for name, item in items.items()}
+        text = f"z{subscript(number)}"
+        items[f"{_ROOT}/{name}_label"] = Label(position=vector(ends[name]), text=text, color=AXIS_COLOR)
+    return items
 
 
-def _axes(steps: tuple[Step, ...], convention: Convention, size: float) -> tuple[dict[str, Item], dict[str, Array]]:
-    """Return the z axes of the frames before and after, and their upper ends; each covers its offset d."""
+def _frames(steps: tuple[Step, ...]) -> tuple[list[str], dict[str, Item]]:
+    """Return the names of the frames before the first step and after each, and the frames, each in the one before."""
+    names, items = [f"{_ROOT}/0"], dict[str, Item]()
+    items[names[0]] = Placed(**_pose(steps[0].T_before))
+    for number, step in enumerate(steps, start=1):
+        names.append(f"{names[-1]}/{number}")
+        items[names[-1]] = Placed(**_pose(_transform(step.quantity, step.value)))
+    return names, items
+
+
+def _axes(
+    steps: tuple[Step, ...], convention: Convention, size: float
+) -> list[tuple[str, int, Array, tuple[float, float]]]:
+    """Return the z axes of the frames before and after: name, which frame, its pose in base_link, and both ends.
+
+    Each covers its offset d.
+    """
     d = next(step.value for step in steps if step.quantity is Quantity.D)
-    modified = convention is Convention.MODIFIED
-    spans = {
-        "axis_before": (steps[0].T_before, 0.0 if modified else d),
-        "axis_after": (steps[-1].T_after, -d if modified else 0.0),
-    }
-    lines: dict[str, Item] = {}
-    ends = {}
-    for name, (T, offset) in spans.items():
-        low, high = _extended(offset, _AXIS * size)
-        lines[name] = _line(T, 2, low, high)
-        ends[name] = T[:3, 3] + (high + 0.2 * size) * T[:3, 2]
-    return lines, ends
-
-
-def _normal(steps: tuple[Step, ...], size: float) -> Polyline:
-    step = next(step for step in steps if step.quantity is Quantity.A)
-    return _line(step.T_before, 0, *_extended(step.value, _NORMAL * size))
+    before, after = (0.0, -d) if convention is Convention.MODIFIED else (d, 0.0)
+    return [
+        ("axis_before", 0, steps[0].T_before, _extended(before, _AXIS * size)),
+        ("axis_after", -1, steps[-1].T_after, _extended(after, _AXIS * size)),
+    ]
 
 
 def _extended(length: float, margin: float) -> tuple[float, float]:
     return min(0.0, length) - margin, max(0.0, length) + margin
 
 
-def _line(T: Array, axis: int, low: float, high: float) -> Polyline:
+def _line(axis: int, low: float, high: float) -> Polyline:
     direction = np.eye(3)[axis]
-    ends = vector(low * direction), vector(high * direction)
-    return Polyline(points=ends, color=AXIS_COLOR, width=1.0, **_pose(T))
+    return Polyline(points=(vector(low * direction), vector(high * direction)), color=AXIS_COLOR, width=1.0)
