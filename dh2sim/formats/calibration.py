@@ -4,7 +4,8 @@ Three kinds, told apart by their content:
 
 * ``kinematics: {shoulder: {x, y, z, roll, pitch, yaw}, upper_arm: …}``, of Universal Robots' ROS drivers
   (``calibration.yaml``, ``default_kinematics.yaml``): poses of joints in each other, in m and rad;
-* ``joint1: {kinematic: {x, y, z, roll, pitch, yaw}}``, of Franka's descriptions (``kinematics.yaml``): the same;
+* ``joint1: {kinematic: {x, y, z, roll, pitch, yaw}}``, of Franka's descriptions (``kinematics.yaml``): the same,
+  with or without the words ``kinematics`` and ``kinematic``;
 * ``delta_theta = [ … ]`` and the like, of Universal Robots' controllers (``calibration.conf``): what is to be added
   to the nominal standard table.
 """
@@ -91,7 +92,7 @@ class TableDeltas:
     """Whether the controller calls the robot calibrated."""
 
 
-_YAML = re.compile(rb"^[ \t]*(kinematics|kinematic)[ \t]*:[ \t]*([#{].*)?\r?$", re.MULTILINE)
+_ANGLE = re.compile(rb"(?:^|[{,])[ \t]*(?:roll|yaw)[ \t]*:", re.MULTILINE)
 _OTHER_YAML = re.compile(rb"^(joints|axes)[ \t]*:", re.MULTILINE)
 _DELTA = re.compile(rb"^[ \t]*delta_(theta|a|d|alpha)[ \t]*=", re.MULTILINE)
 
@@ -100,7 +101,7 @@ def is_calibration(data: bytes) -> bool:
     """Whether a file looks like one of a maker's calibration files."""
     if len(set(_DELTA.findall(data))) > 1:
         return True
-    return _YAML.search(data) is not None and b"roll" in data and _OTHER_YAML.search(data) is None
+    return len(_ANGLE.findall(data)) > 1 and _OTHER_YAML.search(data) is None
 
 
 class _CalibrationReport(Report):
@@ -147,13 +148,13 @@ def _origins(text: str, report: Report) -> JointOrigins | None:
             report.add(node.line, node.column, loc, f"expected poses of joints by name, got {_found(node)}")
             return None
         return _of_kinematics(node, loc, report)
+    if any(name in top for name in UR_JOINTS):
+        return _of_kinematics(root, (), report)
     poses = {}
     for key, entry in top.items():
         inner = entry.value.at("kinematic")
-        if inner is None:
-            report.add(entry.line, entry.column, (key,), "expected 'kinematic' with x, y, z, roll, pitch and yaw")
-        else:
-            poses[key] = _pose(inner, (key, "kinematic"), report)
+        loc = (key,) if inner is None else (key, "kinematic")
+        poses[key] = _pose(entry.value if inner is None else inner, loc, report)
     return _numbered(top, poses, report)
 
 

@@ -67,22 +67,22 @@ class FarFrame:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FarFrames:
-    """The DH frames of a table that stand far from the arm, and how far the arm itself reaches."""
+    """The DH frames of a table that stand far from the arm, and how long the arm itself is."""
 
     frames: tuple[FarFrame, ...]
     """Base first; empty where the table is compact."""
-    reach: float
-    """Of the arm, m, whatever its frames."""
+    length: float
+    """Of the arm along its links, m, whatever its frames."""
 
     @property
     def sentence(self) -> str:
-        """The frames, how far out they are, and the reach."""
+        """The frames, how far out they are, and how long the arm is."""
         names = " and ".join(str(far.frame) for far in self.frames)
         distances = " and ".join(f"{far.distance:.4g}" for far in self.frames)
         one = len(self.frames) == 1
         return (
             f"DH {'frame' if one else 'frames'} {names} {'is' if one else 'are'} {distances} m away from the arm, "
-            f"whose reach is {self.reach:.3g} m."
+            f"which is {self.length:.3g} m long."
         )
 
 
@@ -95,7 +95,7 @@ def far_frames(spec: RobotSpec) -> FarFrames:
     with exact_arithmetic():
         survey = _Survey(spec)
     far = [FarFrame(frame=i, distance=survey.distance(i)) for i in range(len(spec.rows) + 1) if survey.is_far(i)]
-    return FarFrames(frames=tuple(far), reach=survey.path.reach)
+    return FarFrames(frames=tuple(far), length=survey.path.reach)
 
 
 class _Survey:
@@ -480,7 +480,7 @@ class _Notes:
 
     def _stood(self, i: int) -> str:
         survey = self._survey
-        return f"frame {i} was {survey.distance(i):.4g} m away from the arm, whose reach is {survey.path.reach:.3g} m"
+        return f"frame {i} was {survey.distance(i):.4g} m away from the arm, which is {survey.path.reach:.3g} m long"
 
     def end(self, i: int) -> None:
         """Note the first or the last frame."""

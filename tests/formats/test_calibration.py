@@ -82,7 +82,19 @@ def test_a_file_of_a_ur_controller_gives_deltas() -> None:
     assert not uncalibrated.linearised
 
 
-@pytest.mark.parametrize("text", [UR, FRANKA, CONF, CONF.replace("[mounting]\n", "")])
+BARE_UR = UR.replace("kinematics:\n", "").replace("  ", "")
+BARE_FRANKA = FRANKA.replace("\n  kinematic:", "")
+
+
+def test_the_words_around_the_poses_may_be_missing() -> None:
+    for bare, whole in ((BARE_UR, UR), (BARE_FRANKA, FRANKA)):
+        reads = [read_calibration(text.encode(), file="f") for text in (bare, whole)]
+        assert isinstance(reads[0], JointOrigins)
+        assert isinstance(reads[1], JointOrigins)
+        assert reads[0].names == reads[1].names
+
+
+@pytest.mark.parametrize("text", [UR, BARE_UR, FRANKA, BARE_FRANKA, CONF, CONF.replace("[mounting]\n", "")])
 def test_calibrations_are_recognised_by_their_content(text: str) -> None:
     assert is_calibration(text.encode())
 
@@ -91,7 +103,7 @@ def test_calibrations_are_recognised_by_their_content(text: str) -> None:
     "text",
     [
         "name: arm\nconvention: standard\njoints:\n  - {type: revolute}\n",
-        "kinematics: well known\nroll your own\n",
+        "kinematics: well known\nroll: your own\n",
         "| theta | d | a | alpha |\n|---|---|---|---|\n| q1 | 0 | 0 | 0 |\n",
         "delta_theta = [1]\n",
         "name: a\naxes:\n  - {type: revolute, point: [0, 0, 0], direction: [0, 0, 1]}\n",
@@ -144,7 +156,7 @@ def test_numbered_joints_must_be_complete() -> None:
         "f:7:1: elbow: expected a numbered joint, such as 'joint1', got 'elbow'"
     ]
     assert wrong(f"joint1:\n  kinematic: {POSE}\njoint2: 3\n") == [
-        "f:3:1: joint2: expected 'kinematic' with x, y, z, roll, pitch and yaw"
+        "f:3:9: joint2: expected x, y, z, roll, pitch, yaw, got '3'"
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
 from dh2sim.robot.write import robot_file_text
-from tests.kinematics.test_compaction import calibrated_ur5
+from tests.kinematics.test_compaction import UR5, calibrated_ur5
 from tests.strategies import robot_specs
 
 OTHER = {Convention.STANDARD: Convention.MODIFIED, Convention.MODIFIED: Convention.STANDARD}
@@ -106,3 +107,25 @@ def test_the_units_of_the_file_are_kept() -> None:
 def test_hayati_is_no_form_of_a_whole_table() -> None:
     with pytest.raises(Dh2simError, match="can be converted to standard, modified or compact, not to hayati"):
         convert_robot(load_robot("scara"), Convention.HAYATI)
+
+
+def _tables(text: str) -> list[list[list[str]]]:
+    """The Markdown tables of a text, without their heads."""
+    tables: list[list[list[str]]] = [[]]
+    for line in text.splitlines():
+        if not line.startswith("|"):
+            tables.append([])
+        elif not line.startswith("|-"):
+            tables[-1].append([cell.strip() for cell in line.strip("|").split("|")])
+    return [table for table in tables if table]
+
+
+def test_the_compact_table_on_the_page_is_that_of_the_one_above_it() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "importing.md").read_text(encoding="utf-8")
+    section = page.partition("## A compact table")[2].partition("## Axes")[0]
+    given, compact = _tables(section)
+    assert [tuple(map(float, row[1:])) for row in given[1:]] == list(UR5)
+    rows = compact_rows(calibrated_ur5()).spec.rows
+    assert [row[1] for row in compact[1:]] == [row.convention.value for row in rows]
+    shown = [[float(cell or 0) for cell in row[2:]] for row in compact[1:]]
+    assert shown == [[row.theta, row.a, row.d, row.alpha, row.beta] for row in rows]

@@ -313,6 +313,6 @@ def test_a_calibrated_table_says_that_it_can_be_compact() -> None:
     data = f"| theta (rad) | a (m) | d (m) | alpha (rad) |\n|---|---|---|---|\n{rows}\n".encode()
     imported = import_data(data, "ur5.md", ImportOptions(convention="standard"))
     assert imported.notes[-1] == (
-        "DH frames 2 and 3 are 574.1 and 66.77 m away from the arm, whose reach is 1.19 m. "
+        "DH frames 2 and 3 are 574.1 and 66.77 m away from the arm, which is 1.19 m long. "
         "'dh2sim convert ur5.yaml --to compact' rewrites the table without them."
     )

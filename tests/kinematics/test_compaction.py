@@ -89,11 +89,11 @@ def test_what_stood_where_is_reported() -> None:
     spec = calibrated_ur5()
     far = far_frames(spec)
     assert [one.frame for one in far.frames] == [2, 3]
-    assert far.sentence == "DH frames 2 and 3 are 574.1 and 66.77 m away from the arm, whose reach is 1.19 m."
+    assert far.sentence == "DH frames 2 and 3 are 574.1 and 66.77 m away from the arm, which is 1.19 m long."
     assert compact_rows(spec).notes == (
-        "joint_2 is a Hayati row now: frame 2 was 574.1 m away from the arm, whose reach is 1.19 m, because its axis "
+        "joint_2 is a Hayati row now: frame 2 was 574.1 m away from the arm, which is 1.19 m long, because its axis "
         "and that of joint_3 are nearly parallel, 7.34e-04 rad apart.",
-        "joint_3 is a Hayati row now: frame 3 was 66.77 m away from the arm, whose reach is 1.19 m, because its axis "
+        "joint_3 is a Hayati row now: frame 3 was 66.77 m away from the arm, which is 1.19 m long, because its axis "
         "and that of joint_4 are nearly parallel, 3.26e-03 rad apart.",
         "joint_4 begins at the frame that was moved: its theta and d changed.",
     )
@@ -278,5 +278,5 @@ def test_everything_else_of_a_robot_is_kept() -> None:
 
 def test_an_arm_without_reach_is_left_alone() -> None:
     spec = RobotSpec(name="point", rows=(Row(type=REVOLUTE, alpha=0.5), Row(type=REVOLUTE)))
-    assert far_frames(spec).reach == 0.0
+    assert far_frames(spec).length == 0.0
     assert compact_rows(spec).spec is spec

@@ -243,7 +243,7 @@ def test_frames_far_from_the_arm_are_noted_with_what_moves_them(tmp_path: Path) 
     assert (slip.kind, slip.path) == (SlipKind.FAR_FRAMES, "joints[1].d")
     assert slip.line == text.splitlines().index("    d: 574.241384579456") + 1
     assert slip.message == (
-        "DH frames 2 and 3 are 574.1 and 66.77 m away from the arm, whose reach is 1.19 m; "
+        "DH frames 2 and 3 are 574.1 and 66.77 m away from the arm, which is 1.19 m long; "
         "'dh2sim convert ur5.yaml --to compact' rewrites the table without them"
     )
     run = dh2sim("info", tmp_path / "ur5.yaml")
