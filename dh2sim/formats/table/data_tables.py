@@ -11,6 +11,7 @@ They are read as text; nothing is run.
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
@@ -48,6 +49,8 @@ _TO_RADIANS: Final = re.compile(
 _LONGEST: Final = 20_000
 _LONGEST_RECORD: Final = 2_000
 _MAX_FOUND: Final = 3_000
+_MAX_PROBLEMS: Final = 20
+"""Brackets that are looked at; one that is never closed counts for many."""
 _BLOCKS: Final = (".yaml", ".yml", ".toml", ".ini", ".cfg")
 _FIXED_TRANSFORM: Final = re.compile(r"setFixedTransform\s*\([^;\n]*[\"'](m?dh)[\"']")
 _NAMED_DH: Final = re.compile(r"dh|denavit", re.IGNORECASE)
@@ -63,6 +66,8 @@ def data_tables(lines: Sequence[str], suffix: str) -> tuple[list[Table], list[tu
     text = _COMMENTS.sub(lambda found: " " * len(found.group()), "\n".join(lines))
     places = TextPlaces(lines)
     problems: list[tuple[int, int, str]] = []
+    if not any(sign in text for sign in "[{(") and suffix not in _BLOCKS:
+        return [], []
     found = [
         *_lists(text, places),
         *_matrices(text, lines, places, problems),
@@ -141,19 +146,15 @@ def _plainer(raw: str) -> str:
     return "" if text in ("None", "null", "nan", "np.nan") else " ".join(text.split())
 
 
-def _heading(name: str, cell: Cell) -> Cell | None:
+@functools.lru_cache(maxsize=4096)
+def _heading(name: str) -> str | None:
     """Return the heading that a name in a program stands for, or None."""
-    name = name.rpartition(".")[2]
+    name = name.rpartition(".")[2][:60]
     for _ in range(3):
         name = _AFFIXES.sub("", name)
     for text in (name, name.removesuffix("s"), re.sub(r"s(?=_)", "", name)):
-        heading = Cell(text=text, line=cell.line, column=cell.column)
-        if (
-            len(text) > 0
-            and (quantity := read_heading(heading).quantity) is not None
-            and quantity is not Quantity.JOINT
-        ):
-            return heading
+        if text and read_heading(Cell(text=text, line=1, column=1)).quantity not in (None, Quantity.JOINT):
+            return text
     return None
 
 
@@ -167,13 +168,18 @@ def _lists(text: str, places: TextPlaces) -> Iterator[Table]:
     count = 0
     for found in _LIST.finditer(text):
         start = found.end()
-        name = _heading(found[1], _cell(text, found.start(1), found.end(1), places))
-        count += 1
-        if name is None or count > _MAX_FOUND:
+        text_of_name = _heading(found[1])
+        if text_of_name is None:
             continue
+        count += 1
+        if count > _MAX_FOUND:
+            break
         end = _closing(text, start, _LONGEST)
         if end is None or any(sign in text[start + 1 : end] for sign in "[{;"):
+            count += _MAX_FOUND // 50 if end is None else 0
             continue
+        line, column = places.at(found.start(1))
+        name = Cell(text=text_of_name, line=line, column=column)
         if found[2] in ("deg2rad", "radians") or _IN_DEGREES.match(text, end + 1):
             name = Cell(text=f"{name.text} (deg)", line=name.line, column=name.column)
         cells = [_cell(text, *span, places) for span in _items(text, start + 1, end)][: MAX_ROWS + 1]
@@ -224,9 +230,13 @@ def _matrices(
     text: str, lines: Sequence[str], places: TextPlaces, problems: list[tuple[int, int, str]]
 ) -> Iterator[Table]:
     fixed = _FIXED_TRANSFORM.search(text)
-    for count, found in enumerate(_LIST.finditer(text)):
+    count = 0
+    for found in _LIST.finditer(text):
         start = found.end()
-        end = _closing(text, start, _LONGEST) if count < _MAX_FOUND else None
+        end = _closing(text, start, _LONGEST)
+        count += 1 if end is not None else _MAX_FOUND // 50
+        if count > _MAX_FOUND or len(problems) > _MAX_PROBLEMS:
+            break
         rows = _matrix_rows(text, start, end, places) if end is not None else []
         width = len(rows[0]) if rows else 0
         if not 4 <= width <= 12 or len(rows) > MAX_ROWS or any(len(row) != width for row in rows):
@@ -296,11 +306,15 @@ def _named_columns(lines: Sequence[str], name: int, first: int, width: int) -> l
 def _records(text: str, places: TextPlaces) -> Iterator[Table]:
     records: list[dict[str, Cell]] = []
     last = 0
-    for count, found in enumerate(_CALL.finditer(text)):
-        if count > _MAX_FOUND or found.start() < last:
+    count = 0
+    for found in _CALL.finditer(text):
+        if found.start() < last:
             continue
         opened = found.end() - 1
         end = _closing(text, opened, _LONGEST_RECORD)
+        count += 1 if end is not None else _MAX_FOUND // 200
+        if count > _MAX_FOUND:
+            break
         record = _record(text, opened + 1, end, places) if end is not None else None
         if record is None or end is None:
             continue
@@ -319,9 +333,9 @@ def _record(text: str, start: int, end: int, places: TextPlaces) -> dict[str, Ce
         pair = _PAIR.fullmatch(text[a:b])
         if pair is None:
             continue
-        heading = _heading(pair[1], Cell(text="", line=1, column=1))
+        heading = _heading(pair[1])
         if heading is not None and not pair[2].startswith(("[", "{")):
-            record[heading.text] = _cell(text, a + pair.start(2), a + pair.end(2), places)
+            record[heading] = _cell(text, a + pair.start(2), a + pair.end(2), places)
     return record if are_headings([Cell(text=name, line=1, column=1) for name in record][:MAX_COLUMNS]) else None
 
 
@@ -346,13 +360,13 @@ def _blocks(lines: Sequence[str]) -> Iterator[Table]:
         pair = _BLOCK_PAIR.fullmatch(line[:500])
         key = pair[1] if pair else ""
         starts = line.lstrip().startswith(("- ", "[")) or (pair is not None and pair[2] is None)
-        heading = _heading(key, Cell(text="", line=1, column=1)) if key else None
-        if starts or (heading is not None and heading.text in current):
+        heading = _heading(key) if key else None
+        if starts or (heading is not None and heading in current):
             if are_headings([Cell(text=name, line=1, column=1) for name in current][:MAX_COLUMNS]):
                 records.append(current)
             current = {}
         if pair is not None and heading is not None and pair[2] is not None and not pair[2].startswith(("[", "{")):
-            current[heading.text] = Cell(text=_plainer(pair[2]), line=number, column=pair.start(2) + 1)
+            current[heading] = Cell(text=_plainer(pair[2]), line=number, column=pair.start(2) + 1)
     yield from _of_records(records)
 
 

@@ -85,8 +85,9 @@ def make_table(header: Cells, rows: Sequence[Cells], grid: Grid) -> Table:
     rows = list(rows)
     delimited = bool(rows) and all(DELIMITER.fullmatch(cell.text) for cell in rows[0])
     rows = rows[1:] if delimited else rows
-    while rows and len(rows[0]) == len(header) and (merged := _merged(header, rows[0])):
-        header, rows = merged, rows[1:]
+    for _ in range(2):
+        if rows and len(rows[0]) == len(header) and (merged := _merged(header, rows[0])):
+            header, rows = merged, rows[1:]
     notes: list[str] = []
     if delimited or grid.filled:
         rows = [_fitted(row, len(header), number, notes) for number, row in enumerate(rows, start=1)]

@@ -121,6 +121,8 @@ def separated_grid(lines: Sequence[str], first: int, separator: str) -> Grid:
         if len(cells) < 2:
             break
         rows.append(cells)
+        if len(rows) > MAX_ROWS + 1 or len(problems) > MAX_ROWS:
+            break
     return Grid(rows=tuple(rows), separator=separator, problems=tuple(problems))
 
 

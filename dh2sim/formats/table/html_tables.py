@@ -11,18 +11,18 @@ from dh2sim.formats.table.grid import MAX_COLUMNS, MAX_ROWS, Cell, Cells, Grid
 _KEPT: Final = ("sub", "sup")
 """Elements in a cell that mean something."""
 _SPACES: Final = ("br", "p", "div")
+_LONGEST: Final = 500_000
+"""Characters, from the first table on, that are read."""
+_MOST_CELLS: Final = 2 * MAX_COLUMNS
 
 
 def html_grids(lines: Sequence[str]) -> Iterator[Grid]:
     """Yield the tables of a text that are written in HTML."""
-    starts = [index for index, line in enumerate(lines) if "<table" in line.casefold()]
-    if not starts:
+    first = next((index for index, line in enumerate(lines) if "<table" in line.casefold()), None)
+    if first is None:
         return
-    parser = _TableParser(first=starts[0])
-    for index, line in enumerate(lines[starts[0] :]):
-        parser.feed(line + "\n")
-        if len(parser.grids) > MAX_ROWS or parser.stuck(index):
-            break
+    parser = _TableParser(first)
+    parser.feed("\n".join(lines[first:])[:_LONGEST])
     parser.finish()
     yield from parser.grids
 
@@ -40,10 +40,6 @@ class _TableParser(HTMLParser):
         self._text: list[str] | None = None
         self._span = (1, 1)
         self._place = (1, 1)
-
-    def stuck(self, index: int) -> bool:
-        """Whether the parser waits for the end of something that began long before a line."""
-        return len(self.rawdata) > 100_000 and index % 100 == 0
 
     def finish(self) -> None:
         """Close what is open."""
@@ -102,6 +98,8 @@ class _TableParser(HTMLParser):
         self._text = None
         row = self._row
         cells = self._rows[row]
+        if len(cells) > _MOST_CELLS:
+            return
         at = next((k for k, cell in enumerate(cells) if cell is None), len(cells))
         for below in range(self._span[1]):
             if row + below >= len(self._rows):

@@ -26,6 +26,7 @@ from dh2sim.formats.table.toolbox import (
     FUNCTIONS_OF_NUMBERS,
     IDENTITY,
     MAX_ITEMS,
+    MAX_PROBLEMS,
     NumberArray,
     ScriptError,
     ToolboxLink,
@@ -80,7 +81,7 @@ def read_matlab(text: str) -> tuple[list[ToolboxRobot], list[ScriptError]]:
         return [], [error]
     statements = statements_of(tokens)
     index = 0
-    while index < len(statements):
+    while index < len(statements) and len(script.problems) <= MAX_PROBLEMS:
         first = statements[index][0]
         if first.kind == "name" and first.text in _SKIPPED:
             index = script.skip(statements, index)

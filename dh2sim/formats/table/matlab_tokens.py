@@ -19,7 +19,6 @@ _TOKEN: Final = re.compile(
     r"|(?P<other>.)",
     re.DOTALL,
 )
-_BLOCK_COMMENT: Final = re.compile(r"^[ \t]*[%#]\{[ \t]*$.*?^[ \t]*[%#]\}[ \t]*$", re.MULTILINE | re.DOTALL)
 _STRINGS: Final = {"'": re.compile(r"'((?:[^'\n]|'')*)'"), '"': re.compile(r'"((?:[^"\n]|"")*)"')}
 
 
@@ -43,7 +42,7 @@ def tokens_of(text: str) -> list[Token]:
     Raises:
         ScriptError: It has too many.
     """
-    text = _BLOCK_COMMENT.sub(lambda found: re.sub(r"[^\n]", " ", found.group()), text)
+    text = _without_blocks(text)
     tokens: list[Token] = []
     position, line, start, spaced = 0, 1, 0, True
     while position < len(text):
@@ -67,6 +66,18 @@ def tokens_of(text: str) -> list[Token]:
         if len(tokens) > _MAX_TOKENS:
             raise ScriptError(f"the script has more than {_MAX_TOKENS} words", line, 1)
     return tokens
+
+
+def _without_blocks(text: str) -> str:
+    """Return a script without the lines between ``%{`` and ``%}``."""
+    lines, depth = text.split("\n"), 0
+    for index, line in enumerate(lines):
+        mark = line.strip()
+        depth += mark in ("%{", "#{")
+        if depth:
+            lines[index] = ""
+        depth = max(depth - (mark in ("%}", "#}")), 0)
+    return "\n".join(lines)
 
 
 def _is_transpose(tokens: Sequence[Token], *, spaced: bool) -> bool:

@@ -18,6 +18,7 @@ from dh2sim.formats.table.toolbox import (
     FUNCTIONS_OF_NUMBERS,
     IDENTITY,
     MAX_ITEMS,
+    MAX_PROBLEMS,
     NUMBERS,
     NumberArray,
     ScriptError,
@@ -114,6 +115,8 @@ class _PythonScript:
     def block(self, statements: Sequence[ast.stmt]) -> None:
         """Follow statements, one after the other; what cannot be read of robots goes to the problems."""
         for statement in statements:
+            if len(self.problems) > MAX_PROBLEMS:
+                break
             try:
                 self._statement(statement)
             except ScriptError as error:
@@ -415,6 +418,8 @@ class _PythonScript:
                 set_property(link, key, value)
             except ScriptError as error:
                 raise ScriptError(str(error), line, column, told=error.told) from None
+        if len(self._links) == MAX_ITEMS:
+            raise ScriptError(f"more than {MAX_ITEMS} links", line, column)
         self._links.append(link)
         return link
 

@@ -60,7 +60,7 @@ def check_shape(table: Table, findings: Findings) -> None:
     if not table.rows:
         findings.wrong(first, "", "the table has headings and no rows")
     if len(table.rows) > MAX_ROWS:
-        findings.wrong(first, "", f"the table has {len(table.rows)} rows; at most {MAX_ROWS} are allowed")
+        findings.wrong(first, "", f"the table has more than {MAX_ROWS} rows")
     if len(table.header) > MAX_COLUMNS:
         findings.wrong(first, "", f"the table has {len(table.header)} columns; at most {MAX_COLUMNS} are allowed")
     for number, row in enumerate(table.rows[:MAX_ROWS], start=1):

@@ -18,6 +18,11 @@ from dh2sim.robot.spec import Convention
 MAX_ITEMS: Final = 1000
 """Elements of a list, links of a robot."""
 
+MAX_PROBLEMS: Final = 100
+"""Problems of a script, behind which it is not followed."""
+_DEEPEST: Final = 3
+"""Lists in lists."""
+
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 """A 4 x 4 homogeneous transform."""
 
@@ -139,8 +144,9 @@ def number(value: object) -> float:
     Raises:
         ScriptError: It is none.
     """
-    while isinstance(value, list) and len(value) == 1:
-        value = value[0]
+    for _ in range(_DEEPEST):
+        if isinstance(value, list) and len(value) == 1:
+            value = value[0]
     if isinstance(value, Unknown):
         raise ScriptError(value.why, told=value.told)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
@@ -180,7 +186,7 @@ def described(value: object) -> str:
             return shown(value)
 
 
-def elementwise(operation: Callable[..., object], *values: object) -> object:
+def elementwise(operation: Callable[..., object], *values: object, depth: int = 0) -> object:
     """Return an operation on numbers, on every element of arrays; ``Unknown`` where an operand is."""
     unknown = next((value for value in values if isinstance(value, Unknown)), None)
     if unknown is not None:
@@ -192,10 +198,12 @@ def elementwise(operation: Callable[..., object], *values: object) -> object:
         except (ArithmeticError, ValueError) as error:
             return Unknown(str(error))
     size = len(arrays[0])
+    if depth == _DEEPEST:
+        return Unknown("lists are nested too deep")
     if any(len(array) != size for array in arrays):
         return Unknown("the sizes of two arrays differ")
     return NumberArray(
-        elementwise(operation, *(value[i] if isinstance(value, list) else value for value in values))
+        elementwise(operation, *(value[i] if isinstance(value, list) else value for value in values), depth=depth + 1)
         for i in range(size)
     )
 
@@ -327,7 +335,7 @@ def set_property(link: ToolboxLink, key: str, value: object) -> None:
         link.unused.add(key)
 
 
-def links_in(value: object) -> list[ToolboxLink]:
+def links_in(value: object, *, depth: int = 0) -> list[ToolboxLink]:
     """Return the links of a value: of a list, a matrix, a link, a robot.
 
     Raises:
@@ -340,8 +348,11 @@ def links_in(value: object) -> list[ToolboxLink]:
             return list(value.links)
         case []:
             raise ScriptError("there are no links")
-        case list() if len(value) <= MAX_ITEMS:
-            return [link for item in value for link in links_in(item)]
+        case list() if len(value) <= MAX_ITEMS and depth < _DEEPEST:
+            links = [link for item in value for link in links_in(item, depth=depth + 1)]
+            if len(links) > MAX_ITEMS:
+                raise ScriptError(f"more than {MAX_ITEMS} links")
+            return links
         case Unknown():
             raise ScriptError(f"the links cannot be read: {value.why}", told=value.told)
         case _:

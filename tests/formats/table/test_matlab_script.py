@@ -216,3 +216,8 @@ def test_what_cannot_be_read_of_a_robot_is_refused_with_its_place(text: str, exp
 def test_nothing_of_a_script_is_run() -> None:
     text = "system('touch /tmp/x'); eval('1'); L(1) = Link([0 0.4 0 0]); delete('a'); !rm -r b\nSerialLink(L)"
     assert numbers(imported(text, "arm.m").spec) == [(0, 0.4, 0, 0)]
+
+
+def test_a_list_of_links_that_holds_itself_is_refused() -> None:
+    text = "L(1) = Link([0 1 0 0]);\nL(2) = L;\nr = SerialLink(L);"
+    assert complaints(text, "arm.m") == ["arm.m:3:5: links are wanted, found a list"]
