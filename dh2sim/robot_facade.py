@@ -54,6 +54,7 @@ if TYPE_CHECKING:
 FilePath: TypeAlias = str | os.PathLike[str]
 _READERS: Final = {
     ".urdf": "from_urdf",
+    ".xacro": "from_urdf",
     ".xml": "from_mjcf",
     ".md": "from_table",
     ".csv": "from_table",

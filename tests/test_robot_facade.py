@@ -198,7 +198,12 @@ def test_a_robot_is_made_of_a_urdf_and_of_an_mjcf(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("path", "reader"),
-    [("scara/scara.urdf", "from_urdf"), ("scara/scara.xml", "from_mjcf"), ("table.CSV", "from_table")],
+    [
+        ("scara/scara.urdf", "from_urdf"),
+        ("scara/scara.xml", "from_mjcf"),
+        ("a.urdf.xacro", "from_urdf"),
+        ("table.CSV", "from_table"),
+    ],
 )
 def test_a_file_of_another_format_is_sent_to_its_reader(path: str, reader: str) -> None:
     with pytest.raises(Dh2simError) as caught:

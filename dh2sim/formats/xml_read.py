@@ -34,8 +34,8 @@ ENCODINGS: Final = ("utf-8", "us-ascii", "iso-8859-1", "utf-16", "utf-16le", "ut
 
 _PIECE: Final = 65_536
 _BEFORE_DECLARATION: Final = re.compile(r"((?:[ \t\r\n]|<!--.*?-->)+)(<\?xml[ \t\r\n].*?\?>)", re.DOTALL)
-_LATER_MARK: Final = re.compile("^([ \t\r\n]*)\xef\xbb\xbf")
-"""A byte order mark of UTF-8 behind blanks, read as Latin-1."""
+_LATER_MARK: Final = re.compile("^([ \t\r\n]*)(?:\ufeff|\xef\xbb\xbf)")
+"""A second byte order mark, or one behind blanks; that of UTF-8 read as Latin-1."""
 _COMMENT: Final = re.compile(r"<!--(.*?)-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>", re.DOTALL)
 
 
@@ -158,8 +158,7 @@ def tolerated(data: bytes) -> bytes:
         text = data.decode(encoding)
     except UnicodeDecodeError:
         return data
-    if not is_utf_16:
-        text = _LATER_MARK.sub(r"\1", text)
+    text = _LATER_MARK.sub(r"\1", text)
     return _COMMENT.sub(_without_dashes, _declared_first(text)).encode(encoding)
 
 

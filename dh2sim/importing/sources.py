@@ -319,7 +319,7 @@ def _refuse_yaml(data: bytes, file: str) -> None:
 
 def _root_element(data: bytes, file: str) -> str | None:
     """Return the name of an XML file's outermost element; None for what is no XML, such as Markdown after HTML."""
-    text = data.removeprefix(b"\xef\xbb\xbf").lstrip()
+    text = data.lstrip(b"\xef\xbb\xbf \t\r\n")
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = data.decode("utf-16", "replace").encode().lstrip(b"\xef\xbb\xbf \t\r\n")
     if not text.startswith(b"<"):

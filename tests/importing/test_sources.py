@@ -316,3 +316,12 @@ def test_a_calibrated_table_says_that_it_can_be_compact() -> None:
         "DH frames 2 and 3 are 574.1 and 66.77 m away from the arm, which is 1.19 m long. "
         "'dh2sim convert ur5.yaml --to compact' rewrites the table without them."
     )
+
+
+@pytest.mark.parametrize(
+    "before", ["", "\ufeff", "\n\ufeff", "\ufeff \n", "<!-- a -- b -->\n", "\n<!-- <mujoco> -->\n", "<?pi?>"]
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_a_urdf_is_known_behind_marks_blanks_and_comments(before: str, encoding: str) -> None:
+    text = before + ARM.partition("\n")[2]
+    assert import_data(text.encode(encoding), "arm.txt", ImportOptions()).spec.name == "two_arm"

@@ -111,6 +111,21 @@ def test_a_wider_root_allows_files_of_a_parent_folder(tmp_path: Path, form: str)
     )
 
 
+def test_a_model_above_may_be_attached_where_the_root_allows_it(tmp_path: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "arm.xml").write_text(arm_text())
+    folder = tmp_path / "cells" / "one"
+    folder.mkdir(parents=True)
+    asset = '<asset><model name="arm" file="../../parts/arm.xml"/></asset>'
+    attached = '<worldbody><attach model="arm" body="base" prefix="p_"/></worldbody>'
+    path = folder / "robot.xml"
+    path.write_text(f"<mujoco>{asset}{attached}</mujoco>")
+    robot = read_mjcf(path, file="robot.xml", root=tmp_path)
+    assert [joint.name for joint in robot.chain.joints] == ["p_joint_a", "p_joint_b"]
+    with pytest.raises(ImportedFileError, match=re.escape("allow others with root='../..'")):
+        read_mjcf(path, file="robot.xml", root=tmp_path / "cells")
+
+
 def test_a_file_that_includes_itself_is_refused(tmp_path: Path) -> None:
     assert refused(tmp_path, '<mujoco><include file="robot.xml"/></mujoco>') == (
         "robot.xml:1:9: include: the file 'robot.xml' is included already; MuJoCo includes a file once"
