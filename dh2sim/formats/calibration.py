@@ -93,15 +93,18 @@ class TableDeltas:
 
 
 _ANGLE = re.compile(rb"(?:^|[{,])[ \t]*(?:roll|yaw)[ \t]*:", re.MULTILINE)
-_OTHER_YAML = re.compile(rb"^(joints|axes)[ \t]*:", re.MULTILINE)
+_OTHER = re.compile(rb"^(?:(?:joints|axes)[ \t]*:|[ \t]*\|)", re.MULTILINE)
+"""Robot files, axes, and texts with a Markdown table in them, which may quote a calibration."""
 _DELTA = re.compile(rb"^[ \t]*delta_(theta|a|d|alpha)[ \t]*=", re.MULTILINE)
 
 
 def is_calibration(data: bytes) -> bool:
     """Whether a file looks like one of a maker's calibration files."""
+    if _OTHER.search(data) is not None:
+        return False
     if len(set(_DELTA.findall(data))) > 1:
         return True
-    return len(_ANGLE.findall(data)) > 1 and _OTHER_YAML.search(data) is None
+    return len(_ANGLE.findall(data)) > 1
 
 
 class _CalibrationReport(Report):

@@ -106,6 +106,7 @@ def test_calibrations_are_recognised_by_their_content(text: str) -> None:
         "kinematics: well known\nroll: your own\n",
         "| theta | d | a | alpha |\n|---|---|---|---|\n| q1 | 0 | 0 | 0 |\n",
         "delta_theta = [1]\n",
+        f"# My arm\n\n    {CONF}\n    {UR}\n| theta | d | a | alpha |\n|---|---|---|---|\n| q1 | 0 | 0 | 0 |\n",
         "name: a\naxes:\n  - {type: revolute, point: [0, 0, 0], direction: [0, 0, 1]}\n",
     ],
 )

@@ -14,10 +14,12 @@ from dh2sim.importing import convert as converted
 from dh2sim.importing.convert import convert_robot
 from dh2sim.kinematics.compaction import compact_rows
 from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.model.build import build_model
 from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
 from dh2sim.robot.write import robot_file_text
+from tests.kinematics.perturbed_arms import KINDS, perturbed, textbook_table
 from tests.kinematics.test_compaction import UR5, calibrated_ur5
 from tests.strategies import robot_specs
 
@@ -129,3 +131,15 @@ def test_the_compact_table_on_the_page_is_that_of_the_one_above_it() -> None:
     assert [row[1] for row in compact[1:]] == [row.convention.value for row in rows]
     shown = [[float(cell or 0) for cell in row[2:]] for row in compact[1:]]
     assert shown == [[row.theta, row.a, row.d, row.alpha, row.beta] for row in rows]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_compact_table_has_the_bodies_and_the_reach_of_the_far_one(kind: str) -> None:
+    far = textbook_table(*perturbed(kind, 1e-3, 0))
+    models = [build_model(spec) for spec in (far, convert_robot(far, "compact").spec)]
+    assert models[1].reach == pytest.approx(models[0].reach, rel=1e-10)
+    assert models[1].mass == pytest.approx(models[0].mass, rel=1e-10)
+    # and is as long and as heavy as the arm with exactly parallel axes
+    exact = build_model(textbook_table(*perturbed(kind, 0.0, 0)))
+    assert models[1].reach == pytest.approx(exact.reach, rel=0.02)
+    assert models[1].mass == pytest.approx(exact.mass, rel=0.2)
