@@ -39,7 +39,8 @@ def import_robot(
         str,
         typer.Argument(
             metavar="FILE",
-            help="A URDF, an MJCF, a table in Markdown, CSV or TSV, or a calibration; - reads from standard input.",
+            help="A URDF, an MJCF, a DH table (Markdown, LaTeX, CSV, a toolbox's script, …), or a calibration; "
+            "- reads from standard input.",
         ),
     ],
     base: Annotated[
@@ -99,6 +100,10 @@ def import_robot(
     configurations, and a residual above the tolerance is an error. Limits, masses, inertias and meshes are kept;
     what cannot be is listed. With --tolerance 1e-4 angles such as 1.5708 become 90 degrees.
 
+    Tables are read from Markdown, LaTeX, HTML, CSV, YAML and JSON, from printouts of the Robotics Toolbox, and from
+    its scripts in MATLAB and Python, which are read as text and never run. What a table does not say, its convention
+    or its units, is asked for.
+
     \b
     Examples:
       dh2sim import panda.urdf --tip panda_link8 -o panda.yaml
@@ -106,6 +111,7 @@ def import_robot(
       dh2sim import urdf/ur.urdf.xacro --root . --arg ur_type:=ur5e --arg name:=ur
       dh2sim import table.md --convention modified --angle deg -o arm.yaml
       dh2sim import README.md --table 2
+      dh2sim import mdl_puma560.m -o puma560.yaml
       dh2sim import my_robot_calibration.yaml --nominal ur5e -o my_ur5e.yaml
       dh2sim import calibration.conf --nominal ur10e
       dh2sim import - --convention standard < table.csv
