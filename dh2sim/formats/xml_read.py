@@ -32,7 +32,12 @@ MAX_PROBLEMS: Final = 100
 
 ENCODINGS: Final = ("utf-8", "us-ascii", "iso-8859-1", "utf-16", "utf-16le", "utf-16be", "windows-1252")
 
+MAX_JOINED: Final = 20
+"""Attributes without a blank before them, which other readers accept."""
+
 _PIECE: Final = 65_536
+_INVALID_TOKEN: Final = expat.errors.codes[expat.errors.XML_ERROR_INVALID_TOKEN]
+_JOINED: Final = re.compile(rb"[\"'][A-Za-z_]")
 _BEFORE_DECLARATION: Final = re.compile(r"((?:[ \t\r\n]|<!--.*?-->)+)(<\?xml[ \t\r\n].*?\?>)", re.DOTALL)
 _LATER_MARK: Final = re.compile("^([ \t\r\n]*)(?:\ufeff|\xef\xbb\xbf)")
 """A second byte order mark, or one behind blanks; that of UTF-8 read as Latin-1."""
@@ -131,16 +136,22 @@ def parse_xml(data: bytes, *, file: str, places: Sequence[Place] = ()) -> Elemen
     if len(data) > MAX_BYTES:
         raise _error(file, 1, 1, f"the file has {len(data)} bytes; at most {MAX_BYTES} are read")
     data = tolerated(data)
-    builder = _Builder(places)
-    try:
-        _feed(builder, data)
-    except _RefusedError as error:
-        raise _error(file, error.line, error.column, error.message) from None
-    except expat.ExpatError as error:
-        message = _not_utf_8(builder, data) or _of_markup(builder, data)
-        message = message or f"not well-formed XML: {expat.ErrorString(error.code)}"
-        raise _error(file, error.lineno, error.offset + 1, message) from None
-    return builder.root()
+    for _ in range(MAX_JOINED + 1):
+        builder = _Builder(places)
+        try:
+            _feed(builder, data)
+        except _RefusedError as error:
+            raise _error(file, error.line, error.column, error.message) from None
+        except expat.ExpatError as error:
+            at = builder.parser.ErrorByteIndex
+            if error.code == _INVALID_TOKEN and _JOINED.match(data, max(at - 1, 0)):
+                data = data[:at] + b" " + data[at:]
+                continue
+            message = _not_utf_8(builder, data) or _of_markup(builder, data)
+            message = message or f"not well-formed XML: {expat.ErrorString(error.code)}"
+            raise _error(file, error.lineno, error.offset + 1, message) from None
+        return builder.root()
+    raise _error(file, 1, 1, f"more than {MAX_JOINED} attributes without a blank before them")
 
 
 def tolerated(data: bytes) -> bytes:

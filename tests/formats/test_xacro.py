@@ -166,14 +166,9 @@ def test_only_files_below_the_root_are_read(package: Path) -> None:
     (package / "folder").symlink_to(secret.parent)
     only = "only files in ROOT and those below it are read"
     for path in ("../../../secret.yaml", str(secret), "../link.yaml", "../folder/secret.yaml", "/etc/passwd"):
-        for text in (
-            f"<link name=\"${{xacro.load_yaml('{path}')}}\"/>",
-            f'<xacro:include filename="{path}"/>',
-            f'<xacro:include filename="{path}" optional="true"/>',
-        ):
-            assert only in _refused(package, text)
-    for pattern in ("../../../*.yaml", "/etc/*", "../folder/*"):
-        assert only in _refused(package, f'<xacro:include filename="{pattern}"/>')
+        assert only in _refused(package, f"<link name=\"${{xacro.load_yaml('{path}')}}\"/>")
+    for include in ('"../link.yaml"', '"../../../secret.yaml" optional="true"', '"/etc/*"', '"../folder/*"'):
+        assert only in _refused(package, f"<xacro:include filename={include}/>")
 
 
 def test_the_root_is_the_files_folder_by_default_and_the_error_says_how_to_widen_it(package: Path) -> None:
@@ -205,13 +200,23 @@ def test_the_root_is_the_files_folder_by_default_and_the_error_says_how_to_widen
         "f'{xacro.load_yaml.__globals__}'",
         "__import__('os').system('touch FILE')",
         "open('FILE', 'w')",
-        "python.vars(xacro)",
-        "python.type('A', (), {})",
         "(a := 1)",
     ],
 )
+def test_no_expression_reaches_python(expression: str, tmp_path: Path) -> None:
+    import xacro
+
+    made = tmp_path / "made"
+    with pytest.raises(Exception, match=r"allowed|not defined|python"):
+        checked_eval(expression.replace("FILE", str(made)), dict(xacro._global_symbols))
+    assert not made.exists()
+
+
+@pytest.mark.parametrize(
+    "expression", ["[f.__globals__ for f in [xacro.load_yaml]]", "python.vars(xacro)", "open('FILE', 'w')"]
+)
 @pytest.mark.parametrize("form", ["${%s}", "$(eval %s)"])
-def test_no_expression_reaches_python(package: Path, tmp_path: Path, expression: str, form: str) -> None:
+def test_no_expression_of_a_file_reaches_python(package: Path, tmp_path: Path, expression: str, form: str) -> None:
     made = tmp_path / "made"
     text = form % expression.replace("FILE", str(made))
     message = _refused(package, f'<link name="{text}"/>'.replace("'", "&apos;"))
@@ -285,6 +290,7 @@ def test_a_file_that_grows_without_bound_is_stopped(package: Path) -> None:
     assert "too much memory" in _refused(package, "<link name=\"${'a' * 10**10}\"/>")
 
 
+@pytest.mark.slow
 def test_a_file_that_never_ends_is_stopped(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xacro_module, "TIME_LIMIT", 2)
     assert _refused(package, '<link name="${[0 for i in python.range(10**12) if i &lt; 0]}"/>') == (

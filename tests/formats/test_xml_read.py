@@ -39,6 +39,17 @@ def test_elements_know_their_attributes_their_children_and_their_place() -> None
     assert [element.tag for element in root.walk()] == ["a", "b", "c", "b", "d"]
 
 
+def test_attributes_without_a_blank_between_them_are_told_apart() -> None:
+    root = parse("<a b=\"1\"c='2'd=\"3\">\n <e f='x'g='y'/></a>")
+    assert (dict(root.attributes), dict(root.children[0].attributes)) == (
+        {"b": "1", "c": "2", "d": "3"},
+        {"f": "x", "g": "y"},
+    )
+    assert (root.children[0].line, root.children[0].column) == (2, 2)
+    many = "".join(f"a{i}='1'" for i in range(30))
+    assert refused(f"<a {many}/>") == "a.xml:1:1: more than 20 attributes without a blank before them"
+
+
 def test_nothing_of_a_tree_can_be_changed() -> None:
     root = parse('<a x="1"/>')
     with pytest.raises(TypeError):
