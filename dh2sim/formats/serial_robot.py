@@ -63,7 +63,7 @@ class SerialLink:
     name: str
     """As in the file."""
     mass: float | None = None
-    """kg, greater than 0."""
+    """kg; 0 for a link that weighs nothing."""
     com: Array | None = None
     """Centre of mass in the link's frame, m, shape (3,)."""
     inertia: Array | None = None

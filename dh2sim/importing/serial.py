@@ -25,7 +25,7 @@ from dh2sim.kinematics.frame_assignment.recover import (
 from dh2sim.kinematics.frame_assignment.result import Step, Tolerances
 from dh2sim.kinematics.frame_assignment.rounding import simple_angles, simple_length, simple_turn, simple_vector
 from dh2sim.kinematics.transforms import invert, pose_from_rpy, rotate_tensor, rpy_from_rotation
-from dh2sim.messages import shown
+from dh2sim.messages import listed, shown
 from dh2sim.model.mass import is_possible, made_possible
 from dh2sim.robot.fields import LONGEST_NAME, is_reserved, name_problem
 from dh2sim.robot.read import parse_robot
@@ -166,6 +166,25 @@ def _links(robot: SerialRobot, recovery: Recovery) -> list[LinkSpec]:
     ]
 
 
+def _without_invented_masses(robot: SerialRobot) -> tuple[SerialRobot, list[str]]:
+    """Let links weigh nothing of which the file gives no mass, and return a sentence on them.
+
+    So simulators read the file: several joints on one body, or a link to hang two joints on. Where nothing behind a
+    joint has mass its motion would be undetermined; links at the end are estimated, as all are in a file without
+    masses.
+    """
+    given = [i for i, link in enumerate(robot.links) if link.mass is not None]
+    last = given[-1] if given else -1
+    massless = any(link.mass is None for link in robot.links[: max(last, 0)])
+    links = [
+        replace(link, mass=0.0) if i < last and link.mass is None else link for i, link in enumerate(robot.links)
+    ]
+    notes = ["Links without a mass weigh nothing, where something behind them has mass."] if massless else []
+    if given and (end := [shown(link.name) for link in links[last + 1 :]]):
+        notes.append(f"The masses of the last links are estimated, as nothing behind them has any: {listed(end)}.")
+    return replace(robot, links=tuple(links)), notes
+
+
 def _limits(limits: Limits, row: Row, tolerances: Tolerances) -> Limits:
     """Return limits that are as simple as the table: a file's 2.9670597 rad may mean 170 degrees."""
     simple = simple_turn if row.type.turns else simple_length
@@ -245,11 +264,11 @@ def import_serial(
     names, renamed = joint_names([joint.name for joint in robot.chain.joints])
     own_name = robot_name(robot.name if name is None else name)
     joints = tuple(replace(joint, name=own) for joint, own in zip(robot.chain.joints, names, strict=True))
-    robot = replace(robot, chain=replace(robot.chain, joints=joints))
+    robot, weighed = _without_invented_masses(replace(robot, chain=replace(robot.chain, joints=joints)))
     recovery = recover_table(robot.chain, convention=convention, tolerance=tolerance, name=own_name)
     spec = assemble(robot, recovery, name=own_name, joint_names=names)
     hint = None if calibrated else simpler_with(spec, tolerance)
-    notes = (*robot.notes, *_base_mass(robot), *renamed, *_tilted(recovery), *([hint] if hint else []))
+    notes = (*robot.notes, *weighed, *_base_mass(robot), *renamed, *_tilted(recovery), *([hint] if hint else []))
     comments = [*header, *(f"Note: {note}" for note in notes)]
     origin = source or robot.description
     spec = replace(spec, description=description, source=origin)
