@@ -86,12 +86,17 @@ comes behind them must have mass. Exports give them 2e-14 kg and kg·m², about 
 |---|---|
 | position limits | ±π for a revolute joint; for a prismatic one ± what the rest of the robot reaches |
 | velocity limits | π rad/s, 1 m/s |
-| effort limits | what lifts twice the arm's weight, stretched out, at 10 rad/s² or m/s² |
+| payload | a fifth of the moving mass, before tool0 |
+| effort limits | what lifts twice the arm with tool and payload, stretched out, at 10 rad/s² or m/s² |
 | shapes | cylinders and capsules along d and a, as thick as suits the robot's own size, or `radius` |
 | mass, com, inertia | those of the shapes, solid, of 1000 kg/m³ or `density`; what is given wins |
-| actuator gains | those that make each joint critically damped at 100 rad/s in the configuration `home` |
+| actuator gains | critical damping at 100 rad/s, with the payload, at `home`; and a sag of 0.01 rad at most |
 
-Assumed velocity and effort limits are written to the URDF, which must have some, and not to the MJCF.
+A joint that turns is given at least a fifth of the effort and of the gains of the one before it: a last joint would
+get next to nothing, since it turns a round link about its own axis.
+
+Assumed velocity and effort limits are written to the URDF, which must have some, and not to the MJCF; but they are the
+control ranges of its velocity actuators and motors.
 
 ## Errors
 

@@ -67,6 +67,10 @@ def as_dict(model: RobotModel) -> dict[str, Any]:
         "configurations": {name: q.tolist() for name, q in spec.configurations.items()},
         "reach": model.reach,
         "mass": model.mass,
+        "payload": {
+            "mass": 0.0 if model.payload is None else model.payload.mass,
+            "assumed": spec.payload.mass is None,
+        },
         "links": [
             {
                 "name": link.name,
@@ -125,7 +129,9 @@ def _print(model: RobotModel, *, srdf: bool) -> None:
     unit, reach = spec.units.length, f"{model.reach:.4g} m"
     if unit != "m":
         reach = f"{model.reach / spec.units.metres(1.0):.4g} {unit} ({reach})"
-    for line in (f"reach at most {reach}, moving mass {model.mass:.4g} kg", *_remarks(model)):
+    payload = 0.0 if model.payload is None else model.payload.mass
+    carries = f"{'assumed' if spec.payload.mass is None else 'nominal'} payload {payload:.3g} kg"
+    for line in (f"reach at most {reach}, moving mass {model.mass:.4g} kg, {carries}", *_remarks(model)):
         _print_wrapped(line)
     if srdf:
         print("Pairs of links that do not collide, as in an SRDF:")

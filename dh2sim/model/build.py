@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Protocol, TypeAlias
@@ -11,14 +12,14 @@ import numpy as np
 from dh2sim.errors import ModelError
 from dh2sim.kinematics.chain import HasChain, Joint, KinematicChain, SpecLike, build_chain, spec_of
 from dh2sim.kinematics.skeleton import build_skeleton
-from dh2sim.kinematics.transforms import identity, pose_from_rpy
-from dh2sim.model.actuators import actuator_model, seen_inertias
+from dh2sim.kinematics.transforms import identity, move_point, pose_from_rpy
+from dh2sim.model.actuators import actuator_model, duties, seen_inertias
 from dh2sim.model.collision_exclusions import excluded_pairs
-from dh2sim.model.limits import filled_limits, frame_extent, load_bound, position_ranges, reach_bound, travels_of
+from dh2sim.model.limits import duty_bounds, filled_limits, frame_extent, position_ranges, reach_bound, travels_of
 from dh2sim.model.link_shapes import arm_length, lay_out, link_radii
-from dh2sim.model.mass import MassProperties, ball_radius, link_inertial
+from dh2sim.model.mass import MassProperties, ball, ball_radius, link_inertial
 from dh2sim.model.meshes import load_mesh
-from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel, with_tool
+from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel, carrying
 from dh2sim.model.shapes import Shape, given_shape, placed
 from dh2sim.robot.spec import LinkSpec, RobotSpec, Row
 from dh2sim.typing import Array, read_only
@@ -33,6 +34,8 @@ PALETTE: tuple[Color, ...] = (
 BASE_COLOR: Color = (0.25, 0.28, 0.33, 1.0)
 JOINT_COLOR: Color = (0.20, 0.22, 0.26, 1.0)
 TOOL_COLOR: Color = (0.45, 0.48, 0.53, 1.0)
+PAYLOAD_SHARE = 0.2
+"""Of the moving mass, that a robot is to carry whose file does not say. Published arms: 0.06 to 0.5."""
 
 
 class HasModel(HasChain, Protocol):
@@ -97,25 +100,40 @@ def build_model(spec: SpecLike) -> RobotModel:
         estimated=(),
     )
     tool = _tool(spec, chain)
-    bodies = with_tool([link.inertial for link in links], tool, chain.joints[-1])
+    last = chain.joints[-1]
+    bodies = carrying([link.inertial for link in links], None if tool is None else tool.inertial, last)
     home = spec.named_configurations["home"]
     zero = np.zeros_like(home)
     _check_carried(spec, bodies)
     names = [base.name, *(link.name for link in links), *([] if tool is None else [tool.name])]
-    seen = iter(seen_inertias(chain, bodies, home))
+    payload = _payload(spec, chain, math.fsum(body.mass for body in bodies if body is not None))
+    loaded = carrying(bodies, payload, last)
+    seen = iter(seen_inertias(chain, loaded, home))
+    own = duties(
+        [row.type for row in spec.rows],
+        [duty_bounds(i, skeleton, loaded, spec.gravity) for i in range(len(spec.rows))],
+        [next(seen) if row.type.moves else 0.0 for row in spec.rows],
+    )
     joints = []
-    for i, (row, joint, position) in enumerate(zip(spec.rows, chain.joints, ranges, strict=True)):
-        inertia = next(seen) if row.type.moves else 0.0
-        limits, assumed = filled_limits(row, position, load_bound(i, skeleton, bodies, spec.gravity), inertia)
-        actuator = actuator_model(row.actuator, inertia + row.dynamics.armature)
-        placed = {field.name: getattr(joint, field.name) for field in fields(Joint)}
-        joints.append(JointModel(**placed, limits=limits, assumed=assumed, dynamics=row.dynamics, actuator=actuator))
+    for row, joint, position, duty in zip(spec.rows, chain.joints, ranges, own, strict=True):
+        limits, assumed = filled_limits(row, position, duty)
+        joints.append(
+            JointModel(
+                **{field.name: getattr(joint, field.name) for field in fields(Joint)},
+                limits=limits,
+                assumed=assumed,
+                dynamics=row.dynamics,
+                duty=duty,
+                actuator=actuator_model(row.actuator, duty.inertia + row.dynamics.armature),
+            )
+        )
     return RobotModel(
         spec=spec,
         chain=chain,
         base=base,
         links=links,
         tool=tool,
+        payload=payload,
         joints=tuple(joints),
         excluded=excluded_pairs(chain, names, (*shapes, *_tool_shapes(tool, chain)), (zero, home)),
         reach=reach_bound(skeleton),
@@ -163,6 +181,17 @@ def _numbers(path: str, value: object) -> Iterator[tuple[str, float]]:
         case _ if is_dataclass(value):
             for field in fields(value):
                 yield from _numbers(f"{path}.{field.name}", getattr(value, field.name))
+
+
+def _payload(spec: RobotSpec, chain: KinematicChain, moving_mass: float) -> MassProperties | None:
+    """Return the nominal payload in DH frame n: a ball that touches tool0, or has its centre where the file says."""
+    given = spec.payload.mass
+    mass = PAYLOAD_SHARE * moving_mass if given is None else given
+    if mass == 0.0:
+        return None
+    radius = ball_radius(mass)
+    before_tool0 = move_point(chain.T_dhn_tool0, read_only([0, 0, radius]))
+    return replace(ball(mass, radius), com=read_only(before_tool0 if spec.payload.com is None else spec.payload.com))
 
 
 def _tool_start(spec: RobotSpec, chain: KinematicChain) -> Array:

@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 from dh2sim.kinematics.chain import Joint, KinematicChain
 from dh2sim.kinematics.skeleton import Skeleton, build_skeleton
+from dh2sim.model.actuators import Duty
 from dh2sim.model.mass import MassProperties
 from dh2sim.model.shapes import neat
 from dh2sim.robot.spec import JointType, Limits, Row
@@ -22,7 +23,7 @@ ASSUMED_TURN_RATE = math.pi
 ASSUMED_SLIDE_RATE = 1.0
 """m/s, where it gives none of a joint that slides."""
 ASSUMED_ACCELERATION = 10.0
-"""rad/s² or m/s²: an assumed effort limit lifts twice the arm's weight, stretched, at this acceleration."""
+"""rad/s² or m/s²: an assumed effort limit lifts twice the arm and its payload, stretched, at this acceleration."""
 NO_LENGTH = 1e-9
 """m: what is shorter is rounding, as 0.3 * cos(pi / 2) is, and no measure of a robot's size."""
 
@@ -89,14 +90,13 @@ def position_ranges(rows: Sequence[Row], travels: Sequence[Range]) -> list[Range
     ]
 
 
-def filled_limits(row: Row, position: Range | None, load: float, inertia: float) -> tuple[Limits, tuple[str, ...]]:
+def filled_limits(row: Row, position: Range | None, duty: Duty) -> tuple[Limits, tuple[str, ...]]:
     """Fill in the limits that a row leaves open.
 
     Args:
         row: The row.
         position: Its range, from ``position_ranges``.
-        load: What gravity asks of the joint at most, N·m or N.
-        inertia: What the joint moves at home, kg·m² or kg.
+        duty: What the joint is to hold and to move.
 
     Returns:
         The limits, and which of 'position', 'velocity' and 'effort' were assumed.
@@ -106,7 +106,7 @@ def filled_limits(row: Row, position: Range | None, load: float, inertia: float)
     if velocity is None:
         velocity = ASSUMED_TURN_RATE if row.type.turns else ASSUMED_SLIDE_RATE
     if effort is None:
-        effort = _round_up(2 * (load + inertia * ASSUMED_ACCELERATION)) or 1.0
+        effort = _round_up(2 * (duty.load + duty.most_inertia * ASSUMED_ACCELERATION)) or 1.0
     filled = replace(given, position=position, velocity=velocity, effort=effort)
     assumed = [
         name
@@ -116,25 +116,33 @@ def filled_limits(row: Row, position: Range | None, load: float, inertia: float)
     return filled, tuple(assumed) if row.type.moves else ()
 
 
-def load_bound(i: int, skeleton: Skeleton, bodies: Sequence[MassProperties | None], gravity: Array) -> float:
-    """Return an upper bound of what gravity asks of joint ``i``, counted from 0, in any pose, N·m or N.
+def duty_bounds(
+    i: int, skeleton: Skeleton, bodies: Sequence[MassProperties | None], gravity: Array
+) -> tuple[float, float]:
+    """Return upper bounds, in any pose, of what gravity asks of joint ``i`` and of the inertia that it moves.
 
     Args:
-        i: The joint.
+        i: The joint, counted from 0.
         skeleton: Of the arm, n rows.
         bodies: Mass properties of the n links in their joint frames; None for a massless one.
         gravity: m/s² in base_link, shape (3,); where it is zero, the earth's counts.
+
+    Returns:
+        N·m and kg·m², or N and kg.
     """
     g = _length(gravity) or 9.81
     turns = skeleton.slides[i] is None
-    terms, distance = [], 0.0
+    loads, inertias, distance = [], [], 0.0
     for k, body in enumerate(bodies[i:], start=i):
         if k > i:
             distance += skeleton.steps[k]
         if body is not None:
             arm = distance + math.dist(body.com, skeleton.leaving(k + 1)) if turns else 1.0
-            terms.append(body.mass * g * arm)
-    return math.fsum(terms)
+            # no principal moment is more than half of their sum
+            own = 0.5 * math.fsum(float(body.inertia[j, j]) for j in range(3)) if turns else 0.0
+            loads.append(body.mass * g * arm)
+            inertias.append(body.mass * arm * arm + own)
+    return math.fsum(loads), math.fsum(inertias)
 
 
 def _length(vector: Iterable[float]) -> float:

@@ -9,7 +9,7 @@ from enum import StrEnum
 
 from dh2sim.kinematics.chain import Joint, KinematicChain
 from dh2sim.kinematics.transforms import identity
-from dh2sim.model.actuators import ActuatorModel, gravity_loads
+from dh2sim.model.actuators import ActuatorModel, Duty, gravity_loads
 from dh2sim.model.collision_exclusions import ExcludedPair
 from dh2sim.model.limits import Range, clamped
 from dh2sim.model.mass import MassProperties, combine, in_frame
@@ -81,6 +81,8 @@ class JointModel(Joint):
     assumed: tuple[str, ...]
     """Which of the limits 'position', 'velocity' and 'effort' were assumed."""
     dynamics: Dynamics
+    duty: Duty
+    """What the joint is to hold and to move, with the nominal payload."""
     actuator: ActuatorModel
 
     @property
@@ -131,6 +133,8 @@ class RobotModel:
     """base_link."""
     links: tuple[LinkModel, ...]
     """link_1 … link_n, one for every row."""
+    payload: MassProperties | None
+    """The nominal payload, in DH frame n; it is in no export. None where it is 0 kg."""
     tool: LinkModel | None
     """What the last link carries, in DH frame n; None without a tool besides the frame tool0."""
     joints: tuple[JointModel, ...]
@@ -173,7 +177,8 @@ class RobotModel:
     @property
     def bodies(self) -> tuple[MassProperties | None, ...]:
         """Mass properties of link_1 … link_n, each in its joint frame, the last with the tool."""
-        return with_tool([link.inertial for link in self.links], self.tool, self.joints[-1])
+        tool = None if self.tool is None else self.tool.inertial
+        return carrying([link.inertial for link in self.links], tool, self.joints[-1])
 
     @property
     def mass(self) -> float:
@@ -227,14 +232,14 @@ class RobotModel:
         )
 
 
-def with_tool(
-    bodies: Sequence[MassProperties | None], tool: LinkModel | None, last: Joint
+def carrying(
+    bodies: Sequence[MassProperties | None], load: MassProperties | None, last: Joint
 ) -> tuple[MassProperties | None, ...]:
-    """Return the mass properties of the links, of which the last carries the tool; each in its joint frame."""
-    if tool is None or tool.inertial is None:
+    """Return the mass properties of the links, each in its joint frame, the last with a load given in DH frame n."""
+    if load is None:
         return tuple(bodies)
     *others, link = bodies
-    carried = in_frame(last.T_joint_dh, tool.inertial)
+    carried = in_frame(last.T_joint_dh, load)
     return (*others, carried if link is None else combine([link, carried]))
 
 

@@ -20,16 +20,29 @@ def with_actuators(model: RobotModel, kind: ActuatorType) -> RobotModel:
     Returns:
         The robot, with gains chosen like those that a robot file leaves open.
     """
-    seen = iter(seen_inertias(model.chain, model.bodies, model.home))
     joints = []
     for joint in model.joints:
-        inertia = next(seen) if joint.type.moves else 0.0
         if joint.actuator.type is kind:
             joints.append(joint)
         else:
-            actuator = actuator_model(ActuatorSpec(type=kind), inertia + joint.dynamics.armature)
+            actuator = actuator_model(ActuatorSpec(type=kind), joint.duty.inertia + joint.dynamics.armature)
             joints.append(replace(joint, actuator=actuator))
     return replace(model, joints=tuple(joints))
+
+
+def unloaded_gains(model: RobotModel) -> list[tuple[float, float]]:
+    """Return kp and kv of the moving joints for controllers with motors: N·m/rad, N·m·s/rad, or N/m and N·s/m.
+
+    Those of the position actuators that the robot file describes; what it leaves open is chosen for the arm without a
+    payload, as damping that is held for a time step makes a light arm oscillate.
+    """
+    seen = seen_inertias(model.chain, model.bodies, model.home)
+    gains = []
+    for joint, row, inertia in zip(model.moving_joints, model.spec.moving_rows, seen, strict=True):
+        given = row.actuator if row.actuator.type is ActuatorType.POSITION else ActuatorSpec()
+        actuator = actuator_model(given, inertia + joint.dynamics.armature)
+        gains.append((actuator.kp, actuator.kv))
+    return gains
 
 
 def without_meshes(model: RobotModel) -> RobotModel:

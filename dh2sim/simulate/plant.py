@@ -11,8 +11,7 @@ import numpy as np
 
 from dh2sim.errors import EngineError
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.model.variants import with_actuators
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.model.variants import unloaded_gains
 from dh2sim.typing import Array, read_only
 
 FREE_TURN: Final = math.pi
@@ -94,7 +93,7 @@ def make_plant(compiled: mujoco.MjModel, robot: RobotModel) -> Plant:
     ranges = compiled.jnt_range[first:].reshape(-1, 2)
     controlled = compiled.actuator_ctrllimited.astype(bool)
     controls = compiled.actuator_ctrlrange.reshape(-1, 2)
-    stiff = with_actuators(robot, ActuatorType.POSITION).moving_joints
+    gains = unloaded_gains(robot)
     return Plant(
         model=compiled,
         timestep=float(compiled.opt.timestep),
@@ -106,8 +105,8 @@ def make_plant(compiled: mujoco.MjModel, robot: RobotModel) -> Plant:
         lower=read_only(np.where(limited, ranges[:, 0], -np.inf)),
         upper=read_only(np.where(limited, ranges[:, 1], np.inf)),
         velocity=read_only([joint.velocity for joint in robot.moving_joints]),
-        kp=read_only([joint.actuator.kp for joint in stiff]),
-        kv=read_only([joint.actuator.kv for joint in stiff]),
+        kp=read_only([kp for kp, _ in gains]),
+        kv=read_only([kv for _, kv in gains]),
         home=robot.home,
         control_lower=read_only(np.where(controlled, controls[:, 0], -np.inf)),
         control_upper=read_only(np.where(controlled, controls[:, 1], np.inf)),

@@ -100,7 +100,9 @@ def test_several_joints_on_a_body_get_no_mass_between_them() -> None:
     assert built.mass == 20.0
     assert [link.inertial is None for link in built.links] == [True, True, False]
     assert built.estimates == ()
-    np.testing.assert_allclose(_mass_matrix(to_mjcf(built), np.zeros(3)), np.diag([20, 20, 0.8]), rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(
+        _mass_matrix(to_mjcf(built), np.zeros(3)), np.diag([20, 20, 0.8]), rtol=1e-12, atol=1e-14
+    )
     q = np.array([0.3, -0.5, 0.2])
     source = (FOLDER / "three_joints_on_a_body.xml").read_text(encoding="utf-8")
     np.testing.assert_allclose(_mass_matrix(to_mjcf(built), q), _mass_matrix(source, q), rtol=1e-9, atol=1e-12)

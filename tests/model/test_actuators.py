@@ -1,19 +1,22 @@
 from __future__ import annotations
 
 import dataclasses
+import xml.etree.ElementTree as ET
+from itertools import pairwise
 
 import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.model.actuators import gravity_loads, seen_inertias
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import RobotSpec, Row
+from dh2sim.robot.spec import LinkSpec, PayloadSpec, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 from tests.model.samples import compiled
-from tests.sample_robots import NAMES, ODD_ROBOT, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
+from tests.sample_robots import NAMES, ODD, ODD_ROBOT, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
 from tests.strategies import robot_specs
 
 SIDEWAYS = read_only([3.0, -4.0, -7.5])
@@ -24,7 +27,7 @@ def errors(built: RobotModel, count: int) -> tuple[float, float]:
     mj = compiled(built)
     mj.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     data, full = mujoco.MjData(mj), np.zeros((mj.nv, mj.nv))
-    bodies = [link.inertial for link in built.links]
+    bodies = built.bodies
     loads: list[Array] = []
     inertias: list[Array] = []
     for q in in_limits(built, count, seed=7):
@@ -114,3 +117,82 @@ def test_assumed_effort_counts_the_assumed_travel_of_slides() -> None:
         Row(name="tip", type=REVOLUTE, convention=STANDARD, a=0.8),
     )
     assert_strong_enough(build_model(RobotSpec(name="boom", rows=rows)), 500)
+
+
+def loaded(payload: PayloadSpec, tool: ToolSpec | None = None) -> RobotModel:
+    """An odd arm, empty-handed or with a tool, that is to carry something."""
+    links = [LinkSpec(mass=mass, com=read_only([0.05, 0.02, -0.03])) for mass in (4.0, 2.0, 0.3)]
+    rows = (
+        Row(type=REVOLUTE, convention=STANDARD, d=0.3, alpha=ODD, link=links[0]),
+        Row(type=REVOLUTE, convention=STANDARD, a=0.4, alpha=-0.9, d=0.1, link=links[1]),
+        Row(type=REVOLUTE, convention=STANDARD, a=0.2, alpha=0.3, d=0.05, link=links[2]),
+    )
+    frame = ToolSpec(xyz=read_only([0.03, 0.0, 0.1]), rpy=read_only([0.4, 0.0, -0.2]))
+    return build_model(RobotSpec(name="loaded", rows=rows, tool=tool or frame, payload=payload))
+
+
+def test_a_payload_counts_like_a_tool_of_the_same_mass_and_place() -> None:
+    carries = loaded(PayloadSpec(mass=1.5))
+    assert carries.payload is not None
+    body = carries.payload
+    T = carries.chain.T_dhn_tool0
+    radius = (3 * 1.5 / (4 * np.pi * 1000)) ** (1 / 3)
+    np.testing.assert_allclose(body.com, T[:3, 3] + radius * T[:3, 2], rtol=0, atol=1e-3 * radius)
+    np.testing.assert_allclose(body.inertia, 0.4 * 1.5 * radius**2 * np.eye(3), rtol=1e-2, atol=1e-12)
+    tool = ToolSpec(
+        xyz=carries.spec.tool.xyz, rpy=carries.spec.tool.rpy, mass=body.mass, com=body.com, inertia=body.inertia
+    )
+    holds = loaded(PayloadSpec(mass=0.0), tool)
+    assert holds.payload is None
+    assert holds.mass == pytest.approx(carries.mass + 1.5, rel=1e-15)
+    for one, other in zip(carries.joints, holds.joints, strict=True):
+        assert one.limits.effort == other.limits.effort
+        assert (one.actuator.kp, one.actuator.kv) == (other.actuator.kp, other.actuator.kv)
+        assert one.duty.load == pytest.approx(other.duty.load, rel=1e-12)
+    empty = loaded(PayloadSpec(mass=0.0))
+    assert all(
+        light.effort < heavy.effort for light, heavy in zip(empty.moving_joints, carries.moving_joints, strict=True)
+    )
+
+
+def test_a_payload_that_is_not_given_is_a_fifth_of_the_moving_mass() -> None:
+    built = loaded(PayloadSpec())
+    assert built.payload is not None
+    assert built.payload.mass == pytest.approx(0.2 * 6.3, rel=1e-15)
+    beside = loaded(PayloadSpec(mass=1.0, com=read_only([0.1, -0.2, 0.3]))).payload
+    assert beside is not None
+    assert beside.com.tolist() == [0.1, -0.2, 0.3]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_joint_is_given_next_to_nothing(name: str) -> None:
+    turning = [joint for joint in model(name).moving_joints if joint.type.turns]
+    for before, joint in pairwise(turning):
+        if "effort" in before.assumed and "effort" in joint.assumed:
+            assert joint.effort >= 0.18 * before.effort  # rounded up to two digits, both
+        if before.actuator.assumed and joint.actuator.assumed:
+            assert joint.actuator.kp >= 0.198 * before.actuator.kp
+            assert joint.actuator.kv >= 0.198 * before.actuator.kv
+
+
+@pytest.mark.parametrize("name", ["puma560", "staubli_tx2_60", "arm_5r"])
+def test_an_arm_with_its_payload_does_not_sag_visibly(name: str) -> None:
+    built = model(name)
+    assert built.payload is not None
+    root = ET.fromstring(to_mjcf(built))
+    last = next(body for body in root.iter("body") if body.get("name") == built.links[-1].name)
+    T = built.joints[-1].T_joint_dh
+    com, turned = T[:3, :3] @ built.payload.com + T[:3, 3], built.payload.inertia[0, 0]
+    load = ET.SubElement(last, "body", pos=" ".join(map(repr, com.tolist())))
+    ET.SubElement(
+        load, "inertial", pos="0 0 0", mass=repr(built.payload.mass), diaginertia=" ".join([repr(float(turned))] * 3)
+    )
+    mj = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+    mj.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    data = mujoco.MjData(mj)
+    for q in in_limits(built, 3, seed=2):
+        mujoco.mj_resetData(mj, data)
+        data.qpos[:] = data.ctrl[:] = q
+        mujoco.mj_step(mj, data, 1500)
+        assert np.abs(data.qpos - q).max() < 0.011
+        assert np.abs(data.qvel).max() < 1e-3

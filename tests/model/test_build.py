@@ -14,7 +14,7 @@ from dh2sim.errors import ModelError
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import to_urdf
-from dh2sim.model.actuators import ASSUMED_BANDWIDTH, ActuatorModel, seen_inertias
+from dh2sim.model.actuators import ASSUMED_BANDWIDTH, ActuatorModel
 from dh2sim.model.build import BASE_COLOR, JOINT_COLOR, PALETTE, build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, BaseSpec, Dynamics, JointType, LinkSpec, RobotSpec, Row
@@ -77,7 +77,7 @@ def test_colours_are_those_of_the_file_or_of_the_palette() -> None:
 
 
 def actuated(actuator: ActuatorSpec, armature: float = 0.0) -> tuple[ActuatorModel, float]:
-    """The actuator of the first joint of two, and the inertia that it sees at home, rotor included."""
+    """The actuator of the first joint of two, and the inertia that it is chosen for, rotor included."""
     rows = (
         Row(
             name="a",
@@ -91,8 +91,7 @@ def actuated(actuator: ActuatorSpec, armature: float = 0.0) -> tuple[ActuatorMod
         Row(name="b", type=REVOLUTE, convention=STANDARD, a=0.5, d=0.2),
     )
     built = build_model(RobotSpec(name="driven", rows=rows))
-    seen = seen_inertias(built.chain, built.bodies, built.home)
-    return built.joints[0].actuator, seen[0] + armature
+    return built.joints[0].actuator, built.joints[0].duty.inertia + armature
 
 
 @pytest.mark.parametrize("armature", [0.0, 3.0])

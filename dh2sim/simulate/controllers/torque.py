@@ -15,7 +15,13 @@ from dh2sim.simulate.plant import Plant
 from dh2sim.typing import Array
 
 MOST_DAMPED: Final = 0.4
-"""Largest share of its velocity that damping takes from a joint in a time step; from 2 on the arm would oscillate."""
+"""Largest share of its velocity that damping takes from a joint in a time step at home."""
+MOST_DAMPED_ELSEWHERE: Final = 0.8
+"""The same in other configurations; from 2 on the arm would oscillate."""
+POSES: Final = 64
+"""Configurations, besides home, in which that is looked at."""
+ROUNDS: Final = 300
+"""Of reducing the damping in the configuration that is worst."""
 
 
 def steady_gains(plant: Plant) -> tuple[Array, Array]:
@@ -23,27 +29,45 @@ def steady_gains(plant: Plant) -> tuple[Array, Array]:
 
     A position actuator's own damping is integrated implicitly, and may be arbitrarily strong; that of a controller is
     not. With inertia M, damping D and time step h the velocities of the next step are (1 - h M⁻¹ D) times the current
-    ones, so h times the largest eigenvalue of M⁻¹ D is kept below ``MOST_DAMPED``, at home. Stiffness is reduced
-    by the square, which keeps the damping ratio.
+    ones, so h times the largest eigenvalue of M⁻¹ D is kept below ``MOST_DAMPED`` at home. Elsewhere an arm may be
+    much lighter for some joints: there it is kept below ``MOST_DAMPED_ELSEWHERE``. Each joint's damping is reduced by
+    its part in the fastest motion, and its stiffness by the square of that, which keeps the damping ratio.
 
     Returns:
         Stiffness, N·m/rad or N/m, and damping, N·m·s/rad or N·s/m, each of shape (n,).
     """
     if plant.n == 0:
         return plant.kp, plant.kv
-    model = plant.model
-    data = mujoco.MjData(model)
-    data.qpos[model.nq - plant.n :] = plant.home
-    mujoco.mj_forward(model, data)
-    inertia = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, inertia)
-    joints = slice(model.nv - plant.n, None)
-    root = np.sqrt(plant.kv)
-    quickness = root[:, None] * np.linalg.inv(inertia)[joints, joints] * root
-    taken = plant.timestep * float(np.linalg.eigvalsh(quickness)[-1])
-    share = min(1.0, MOST_DAMPED / taken) if taken > 0.0 else 1.0
-    share = float(f"{share:.3g}")  # the last bits of an eigenvalue are not the same on every machine
-    return plant.kp * share * share, plant.kv * share
+    mobilities = _mobilities(plant) * plant.timestep
+    mobilities[0] /= MOST_DAMPED
+    mobilities[1:] /= MOST_DAMPED_ELSEWHERE
+    shares = np.ones(plant.n)
+    for _ in range(ROUNDS):
+        root = np.sqrt(plant.kv * shares)
+        sizes, motions = np.linalg.eigh(root[:, None] * mobilities * root)  # the eigenvalues of M⁻¹ D, but symmetric
+        worst = int(np.argmax(sizes[:, -1]))
+        size, part = sizes[worst, -1], motions[worst, :, -1]
+        if size <= 1.0:
+            break
+        shares = shares * (1.0 - part * part * (1.0 - 1.0 / size))
+    # the last bits of an eigenvalue are not the same on every machine
+    shares = np.array([float(f"{share:.3g}") for share in shares.tolist()])
+    return plant.kp * shares * shares, plant.kv * shares
+
+
+def _mobilities(plant: Plant) -> Array:
+    """Return the inverse of the mass matrix at home and in random configurations, shape (count, n, n)."""
+    model, n = plant.model, plant.n
+    data, inertia = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    lower = np.where(np.isfinite(plant.lower), plant.lower, -plant.free_half_ranges)
+    upper = np.where(np.isfinite(plant.upper), plant.upper, plant.free_half_ranges)
+    found = np.empty((1 + POSES, n, n))
+    for k, q in enumerate([plant.home, *np.random.default_rng(0).uniform(lower, upper, (POSES, n))]):
+        data.qpos[model.nq - n :] = q
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, inertia)
+        found[k] = np.linalg.inv(inertia)[model.nv - n :, model.nv - n :]
+    return found
 
 
 class Passive:
