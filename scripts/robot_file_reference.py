@@ -95,8 +95,8 @@ comes behind them must have mass. Exports give them 2e-14 kg and kg·m², about 
 A joint that turns is given at least a fifth of the effort and of the gains of the one before it: a last joint would
 get next to nothing, since it turns a round link about its own axis.
 
-Assumed velocity and effort limits are written to the URDF, which must have some, and not to the MJCF; but they are the
-control ranges of its velocity actuators and motors.
+Assumed velocity and effort limits are written to the URDF, which must have some, and not to the MJCF; but they are
+the control ranges of its velocity actuators and motors.
 
 ## Errors
 
