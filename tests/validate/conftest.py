@@ -11,8 +11,11 @@ from tests.robot_files import ODD, write
 
 @pytest.fixture(scope="session")
 def exported_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Export a robot whose fixed link has mass, so that engines read it even if its joint is made to move."""
     folder = tmp_path_factory.mktemp("exported")
-    assert dh2sim("export", write(folder, ODD), "--out", folder / "made").status == 0
+    inertia = "{ixx: 0.01, iyy: 0.01, izz: 0.01, ixy: 0, ixz: 0, iyz: 0}"
+    text = ODD.replace("theta: 1.9}", f"theta: 1.9, link: {{mass: 1, com: [0, 0, 0], inertia: {inertia}}}}}")
+    assert dh2sim("export", write(folder, text), "--out", folder / "made").status == 0
     return folder
 
 
