@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Render the README's picture from the exported files: the Stanford arm, SCARA and the Space Station arm at home.
+"""Render exported robots at home: the README's picture, or a contact sheet of all robots.
 
-    python scripts/render_robots.py [ROBOT...] [--out docs/images/robots.png] [--size 640x560]
+    python scripts/render_robots.py [ROBOT...] [--out docs/images/robots.png] [--size 560x520]
+    python scripts/render_robots.py --sheet sheet.png
 
 Needs the extra `video`, and EGL or OSMesa to render without a screen.
 """
@@ -13,11 +14,14 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from dh2sim.draw.offscreen import open_renderer
+from dh2sim.robot.catalog import builtin_robots
 
 ROOT = Path(__file__).resolve().parent.parent
+COLUMNS = 5
+"""Of a contact sheet."""
 
 
 def render(robot: str, width: int, height: int) -> np.ndarray:
@@ -31,18 +35,37 @@ def render(robot: str, width: int, height: int) -> np.ndarray:
         return np.array(renderer.render())
 
 
+def sheet(robots: list[str], width: int, height: int) -> np.ndarray:
+    """Return the pictures of robots in rows, each with its name."""
+    rows = []
+    for start in range(0, len(robots), COLUMNS):
+        parts = []
+        for name in robots[start : start + COLUMNS]:
+            picture = Image.fromarray(render(name, width, height))
+            ImageDraw.Draw(picture).text((10, 8), name, fill=(30, 30, 30), font=ImageFont.load_default(16))
+            parts.append(np.array(picture))
+        blank = np.full((height, width * (COLUMNS - len(parts)), 3), 255, dtype=np.uint8)
+        rows.append(np.concatenate([*parts, blank], axis=1))
+    return np.concatenate(rows)
+
+
 def main() -> None:
     """Parse the command line and write the picture."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("robots", nargs="*", default=["stanford", "scara", "ssrms"], metavar="ROBOT")
+    parser.add_argument("robots", nargs="*", metavar="ROBOT")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images" / "robots.png")
+    parser.add_argument("--sheet", type=Path, metavar="FILE", help="write a contact sheet, of all robots by default")
     parser.add_argument("--size", default="560x520", help="of each robot's part, in pixels")
     arguments = parser.parse_args()
     width, height = (int(text) for text in arguments.size.split("x"))
-    parts = [render(robot, width, height) for robot in arguments.robots]
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(np.concatenate(parts, axis=1)).save(arguments.out, optimize=True)
-    print(arguments.out)
+    if arguments.sheet:
+        out, picture = arguments.sheet, sheet(arguments.robots or list(builtin_robots()), width, height)
+    else:
+        robots = arguments.robots or ["stanford", "scara", "ssrms"]
+        out, picture = arguments.out, np.concatenate([render(name, width, height) for name in robots], axis=1)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(picture).save(out, optimize=True)
+    print(out)
 
 
 if __name__ == "__main__":

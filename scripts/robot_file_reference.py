@@ -88,8 +88,8 @@ comes behind them must have mass. Exports give them 2e-14 kg and kg·m², about 
 | velocity limits | π rad/s, 1 m/s |
 | payload | a fifth of the moving mass, before tool0 |
 | effort limits | what lifts twice the arm with tool and payload, stretched out, at 10 rad/s² or m/s² |
-| shapes | cylinders and capsules along d and a, as thick as suits the robot's own size, or `radius` |
-| mass, com, inertia | those of the shapes, solid, of 1000 kg/m³ or `density`; what is given wins |
+| shapes | [housings and links](bodies.md) that follow the axes, as thick as suits the robot's own size, or `radius` |
+| mass, com, inertia | those of the [shapes](bodies.md), solid, of 1300 kg/m³ or `density`; what is given wins |
 | actuator gains | critical damping at 100 rad/s, with the payload, at `home`; and a sag of 0.01 rad at most |
 
 A joint that turns is given at least a fifth of the effort and of the gains of the one before it: a last joint would

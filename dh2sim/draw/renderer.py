@@ -50,10 +50,12 @@ def widen(model: Any, points: Array, *, floor: bool = True) -> None:
     ground, pedestal = _geom(model, "floor"), _geom(model, "pedestal")
     lowest = float(points[:, 2].min())
     if ground >= 0 and lowest < model.geom_pos[ground, 2] - 1e-6 * size:
-        model.geom_pos[ground, 2] = lowest - GAP * size
+        z = lowest - GAP * size
+        model.geom_pos[ground, 2] = z
         if pedestal >= 0:
-            model.geom_pos[pedestal, 2] = model.geom_pos[ground, 2] / 2
-            model.geom_size[pedestal, 1] = -model.geom_pos[ground, 2] / 2
+            top = float(model.geom_pos[pedestal, 2] + model.geom_size[pedestal, 1])
+            model.geom_pos[pedestal, 2] = (top + z) / 2
+            model.geom_size[pedestal, 1] = (top - z) / 2
     for geom, shown in ((ground, floor), (pedestal, not _floats(model))):
         if geom >= 0 and not shown:
             model.geom_matid[geom] = -1
@@ -96,29 +98,34 @@ def foot(model: Any) -> Array:
     Args:
         model: ``mujoco.MjModel``, after ``widen``.
     """
-    radius, z = _pedestal(model)
+    radius, z, _ = _pedestal(model)
     corners = [[x * radius, y * radius, z] for x in (-1, 1) for y in (-1, 1)]
     return np.array(corners if radius > 0.0 else []).reshape(-1, 3)
 
 
-def _pedestal(model: Any) -> tuple[float, float]:
-    """Radius of the pedestal, 0 if there is none, and height of the floor, m."""
+def _pedestal(model: Any) -> tuple[float, float, float]:
+    """Radius of the pedestal, 0 if there is none, and heights of the floor and of the foot of the base, m."""
     floor, base = _geom(model, "floor"), mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY.value, "base_link")
-    if floor < 0 or base < 0 or _floats(model) or model.geom_pos[floor, 2] >= 0.0:
-        return 0.0, 0.0
+    if floor < 0 or base < 0 or _floats(model):
+        return 0.0, 0.0, 0.0
     z, own = float(model.geom_pos[floor, 2]), _geom(model, "pedestal")
     if own >= 0:
-        return float(model.geom_size[own, 0]), z
-    widths = model.geom_size[model.geom_bodyid == base, 0]
-    return 0.8 * float(widths.max(initial=0.0)), z
+        return float(model.geom_size[own, 0]), z, float(model.geom_pos[own, 2] + model.geom_size[own, 1])
+    parts = np.flatnonzero((model.geom_bodyid == base) & (model.geom_type == mujoco.mjtGeom.mjGEOM_CYLINDER.value))
+    if not parts.size:
+        return 0.0, 0.0, 0.0
+    plate, *others = (float(model.geom_pos[part, 2] - model.geom_size[part, 1]) for part in parts)
+    if z >= plate - 1e-9 or any(other < plate for other in others):  # on the floor, or hanging
+        return 0.0, 0.0, 0.0
+    return 0.8 * float(model.geom_size[parts, 0].max()), z, plate
 
 
 def _add_pedestal(scene: Any, model: Any) -> None:
-    radius, z = _pedestal(model)
+    radius, z, top = _pedestal(model)
     if radius == 0.0 or _geom(model, "pedestal") >= 0 or scene.ngeom >= scene.maxgeom:
         return
     geom = scene.geoms[scene.ngeom]
-    size, place = np.array([radius, radius, -z / 2]), np.array([0.0, 0.0, z / 2])
+    size, place = np.array([radius, radius, (top - z) / 2]), np.array([0.0, 0.0, (top + z) / 2])
     rgba = np.array(PEDESTAL_COLOR, dtype=np.float32)
     mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_CYLINDER.value, size, place, np.eye(3).ravel(), rgba)
     geom.category = mujoco.mjtCatBit.mjCAT_STATIC.value

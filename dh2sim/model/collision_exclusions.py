@@ -76,7 +76,7 @@ def _overlaps(chain: KinematicChain, shapes: Sequence[Sequence[Shape]], q: Array
     poses += poses[-1:] * (len(shapes) - len(poses))
     owner, starts, ends, radii = [], [], [], []
     for index, (T, own) in enumerate(zip(poses, shapes, strict=True)):
-        for shape in own:
+        for shape in (one for one in own if one.solid):
             start, end = shape.ends
             owner.append(index)
             starts.append(move_point(T, start))

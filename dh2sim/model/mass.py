@@ -19,8 +19,8 @@ from dh2sim.typing import Array, read_only
 
 ROUNDING = (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """Shares of its trace by which an inertia may be mended: numbers in robot files are rounded."""
-ASSUMED_DENSITY = 1000.0
-"""kg/m³: a hollow arm with its motors is closer to water than to aluminium."""
+ASSUMED_DENSITY = 1300.0
+"""kg/m³, of housings and tubes as if solid: fitted to the masses that makers publish, see docs/bodies.md."""
 THIN = 1e-12
 """Share of its trace below which a moment of inertia is zero but for rounding."""
 THICKNESS = 1e-9
@@ -234,7 +234,7 @@ def link_inertial(
 
 def of_shapes(shapes: Iterable[Shape], density: float) -> MassProperties:
     """Return the mass properties of a link of solid shapes, none too small for MuJoCo; ``density`` in kg/m³."""
-    whole = combine(of_shape(shape, density) for shape in shapes)
+    whole = combine(of_shape(shape, density) for shape in shapes if shape.solid)
     whole = _of_mass(whole, max(whole.mass, MIN_MASS))
     return replace(whole, inertia=made_possible(whole.inertia))
 
@@ -247,5 +247,5 @@ def _of_mass(body: MassProperties, mass: float) -> MassProperties:
 def _estimate(link: LinkSpec, shapes: tuple[Shape, ...], anchor: Array) -> MassProperties:
     """Estimate from the shapes; a fixed link without any, but with a mass, counts as a small ball."""
     if shapes:
-        return combine(of_shape(shape, link.density or ASSUMED_DENSITY) for shape in shapes)
+        return combine(of_shape(shape, link.density or ASSUMED_DENSITY) for shape in shapes if shape.solid)
     return replace(ball(link.mass or 1.0, link.radius or 0.01), com=anchor)

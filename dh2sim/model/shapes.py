@@ -22,10 +22,12 @@ class ShapeKind(StrEnum):
 
 
 class ShapePart(StrEnum):
-    """The part that a shape shows; joints are drawn darker than links."""
+    """The part that a shape shows; joints and trim are drawn darker than links."""
 
     JOINT = "joint"
     LINK = "link"
+    TRIM = "trim"
+    """Only shown: it has no mass, and nothing touches it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,6 +45,11 @@ class Shape:
     """Pose of the shape's centre in the link's (joint-placed) frame, shape (4, 4)."""
     size: tuple[float, float, float] | None = None
     """Of a box along x, y and z, m."""
+
+    @property
+    def solid(self) -> bool:
+        """Whether it weighs and collides."""
+        return self.part is not ShapePart.TRIM
 
     @property
     def ends(self) -> tuple[Array, Array]:

@@ -160,7 +160,7 @@ def test_every_built_in_robot_has_one_solid_for_every_shape_in_its_place(name: s
             solid = items[f"/robot/{link.name}/shape_{number}"]
             assert isinstance(solid, Solid)
             np.testing.assert_allclose(matrix(solid), part.T_link_shape, rtol=0, atol=1e-14)
-            own = link.joint_color if part.part is ShapePart.JOINT else link.color
+            own = link.color if part.part is ShapePart.LINK else link.joint_color
             assert (*solid.color, solid.opacity) == own
     assert len(items) == 2 + len(model.links) + sum(len(link.shapes) for link in model.all_links)
 

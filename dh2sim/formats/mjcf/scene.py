@@ -11,7 +11,8 @@ from dh2sim.kinematics.forward import reference_joint_poses
 from dh2sim.kinematics.transforms import compose, identity, move_point
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.typing import read_only
+from dh2sim.model.shapes import Shape, ShapeKind
+from dh2sim.typing import Array, read_only
 
 VIEW_DIRECTION = (1.0, -1.25, 0.62)
 """From the camera's target to the camera."""
@@ -21,11 +22,14 @@ FIELD_OF_VIEW = 40.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Extent:
-    """A ball and a box around the robot in its home configuration, m."""
+    """A ball around the robot in its home configuration, m."""
 
     centre: tuple[float, float, float]
     radius: float
     lowest: float
+    """Height of the lowest part."""
+    foot: float | None
+    """Height of the foot of the base; None where the arm hangs from it."""
 
 
 def to_scene(model: ModelLike) -> str:
@@ -35,21 +39,24 @@ def to_scene(model: ModelLike) -> str:
         model: the robot, in any form.
 
     Returns:
-        The text of the file. The floor is at z = 0, or below the robot where that is lower at home.
+        The text of the file. The floor is at z = 0, or at the foot of the base if that is lower; below the arm
+        where that is lower at home, and then the base stands on a pedestal.
     """
     model = model_of(model)
     extent = _extent(model)
     cell = 10.0 ** math.floor(math.log10(extent.radius))
-    floor = 0.0 if extent.lowest >= -1e-9 else _short(extent.lowest - 0.15 * extent.radius)
+    floor = 0.0 if extent.foot is None else min(0.0, extent.foot)
+    if extent.lowest < floor - 1e-6 * extent.radius:
+        floor = _short(extent.lowest - 0.15 * extent.radius)
     root = ET.Element("mujoco", model=f"{model.name} scene")
     child(root, "include", file=f"{model.name}.xml")
     child(root, "statistic", center=numbers(extent.centre), extent=number(extent.radius))
     visual = child(root, "visual")
     child(visual, "headlight", ambient="0.35 0.35 0.35", diffuse="0.45 0.45 0.45", specular="0.1 0.1 0.1")
     child(visual, "global", azimuth="130", elevation="-20", offwidth="1920", offheight="1080")
-    child(visual, "quality", shadowsize="4096", offsamples="8")
+    child(visual, "quality", shadowsize="8192", offsamples="8")
     child(visual, "rgba", haze="0.86 0.89 0.93 1")
-    child(visual, "map", znear="0.01", zfar="60", shadowclip="3")
+    child(visual, "map", znear="0.01", zfar="60", shadowclip="1.2")
     _scene_assets(root, cell)
     world = child(root, "worldbody")
     _lights(world, extent)
@@ -62,8 +69,8 @@ def to_scene(model: ModelLike) -> str:
         size="0 0 0.05",
         material="floor",
     )
-    if floor < 0.0:
-        _pedestal(world, model, floor)
+    if extent.foot is not None and floor < extent.foot:
+        _pedestal(world, model, floor, extent.foot)
     _camera(world, extent)
     return document(root, provenance(model)[:2])
 
@@ -75,17 +82,25 @@ def _extent(model: RobotModel) -> _Extent:
     points, lowest = [], 0.0
     for link, T in zip(model.all_links, poses, strict=True):
         for shape in link.shapes:
-            start, end = (move_point(T, point) for point in shape.ends)
-            slope = (end[2] - start[2]) / shape.length if shape.length else 0.0
-            # by how much a disc of this radius, square to the axis, is lower than its centre
-            drop = shape.radius * math.sqrt(max(0.0, 1.0 - slope * slope))
-            points += [(start, shape.radius), (end, shape.radius)]
-            lowest = min(lowest, start[2] - drop, end[2] - drop)
+            points += [(move_point(T, point), shape.radius) for point in shape.ends]
+            lowest = min(lowest, _lowest(shape, T))
+    plate, *others = (_lowest(shape, poses[0]) for shape in model.base.shapes)
+    foot = _short(plate) if all(plate <= other for other in others) else None
     low = [min(point[k] - r for point, r in points) for k in range(3)]
     high = [max(point[k] + r for point, r in points) for k in range(3)]
     centre = [_short(0.5 * (a + b)) for a, b in zip(low, high, strict=True)]
     radius = max(math.dist(point, centre) + r for point, r in points)
-    return _Extent(centre=(centre[0], centre[1], centre[2]), radius=_short(radius), lowest=_short(lowest))
+    return _Extent(centre=(centre[0], centre[1], centre[2]), radius=_short(radius), lowest=_short(lowest), foot=foot)
+
+
+def _lowest(shape: Shape, T: Array) -> float:
+    """Return the height of the lowest point of a shape, m, a cylinder or not."""
+    start, end = (move_point(T, point) for point in shape.ends)
+    drop = shape.radius
+    if shape.kind is ShapeKind.CYLINDER:  # by how much a disc square to the axis is lower than its centre
+        slope = (end[2] - start[2]) / shape.length
+        drop *= math.sqrt(max(0.0, 1.0 - slope * slope))
+    return min(start[2], end[2]) - drop
 
 
 def _scene_assets(root: ET.Element, cell: float) -> None:
@@ -125,15 +140,15 @@ def _lights(world: ET.Element, extent: _Extent) -> None:
     child(world, "light", pos=above, dir="-0.25 0.25 -1", type="directional", diffuse="0.55 0.55 0.55")
 
 
-def _pedestal(world: ET.Element, model: RobotModel, floor: float) -> None:
-    """Add a pedestal under the base where the floor is lower; it is only shown, and does not collide."""
+def _pedestal(world: ET.Element, model: RobotModel, floor: float, foot: float) -> None:
+    """Add a pedestal under the foot of the base where the floor is lower; it is only shown, and does not collide."""
     radius = 0.8 * max(shape.radius for shape in model.base.shapes)
     child(
         world,
         "geom",
         name="pedestal",
         type="cylinder",
-        fromto=numbers([0, 0, floor, 0, 0, 0]),
+        fromto=numbers([0, 0, floor, 0, 0, foot]),
         size=number(_short(radius)),
         material="pedestal",
         contype="0",

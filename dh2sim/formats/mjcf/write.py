@@ -140,6 +140,8 @@ def _defaults(mujoco: ET.Element, model: RobotModel) -> None:
     child(visual, "geom", type="mesh", group="2", contype="0", conaffinity="0", mass="0")
     collision = child(outer, "default", class_=f"{model.name}_shape")
     child(collision, "geom", group="1")
+    trim = child(outer, "default", class_=f"{model.name}_trim")
+    child(trim, "geom", group="1", contype="0", conaffinity="0", mass="0")
     hidden = child(outer, "default", class_=f"{model.name}_collision")
     child(hidden, "geom", group="3")
 
@@ -150,7 +152,7 @@ def _class(model: RobotModel) -> str:
 
 
 def _site_scale(model: RobotModel) -> float:
-    radii = [shape.radius for link in model.all_links for shape in link.shapes]
+    radii = [shape.radius for link in model.all_links for shape in link.shapes if shape.solid]
     return 10.0 * min(radii)
 
 
@@ -252,8 +254,11 @@ def _geoms(
     # floats is written out
     weight = {"mass": "0"} if link is model.base else {}
     for shape in link.shapes:
-        color = link.joint_color if shape.part is ShapePart.JOINT else link.color
-        _geom(body, f"{model.name}_{kind}", shape, materials[color], weight)
+        color = link.color if shape.part is ShapePart.LINK else link.joint_color
+        if shape.solid:
+            _geom(body, f"{model.name}_{kind}", shape, materials[color], weight)
+        elif link.mesh is None:
+            _geom(body, f"{model.name}_trim", shape, materials[color], {})
 
 
 def _geom(body: ET.Element, class_: str, shape: Shape, material: str, weight: dict[str, str]) -> None:

@@ -111,10 +111,10 @@ def _link(
             if link.mesh is None:
                 visual = child(element, "visual")
                 _geometry(visual, simple)
-                color = link.joint_color if shape.part is ShapePart.JOINT else link.color
+                color = link.color if shape.part is ShapePart.LINK else link.joint_color
                 child(visual, "material", name=materials[color])
     for shape in link.shapes:
-        for simple in _without_capsules(shape):
+        for simple in _without_capsules(shape) if shape.solid else []:
             _geometry(child(element, "collision"), simple)
 
 

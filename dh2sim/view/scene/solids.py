@@ -61,7 +61,7 @@ def link_solids(
     solids = {}
     for number, shape in enumerate(link.shapes):
         vertices, faces = shape_triangles(shape)
-        own = link.joint_color if shape.part is ShapePart.JOINT else link.color
+        own = link.color if shape.part is ShapePart.LINK else link.joint_color
         solids[f"shape_{number}"] = _solid(vertices, faces, shape.T_link_shape, own, color, opacity)
     return solids
 

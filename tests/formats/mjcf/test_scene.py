@@ -95,12 +95,29 @@ def test_the_floor_is_at_zero_below_a_robot_that_is_above_it() -> None:
     assert "pedestal" not in [mj.geom(i).name for i in range(mj.ngeom)]
 
 
-def test_a_robot_that_reaches_lower_is_on_a_pedestal_that_nothing_touches() -> None:
+def test_the_floor_is_at_the_foot_of_a_base_whose_first_axes_meet_at_its_origin() -> None:
+    mj, _ = compiled(model("puma560"))
+    plate = mj.body("base_link").geomadr[0]
+    assert mj.geom("floor").pos[2] == pytest.approx(float(mj.geom_pos[plate, 2] - mj.geom_size[plate, 1]), abs=1e-4)
+    assert mj.geom("floor").pos[2] < 0.0
+    assert "pedestal" not in [mj.geom(i).name for i in range(mj.ngeom)]
+
+
+def test_an_arm_that_hangs_from_its_base_has_no_pedestal() -> None:
     mj, _ = compiled(lifted(-1.0))
-    floor, pedestal = mj.geom("floor"), mj.geom("pedestal")
-    assert floor.pos[2] < -1.0
-    assert pedestal.pos[2] == pytest.approx(0.5 * floor.pos[2])
-    assert pedestal.size[1] == pytest.approx(-0.5 * floor.pos[2])
+    assert mj.geom("floor").pos[2] < -1.0
+    assert "pedestal" not in [mj.geom(i).name for i in range(mj.ngeom)]
+
+
+def test_a_robot_that_reaches_lower_is_on_a_pedestal_that_nothing_touches() -> None:
+    rows = [Row(name=f"j{i}", type=REVOLUTE, convention=STANDARD, alpha=a) for i, a in enumerate((1.5, 0.0))]
+    hanging = Row(name="down", type=REVOLUTE, convention=STANDARD, a=0.8, theta=-1.4)
+    mj, _ = compiled(build_model(RobotSpec(name="reaching", rows=(*rows, hanging))))
+    floor, pedestal, plate = mj.geom("floor"), mj.geom("pedestal"), mj.geom_size[mj.body("base_link").geomadr[0]]
+    foot = float(mj.geom_pos[mj.body("base_link").geomadr[0], 2] - plate[1])
+    assert floor.pos[2] < -0.8 < foot < 0.0
+    assert pedestal.pos[2] == pytest.approx(0.5 * (floor.pos[2] + foot), abs=1e-3)
+    assert pedestal.size[1] == pytest.approx(0.5 * (foot - floor.pos[2]), abs=1e-3)
     assert (pedestal.contype[0], pedestal.conaffinity[0]) == (0, 0)
 
 

@@ -103,7 +103,8 @@ def test_shapes_read_back_as_the_models_doubles() -> None:
             quaternion = floats(geom, "quat") if "quat" in geom.attrib else [1.0, 0.0, 0.0, 0.0]
             assert position == shape.T_link_shape[:3, 3].tolist()
             assert quaternion == quaternion_from_rotation(shape.T_link_shape).tolist()
-            color = link.joint_color if shape.part is ShapePart.JOINT else link.color
+            color = link.color if shape.part is ShapePart.LINK else link.joint_color
+            assert geom.attrib["class"] == ("odd_shape" if shape.solid else "odd_trim")
             assert materials[geom.attrib["material"]] == color
 
 
