@@ -56,9 +56,7 @@ _READERS: Final = {
     ".urdf": "from_urdf",
     ".xacro": "from_urdf",
     ".xml": "from_mjcf",
-    ".md": "from_table",
-    ".csv": "from_table",
-    ".tsv": "from_table",
+    **dict.fromkeys((".md", ".csv", ".tsv", ".tex", ".html", ".rst", ".m", ".py", ".json"), "from_table"),
 }
 """The methods that read files of other formats, by their suffix."""
 _RIGID: Final = 1e-9
@@ -296,7 +294,7 @@ class Robot:
         tolerance: float = 1e-9,
         name: str | None = None,
     ) -> Self:
-        """Read a DH table in Markdown, CSV or TSV, or as a robotics toolbox prints it.
+        """Read a DH table in Markdown, LaTeX, HTML, CSV or JSON, or a printout or a script of a robotics toolbox.
 
         Args:
             path: The file.

@@ -11,6 +11,7 @@ from dh2sim.formats.table.data_tables import data_tables
 from dh2sim.formats.table.dh_table import Located, Table, make_table, transposed
 from dh2sim.formats.table.grid import (
     MAX_COLUMNS,
+    Cells,
     Grid,
     is_comment,
     pipe_grids,
@@ -20,6 +21,7 @@ from dh2sim.formats.table.grid import (
 from dh2sim.formats.table.headers import are_headings, parameters_in
 from dh2sim.formats.table.html_tables import html_grids
 from dh2sim.formats.table.latex_tables import latex_grids
+from dh2sim.formats.table.rst_tables import rst_grids
 from dh2sim.formats.table.scripts import script_tables
 
 _SEPARATED: Final = (".csv", ".tsv", ".tab")
@@ -44,7 +46,13 @@ def locate(lines: Sequence[str], file: str) -> Located:
     if not scripts:
         scripts, unnamed = data_tables(lines, suffix)
         problems += unnamed
-    marked = [*_in_grids(pipes), *_in_grids(latex_grids(lines)), *_in_grids(html_grids(lines)), *scripts]
+    marked = [
+        *_in_grids(pipes),
+        *_in_grids(latex_grids(lines)),
+        *_in_grids(html_grids(lines)),
+        *_in_grids(rst_grids(lines)),
+        *scripts,
+    ]
     taken = {number for table in marked for number in table.lines}
     separated = list(_between_separators(lines, taken))
     even = [table for table in separated if _is_even(table)]
@@ -53,6 +61,7 @@ def locate(lines: Sequence[str], file: str) -> Located:
     else:
         found = sorted([*marked, *even], key=lambda table: table.lines.start)
         found = found or ([] if problems else separated[:1])
+    found = found if even or marked else list(_on_their_sides(lines)) or found
     found = sorted(found, key=lambda table: table.extent is None and is_comment(lines[table.lines.start - 1]))
     alike = [] if found or problems else _most_alike(lines, pipes)
     return Located(tables=(*found, *alike), pipes=pipes, problems=tuple(problems))
@@ -90,6 +99,25 @@ def _between_separators(lines: Sequence[str], taken: set[int]) -> Iterator[Table
             candidates += 1
             if candidates == _MAX_CANDIDATES:
                 return
+
+
+def _on_their_sides(lines: Sequence[str]) -> Iterator[Table]:
+    """Yield the tables between separators whose rows are the parameters: lines of as many cells each."""
+    rows: list[Cells] = []
+    for separator in "\t;,":
+        for index, line in enumerate([*lines[:_MAX_HEADING_LINES], ""]):
+            try:
+                cells = (
+                    split(line[:2_000], index + 1, separator) if separator in line and not is_comment(line) else ()
+                )
+            except ValueError:
+                cells = ()
+            if rows and len(cells) != len(rows[0]):
+                if (table := transposed(Grid(rows=tuple(rows), separator="|"))) is not None:
+                    yield table
+                rows = []
+            if len(cells) > 1 and len(rows) <= MAX_COLUMNS:
+                rows.append(cells)
 
 
 def _is_even(table: Table) -> bool:

@@ -232,7 +232,7 @@ class _Reader:
         findings.check()
         spec = self._spec(name, rows, chosen, used.length)
         for symbol in body.constants:
-            findings.note(f"{symbol} was given its value by line {constants[symbol].line}")
+            findings.note(f"line {constants[symbol].line} gives {symbol} its value")
         self._note_unread()
         return TableImport(spec=spec, units=used, notes=tuple(findings.notes))
 

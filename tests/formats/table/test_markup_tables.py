@@ -162,3 +162,71 @@ def test_a_parameter_with_fewer_values_on_a_table_on_its_side_is_noted() -> None
     )
     assert numbers(found.spec) == [(0, 1, 1, H), (0, 0, 2, 0)]
     assert "'d (m)' has fewer values than others: the rest was read as empty" in found.notes
+
+
+SIMPLE = """\
+Standard DH
+
+=====  =========  =====  =====  =====
+Joint  theta      d (m)  a (m)  alpha
+=====  =========  =====  =====  =====
+1      q1         0.4    0      pi/2
+2      q2 + pi/2         0.3    0
+=====  =========  =====  =====  =====
+
+Text.
+"""
+LIST = """\
+Standard DH
+
+.. list-table:: Parameters
+   :header-rows: 1
+
+   * - Joint
+     - theta
+     - d (m)
+     - a (m)
+     - alpha
+   * - 1
+     - q1
+     - 0.4
+     -
+     - pi/2
+   * - 2
+     - q2 + pi/2
+     - 0
+     - 0.3
+
+Text - after it.
+"""
+CSV_TABLE = """\
+.. csv-table:: Standard DH
+   :header: theta, d (m), a (m), alpha
+   :widths: 1, 1, 1, 1
+
+   q1, 0.4, 0, pi/2
+   q2 + pi/2, 0, 0.3, 0
+"""
+GRID = """\
+Standard DH
+
++-------+-----------+-------+-------+-------+
+| Joint | theta     | d (m) | a (m) | alpha |
++=======+===========+=======+=======+=======+
+| 1     | q1        | 0.4   | 0     | pi/2  |
++-------+-----------+-------+-------+-------+
+| 2     | q2 + pi/2 | 0     | 0.3   | 0     |
++-------+-----------+-------+-------+-------+
+"""
+
+
+@pytest.mark.parametrize("text", [SIMPLE, LIST, CSV_TABLE, GRID])
+def test_tables_of_restructured_text_are_read(text: str) -> None:
+    expected = standard(Q[0], 0.4, 0, H) @ standard(Q[1] + H, 0, 0.3, 0)
+    np.testing.assert_allclose(tool_poses(imported(text, "arm.rst").spec, [Q])[0], expected, atol=1e-15)
+
+
+def test_csv_on_its_side_is_turned() -> None:
+    text = "# standard DH\njoint;1;2\ntheta;q1;q2 + pi/2\nd (m);0.4;0\na (m);0;0.3\nalpha;pi/2;0\n"
+    expected = standard(Q[0], 0.4, 0, H) @ standard(Q[1] + H, 0, 0.3, 0)
+    np.testing.assert_allclose(tool_poses(imported(text, "arm.csv").spec, [Q])[0], expected, atol=1e-15)

@@ -154,8 +154,8 @@ def test_the_stanford_arm_of_a_book_has_symbols_whose_values_are_below_it() -> N
     assert types(found.spec) == "rrprrr"
     assert found.notes == (
         "a length without a unit was read in m, the unit of other cells",
-        "d2 was given its value by line 12",
-        "d6 was given its value by line 12",
+        "line 12 gives d2 its value",
+        "line 12 gives d6 its value",
     )
 
 

@@ -16,7 +16,7 @@ from dh2sim.errors import Dh2simError, ImportedFileError
 from dh2sim.formats.table.read import TableImport, read_table
 from tests.formats.table.samples import STANDARD, complaints, imported, numbers
 from tests.formats.table.test_data_tables import KUKA as DICTIONARY
-from tests.formats.table.test_markup_tables import ARRAY, BOOKTABS, HTML, SIDE, TABULAR
+from tests.formats.table.test_markup_tables import ARRAY, BOOKTABS, CSV_TABLE, HTML, LIST, SIDE, SIMPLE, TABULAR
 from tests.formats.table.test_matlab_script import JACO, LINKS, PUMA
 from tests.formats.table.test_python_script import MODEL, SCRIPT
 from tests.formats.table.test_real_tables import KUKA, PANDA, SCARA, STANFORD, STUDENT, UR5
@@ -29,7 +29,7 @@ TABLES = [
     STANFORD,
     STUDENT,
     UR5,
-    *(ARRAY, BOOKTABS, HTML, SIDE, TABULAR, JACO, LINKS, PUMA, MODEL, SCRIPT, DICTIONARY),
+    *(ARRAY, BOOKTABS, CSV_TABLE, LIST, SIMPLE, HTML, SIDE, TABULAR, JACO, LINKS, PUMA, MODEL, SCRIPT, DICTIONARY),
     *(p.read_text("utf-8") for p in sorted(PRINTOUTS.glob("*.txt"))),
 ]
 SPICE = [

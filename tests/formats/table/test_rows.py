@@ -96,9 +96,9 @@ def test_values_in_the_text_are_used_and_noted() -> None:
     assert numbers(found.spec) == [(0, 0.4, 0.2, 0), (0, 0, -0.15, 0)]
     assert found.notes == (
         "a length without a unit was read in m, the unit of other cells",
-        "d1 was given its value by line 1",
-        "L was given its value by line 1",
-        "a2 was given its value by line 1",
+        "line 1 gives d1 its value",
+        "line 1 gives L its value",
+        "line 1 gives a2 its value",
     )
 
 
