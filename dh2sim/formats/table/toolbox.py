@@ -195,7 +195,7 @@ def elementwise(operation: Callable[..., object], *values: object, depth: int = 
     if not arrays:
         try:
             return operation(*map(number, values))
-        except (ArithmeticError, ValueError) as error:
+        except (ArithmeticError, TypeError, ValueError) as error:  # TypeError: the wrong number of arguments
             return Unknown(str(error))
     size = len(arrays[0])
     if depth == _DEEPEST:
