@@ -519,20 +519,36 @@ class Robot:
         wanted = list(dict.fromkeys(member(Format, format_, "format") for format_ in formats))
         return export_robot(self.model, Path(out), formats=wanted, dh_frames=dh_frames, verified=verify)
 
-    def validate(self, *, samples: int = 1000, seed: int = 0, tolerance: float = 1e-12) -> RobotReport:
+    def validate(
+        self,
+        *,
+        samples: int = 1000,
+        seed: int = 0,
+        tolerance: float = 1e-12,
+        source: FilePath | None = None,
+        base: str | None = None,
+        tip: str | None = None,
+    ) -> RobotReport:
         """Compare every engine that is installed with the table: poses, Jacobians and dynamics.
 
         Args:
             samples: Number of random configurations inside the limits.
             seed: Of the configurations.
             tolerance: Allowed angle, rad, and distance as a share of max(1 m, reach).
+            source: URDF or MJCF that the robot was imported from, to compare its masses with.
+            base: Link of the source that became base_link; by default the root.
+            tip: Link or site of the source that became tool0; by default where the arm ends.
 
         Returns:
             The report; ``ok`` says whether everything matches.
         """
+        from dh2sim.importing.sources import ImportOptions
         from dh2sim.validate.run import validate_robot
 
-        return validate_robot(self.model, samples=samples, seed=seed, tolerance=tolerance)
+        options = ImportOptions(base=base, tip=tip)
+        return validate_robot(
+            self.model, samples=samples, seed=seed, tolerance=tolerance, source=source, source_options=options
+        )
 
     def rollout(
         self,

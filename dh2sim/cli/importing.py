@@ -97,7 +97,8 @@ def import_robot(
 
     The joints of a URDF or an MJCF become DH rows, however their axes lie; where axes are nearly parallel, Hayati's
     row is used. All joint axes and the tip are compared with the file's own kinematics at 1000 random
-    configurations, and a residual above the tolerance is an error. Limits, masses, inertias and meshes are kept;
+    configurations, and a residual above the tolerance is an error; so are the mass matrix and the forces of gravity
+    at 20, and a difference is reported. Limits, masses, inertias and meshes are kept;
     what cannot be is listed. With --tolerance 1e-4 angles such as 1.5708 become 90 degrees.
 
     Tables are read from Markdown, LaTeX, HTML, CSV, YAML and JSON, from printouts of the Robotics Toolbox, and from
@@ -147,11 +148,22 @@ def import_robot(
     except Dh2simError as error:
         error.args = (_with_options(str(error)),)
         raise
-    notes = [_with_options(note) for note in imported.notes]
+    notes = [*(_with_options(note) for note in imported.notes), *_other_masses(imported)]
     if as_json:
         hand_over_json(imported.text, out, imported.spec, notes, _residual(imported))
         return
     hand_over(imported.text, out, summary=summary(imported), notes=notes, quiet=quiet)
+
+
+def _other_masses(imported: Imported) -> list[str]:
+    """Return a sentence on masses that are not those of the source."""
+    found = imported.mechanics
+    if found is None or found.small:
+        return []
+    return [
+        f"The mass matrix differs from the file's by up to {100 * found.mass_matrix:.2g} %, the forces of gravity by "
+        f"{100 * found.gravity:.2g} %, most at {found.worst}: masses are estimated or left out, as said above."
+    ]
 
 
 def _residual(imported: Imported) -> dict[str, object] | None:
@@ -163,6 +175,11 @@ def _residual(imported: Imported) -> dict[str, object] | None:
         "rotation": residual.rotation,
         "worst": residual.worst,
         "configurations": residual.configurations,
+        **(
+            {}
+            if (found := imported.mechanics) is None
+            else {"mass_matrix": found.mass_matrix, "gravity": found.gravity}
+        ),
     }
 
 
@@ -213,7 +230,9 @@ def summary(imported: Imported) -> str:
     residual = imported.residual
     if residual is None:
         return rows
-    return f"{rows}; off by at most {residual_text(residual)} at {residual.configurations} configurations"
+    text = f"{rows}; off by at most {residual_text(residual)} at {residual.configurations} configurations"
+    found = imported.mechanics
+    return text if found is None else f"{text}, its mass matrix by {found.mass_matrix:.1e}"
 
 
 def frames(

@@ -55,6 +55,16 @@ def validate(
         Path | None,
         typer.Option("--dir", metavar="DIR", help="Check the files in DIR/<name>/ instead of a new export."),
     ] = None,
+    source: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="URDF or MJCF that the robot was imported from: compare masses with it."),
+    ] = None,
+    base: Annotated[
+        str | None, typer.Option(metavar="LINK", help="Link of --source that became base_link. [default: the root]")
+    ] = None,
+    tip: Annotated[
+        str | None, typer.Option(metavar="LINK|SITE", help="Link or site of --source that became tool0.")
+    ] = None,
     json_file: Annotated[
         str | None,
         typer.Option("--json", metavar="FILE|-", help="Write the report as JSON; - prints it alone."),
@@ -66,7 +76,8 @@ def validate(
 
     The engines are dh2sim itself, MuJoCo on the MJCF and on the URDF, and yourdfpy, pinocchio and PyBullet where they
     are installed. With --dynamics the robot is also simulated, and its motion is checked against the laws of physics.
-    The exit status is 1 if anything differs by more than the tolerance.
+    With --source the mass matrix and the forces of gravity are compared with those of the file that 'dh2sim import'
+    read. The exit status is 1 if anything differs by more than the tolerance.
 
     \b
     Examples:
@@ -74,13 +85,20 @@ def validate(
       dh2sim validate stanford --dynamics
       dh2sim validate my_arm.yaml --samples 100000 --json report.json
       dh2sim validate robots/*.yaml --dir generated --junit report.xml
+      dh2sim validate panda.yaml --source panda.urdf
     """
     tolerance_of(tolerance)
     if dynamics:
         require_extra("data", "xarray", what="--dynamics")
+    if source is not None and len(robots) > 1:
+        raise typer.BadParameter("is the source of one robot", param_hint="--source")
+    if source is None and (base is not None or tip is not None):
+        option = "--base" if tip is None else "--tip"
+        raise typer.BadParameter("only with --source", param_hint=option)
     models = build_all(robots, strict=strict)
     if folder is not None:
         _require_folders(robots, models, folder)
+    from dh2sim.importing.sources import ImportOptions
     from dh2sim.validate.report import ValidationReport, to_junit
     from dh2sim.validate.run import engine_samples, validate_robot
 
@@ -94,6 +112,8 @@ def validate(
                 seed=seed,
                 tolerance=tolerance,
                 folder=None if folder is None else folder / model.name,
+                source=source,
+                source_options=ImportOptions(base=base, tip=tip),
                 advance=advance,
             )
             reports.append(_simulated(model, found, seed) if dynamics else found)
@@ -218,4 +238,10 @@ def _remarks(robot: RobotReport) -> Iterator[tuple[str, str]]:
 def _compared(check: Check) -> str:
     if check.frames is not None:
         return f"pose, {check.frames} frames"
-    return "jacobian (central)" if check.reference == "central differences" else check.quantity.value
+    if check.reference == "central differences":
+        return "jacobian (central)"
+    if check.engine == "mujoco-mjcf":  # for all but a source it is the reference itself
+        return {"mass matrix": "masses (source)", "gravity force": "gravity (source)"}.get(
+            check.quantity.value, check.quantity.value
+        )
+    return check.quantity.value

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Final, TypeAlias
 
 from dh2sim.kinematics.serial_chain import SerialChain
 from dh2sim.messages import Notes, listed
@@ -93,6 +93,11 @@ class ChainJoints:
     dynamics: tuple[Dynamics, ...]
 
 
+Mechanics: TypeAlias = Callable[[Array], tuple[Array, Array]]
+"""Returns mass matrices without rotor inertia, shape (N, n, n), and the forces that balance gravity, (N, n), of joint
+vectors of shape (N, n), rad and m."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SerialRobot:
     """A serial robot as a file of another format describes it; SI units."""
@@ -117,6 +122,8 @@ class SerialRobot:
     """m/s² in the base's frame, shape (3,)."""
     configurations: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
     """Named joint vectors, rad and m, each of shape (number of joints,)."""
+    mechanics: Mechanics | None = field(default=None, repr=False)
+    """By the file's own masses, whatever was read of them; None where it has none."""
     notes: tuple[str, ...] = ()
     """What was chosen, changed or left out, a sentence each, for the user to read."""
 

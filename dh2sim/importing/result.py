@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dh2sim.importing.mechanics import MechanicsResidual
 from dh2sim.kinematics.frame_assignment.lines import Line
 from dh2sim.kinematics.frame_assignment.recover import Residual, bounded_reach
 from dh2sim.kinematics.frame_assignment.result import Assignment
@@ -29,6 +30,8 @@ class Imported:
     """What was chosen, changed or left out, a sentence each."""
     residual: Residual | None = None
     """Measured on the text; None where there is no other kinematics to compare with."""
+    mechanics: MechanicsResidual | None = None
+    """Of the masses; None where the source gives none."""
     chain: SerialChain | None = field(default=None, repr=False)
     """The source's own kinematics."""
     assignment: Assignment | None = field(default=None, repr=False)

@@ -12,6 +12,7 @@ import numpy as np
 
 from dh2sim.errors import Dh2simError, MismatchError
 from dh2sim.formats.serial_robot import SerialLink, SerialMesh, SerialRobot
+from dh2sim.importing.mechanics import measure_mechanics
 from dh2sim.importing.result import Imported
 from dh2sim.kinematics.frame_assignment.recover import (
     CONFIGURATIONS,
@@ -280,11 +281,13 @@ def import_serial(
         )
     spec = replace(spec, source=f"{origin}{'' if origin.endswith('.') else '.'} {residual_sentence(residual)}")
     text = robot_file_text(spec, header=comments, folder=folder)
+    made = _read(text, folder)
     return Imported(
         text=text,
-        spec=_read(text, folder),
+        spec=made,
         notes=notes,
         residual=residual,
+        mechanics=None if robot.mechanics is None else measure_mechanics(made, robot.mechanics),
         chain=robot.chain,
         assignment=recovery.assignment,
     )

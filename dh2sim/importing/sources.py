@@ -310,6 +310,24 @@ def import_data(data: bytes, file: str, options: ImportOptions, *, folder: Path 
             )
 
 
+def read_arm(path: str | os.PathLike[str], options: ImportOptions = ImportOptions()) -> SerialRobot:
+    """Return the arm that a URDF or an MJCF describes, as ``import_robot`` reads it.
+
+    Raises:
+        ImportedFileError: The file is wrong, or holds no such arm.
+        Dh2simError: The file cannot be read, or is of another format.
+    """
+    file = os.fspath(path)
+    data = read_file(Path(file))
+    match _root_element(data, file):
+        case "robot":
+            return _read_urdf(data, file, options)
+        case "mujoco" | "mujocoinclude":
+            return _read_mjcf(file, options)
+        case _:
+            raise Dh2simError(f"{file}: must be a URDF or an MJCF, which have masses")
+
+
 def _refuse_yaml(data: bytes, file: str) -> None:
     if re.search(rb"^joints\s*:", data, re.MULTILINE):
         raise Dh2simError(f"{file}: this is a robot file already, and needs no import")

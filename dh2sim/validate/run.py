@@ -17,6 +17,7 @@ from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
 from dh2sim.errors import Dh2simError, EngineCapacityError, EngineError
 from dh2sim.export import export_robot
 from dh2sim.files import finish_interrupted, signals_deferred
+from dh2sim.importing.sources import ImportOptions
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.robot_model import RobotModel
@@ -33,6 +34,7 @@ from dh2sim.validate.kinematics import (
     table_jacobian,
 )
 from dh2sim.validate.report import Check, Quantity, RobotReport
+from dh2sim.validate.source import SourceArm, check_source
 
 SLOW_ROWS = 8000
 """Most table rows that engines looping in Python compute: 1000 configurations of 8 rows."""
@@ -62,6 +64,8 @@ def validate_robot(
     seed: int = 0,
     tolerance: float = 1e-12,
     folder: Path | None = None,
+    source: str | PathLike[str] | None = None,
+    source_options: ImportOptions | None = None,
     advance: Advance | None = None,
 ) -> RobotReport:
     """Compare every engine with the table.
@@ -72,29 +76,39 @@ def validate_robot(
         seed: Seed of the configurations.
         tolerance: Allowed angle, rad, and distance as a share of max(1 m, reach).
         folder: Folder with the robot's files; None to export them to a temporary one.
+        source: URDF or MJCF that the robot was imported from, to compare its masses with.
+        source_options: Those that it was imported with; base and tip say which part of it the robot is.
         advance: Called with the number of configurations that an engine has computed.
 
     Returns:
         The report. A file that is missing or that an engine refuses is a check that failed.
 
     Raises:
-        Dh2simError: ``samples`` is not a whole number of at least 1.
+        Dh2simError: ``samples`` is not a whole number of at least 1, or the source is not of this robot.
+        ImportedFileError: The source is wrong.
         ModelError: A format cannot hold the robot.
         OutputError: The files cannot be written to the temporary folder.
     """
     if not isinstance(samples, int | np.integer) or samples < 1:
         raise Dh2simError(f"samples must be a whole number of at least 1, got {samples!r}")
     model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
+    arm = None if source is None else SourceArm.read(source, source_options or ImportOptions(), model)
     if folder is not None:
         finish_interrupted(folder.parent, folder.name)
-        return _validate(model, folder, samples, seed, tolerance, advance)
+        return _validate(model, folder, samples, seed, tolerance, arm, advance)
     with TemporaryDirectory(prefix="dh2sim-") as temporary:
         export_robot(model, Path(temporary), verified=False)
-        return _validate(model, Path(temporary) / model.name, samples, seed, tolerance, advance)
+        return _validate(model, Path(temporary) / model.name, samples, seed, tolerance, arm, advance)
 
 
 def _validate(
-    model: RobotModel, folder: Path, samples: int, seed: int, tolerance: float, advance: Advance | None
+    model: RobotModel,
+    folder: Path,
+    samples: int,
+    seed: int,
+    tolerance: float,
+    source: SourceArm | None,
+    advance: Advance | None,
 ) -> RobotReport:
     lower, upper = model.travel
     q = random_configurations(lower, upper, samples, seed)
@@ -123,6 +137,7 @@ def _validate(
             *unread,
             *_jacobians(model, library, movers, q[:JACOBIAN_SAMPLES], tolerance),
             *_dynamics(model, movers, q[:DYNAMICS_SAMPLES], seed),
+            *([] if source is None else _masses(model, movers, source, q[:DYNAMICS_SAMPLES])),
         ),
     )
 
@@ -194,6 +209,15 @@ def _dynamics(model: RobotModel, engines: list[Mover], q: Array, seed: int) -> l
             Quantity.MASS_MATRIX,
             lambda engine: check_dynamics(engine, reference, model, q, velocity),
         )
+    return checks
+
+
+def _masses(model: RobotModel, engines: list[Mover], source: SourceArm, q: Array) -> list[Check]:
+    """Compare the exported MJCF with the source; one that was not read has failed already."""
+    checks: list[Check] = []
+    for engine in engines:
+        if isinstance(engine, MujocoEngine) and engine.name == "mujoco-mjcf":
+            checks += _checks_of(engine, Quantity.MASS_MATRIX, lambda engine: check_source(engine, source, model, q))
     return checks
 
 

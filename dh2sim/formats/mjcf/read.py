@@ -18,6 +18,7 @@ from dh2sim.formats.mjcf.compile import Compiled, compile_mjcf
 from dh2sim.formats.mjcf.includes import MjcfFiles, scan_files
 from dh2sim.formats.mjcf.joints import check_joints, joint_names, note_solver, read_drives, read_joints
 from dh2sim.formats.mjcf.links import read_inertial, read_look, weight_of
+from dh2sim.formats.mjcf.mechanics import mjcf_mechanics
 from dh2sim.formats.mjcf.tree import WORLD, MjcfBody, MjcfJoint, MjcfTree, read_tree
 from dh2sim.formats.serial_robot import GREATEST, SerialLink, SerialRobot
 from dh2sim.formats.xml_read import place
@@ -273,6 +274,7 @@ def read_mjcf(
         dynamics=joints.dynamics,
         actuators=tuple(drive.actuator for drive in drives) if compiled.model.nactuator else None,
         gravity=gravity,
+        mechanics=mjcf_mechanics(compiled, selection),
         notes=notes.sentences(),
     )
 

@@ -14,6 +14,7 @@ from dh2sim.formats.serial_robot import SerialLink, SerialRobot
 from dh2sim.formats.urdf.chain import Selection, select_chain
 from dh2sim.formats.urdf.joints import read_joints
 from dh2sim.formats.urdf.links import Body, read_bodies, read_inertial, read_look, read_materials, weight_of
+from dh2sim.formats.urdf.mechanics import urdf_mechanics
 from dh2sim.formats.urdf.tree import UrdfJoint, UrdfTree, read_pose, read_tree
 from dh2sim.formats.xacro import is_definition
 from dh2sim.formats.xml_read import Element, XmlReport, parse_xml
@@ -114,6 +115,7 @@ def read_urdf(
         limits=joints.limits,
         dynamics=joints.dynamics,
         gravity=gravity,
+        mechanics=urdf_mechanics(tree.robot, [joint.name for joint in joints.chain.joints]),
         notes=notes.sentences(),
     )
 
