@@ -341,7 +341,7 @@ def _record(text: str, start: int, end: int, places: TextPlaces) -> dict[str, Ce
 
 def _of_records(records: Sequence[Mapping[str, Cell]]) -> Iterator[Table]:
     names = list(dict.fromkeys(name for record in records for name in record))
-    if not names or len(names) > MAX_COLUMNS or len(records) > MAX_ROWS:
+    if not names or len(names) > MAX_COLUMNS:
         return
     firsts = [next(iter(record.values())) for record in records]
     header = tuple(Cell(text=name, line=firsts[0].line, column=firsts[0].column) for name in names)
@@ -357,6 +357,8 @@ def _blocks(lines: Sequence[str]) -> Iterator[Table]:
     records: list[dict[str, Cell]] = []
     current: dict[str, Cell] = {}
     for number, line in enumerate([*lines, "end:"], start=1):
+        if len(records) > MAX_ROWS:
+            break
         pair = _BLOCK_PAIR.fullmatch(line[:500])
         key = pair[1] if pair else ""
         starts = line.lstrip().startswith(("- ", "[")) or (pair is not None and pair[2] is None)

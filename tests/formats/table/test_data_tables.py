@@ -117,3 +117,8 @@ def test_what_is_wrong_with_data_has_its_place(text: str, expected: list[str]) -
 def test_three_lists_that_have_other_names_are_no_table() -> None:
     for text in ("a = [1, 2]\nb = [3, 4]\nc = [5, 6]\n", "x = {'a': 1, 'b': 2}\n", "M = [[1,0,0,0],[0,1,0,0]]"):
         assert "no table of Denavit-Hartenberg parameters found" in complaints(text, "t.py")[0]
+
+
+def test_a_file_of_too_many_records_is_refused() -> None:
+    text = "- a: 0\n  alpha: 0\n  d: 0\n  theta: 0\n" * 1001
+    assert complaints(text, "t.yaml", **STANDARD) == ["t.yaml:1:6: the table has more than 1000 rows"]
