@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from dh2sim.model.build import build_model
+from dh2sim.robot.read import load_robot
 from dh2sim.simulate.run import rollout
+from dh2sim.validate.motion.free_motion import without_contacts, without_dry_friction
 from dh2sim.validate.motion.tracking import check_tracking, tracking_rollouts
 from tests.robot_files import ODD
 from tests.sample_robots import NAMES
@@ -42,10 +46,36 @@ def test_the_error_of_an_arm_is_that_of_a_unit_mass_under_the_same_sampled_contr
 
 
 def test_arms_with_weak_motors_follow_slower_references() -> None:
-    run = tracking_rollouts(built("ssrms"))
+    spec, strong = load_robot("ssrms"), built("ssrms")
+    rows = tuple(
+        replace(row, limits=replace(row.limits, effort=0.1 * joint.effort))
+        for row, joint in zip(spec.rows, strong.joints, strict=True)
+    )
+    run = tracking_rollouts(build_model(replace(spec, rows=rows)))
     assert run.attrs["controller"] == "computed-torque:bandwidth=5,period=4"
     assert run.attrs["timestep"] == 4 / 250
     assert not run["saturation"].values.any()
+
+
+@pytest.mark.parametrize("robot", NAMES)
+def test_assumed_motors_are_strong_enough_for_the_default_references(robot: str) -> None:
+    model = built(robot)
+    assumed = all("effort" in joint.assumed for joint in model.moving_joints)
+    run = tracking_rollouts(model)
+    assert not run["saturation"].values.any()
+    assert not assumed or run.attrs["controller"] == "computed-torque:bandwidth=20,period=1"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", NAMES)
+def test_every_joint_follows_with_the_options_that_controllers_have_by_default(robot: str) -> None:
+    # as docs/controllers.md says
+    model = without_contacts(without_dry_friction(built(robot)))
+    for controller, most in (("computed-torque", 0.003), ("sine", 0.1)):
+        run = rollout(model, rollouts=8, duration=3.0, controller=controller, start="random", seed=3)
+        error = np.abs(run["qpos"].values - run["qpos_ref"].values).max(axis=(0, 1))
+        assert error.max() < most, dict(zip(run["joint"].values, error, strict=True))
+        assert not run["saturation"].values.any()
 
 
 def test_motors_that_are_too_weak_for_any_motion_are_reported() -> None:
