@@ -17,7 +17,7 @@ from dh2sim.model.actuators import actuator_model, duties, seen_inertias
 from dh2sim.model.collision_exclusions import excluded_pairs
 from dh2sim.model.limits import duty_bounds, filled_limits, frame_extent, position_ranges, reach_bound, travels_of
 from dh2sim.model.link_shapes import arm_length, lay_out, link_radii
-from dh2sim.model.mass import MassProperties, ball, ball_radius, link_inertial
+from dh2sim.model.mass import TOOL_DENSITY, MassProperties, ball, ball_radius, link_inertial
 from dh2sim.model.meshes import load_mesh
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel, carrying
 from dh2sim.model.shapes import Shape, given_shape, placed
@@ -210,7 +210,7 @@ def _tool(spec: RobotSpec, chain: KinematicChain) -> LinkModel | None:
     if not tool.is_body:
         return None
     shapes = () if tool.shape is None else (given_shape(tool.shape),)
-    assumed = LinkSpec(mass=tool.mass, com=tool.com, inertia=tool.inertia)
+    assumed = LinkSpec(mass=tool.mass, com=tool.com, inertia=tool.inertia, density=TOOL_DENSITY)
     if not shapes:  # a ball at tool0
         mass = tool.mass or 0.0
         com = read_only(chain.T_dhn_tool0[:3, 3]) if tool.com is None else tool.com

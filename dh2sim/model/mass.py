@@ -27,6 +27,8 @@ THICKNESS = 1e-9
 """Share of its trace by which the inertia of a thin rod is made greater."""
 NOTHING = 1e-15
 """Share of its trace below which an entry of a combined inertia is rounding: a zero lets MuJoCo keep its axes."""
+TOOL_DENSITY = 1000.0
+"""kg/m³: of tools and payloads, grippers and boxes that are not full."""
 MIN_MASS = 1e-9
 """kg: estimates are no smaller."""
 MIN_INERTIA = 1e-14
@@ -93,8 +95,8 @@ def ball(mass: float, radius: float) -> MassProperties:
 
 
 def ball_radius(mass: float) -> float:
-    """Return the radius, m, of a solid ball of the assumed density, to three digits; ``mass`` in kg."""
-    return float(f"{(3 * mass / (4 * math.pi * ASSUMED_DENSITY)) ** (1 / 3):.3g}")
+    """Return the radius, m, of a solid ball of the density of tools, to three digits; ``mass`` in kg."""
+    return float(f"{(3 * mass / (4 * math.pi * TOOL_DENSITY)) ** (1 / 3):.3g}")
 
 
 def combine(parts: Iterable[MassProperties]) -> MassProperties:
