@@ -172,7 +172,7 @@ def _base(r: float, half: float, lowest: float, end: Array, hangs: bool, shortes
     ]
     corner = read_only([0.0, 0.0, top])
     if abs(top - column[2]) > shortest:
-        shapes.append(_cylinder(ShapePart.LINK, 1.05 * r, column, corner))
+        shapes.append(_cylinder(ShapePart.LINK, 0.85 * r, column, corner))
     return shapes + _tubes([corner, end], TUBE * r, shortest) if math.hypot(x, y) > BEND * r else shapes
 
 

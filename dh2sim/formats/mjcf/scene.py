@@ -56,7 +56,7 @@ def to_scene(model: ModelLike) -> str:
     child(visual, "global", azimuth="130", elevation="-20", offwidth="1920", offheight="1080")
     child(visual, "quality", shadowsize="8192", offsamples="8")
     child(visual, "rgba", haze="0.86 0.89 0.93 1")
-    child(visual, "map", znear="0.01", zfar="60", shadowclip="1.2")
+    child(visual, "map", znear="0.01", zfar="60", shadowclip="3")
     _scene_assets(root, cell)
     world = child(root, "worldbody")
     _lights(world, extent)
