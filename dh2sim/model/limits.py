@@ -133,9 +133,10 @@ def duty_bounds(
     g = _length(gravity) or 9.81
     turns = skeleton.slides[i] is None
     loads, inertias, distance = [], [], 0.0
+    steps = skeleton.steps  # computed anew at every access
     for k, body in enumerate(bodies[i:], start=i):
         if k > i:
-            distance += skeleton.steps[k]
+            distance += steps[k]
         if body is not None:
             arm = distance + math.dist(body.com, skeleton.leaving(k + 1)) if turns else 1.0
             # no principal moment is more than half of their sum
