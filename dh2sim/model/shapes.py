@@ -62,6 +62,8 @@ def between(kind: ShapeKind, part: ShapePart, radius: float, start: Array, end: 
     """Make a shape whose axis runs from ``start`` to ``end`` (link frame, m, shape (3,) each, not the same)."""
     along = [float(b) - float(a) for a, b in zip(start, end, strict=True)]
     length = math.sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2])
+    if length == 0.0:  # the ends of a shape that is tiny beside its distance are rounded to one point
+        along, length = [0.0, 0.0, radius], radius
     centre = [0.5 * (float(a) + float(b)) for a, b in zip(start, end, strict=True)]
     return Shape(
         kind=kind,
