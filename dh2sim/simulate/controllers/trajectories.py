@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Final, TypeAlias
 
+import mujoco
 import numpy as np
 
 from dh2sim.errors import ControllerError
@@ -188,12 +189,63 @@ class Motion:
     a: Array
 
 
+_TRIES: Final = 20
+"""Draws of a waypoint; if links would touch on the way to each, the arm rests instead."""
+_LOOK: Final = 0.08
+"""rad or m: how far a joint moves at most between the places at which contacts are looked for."""
+
+
+def _clear_of_links(batch: RolloutBatch, targets: Array, center: Array, reach: Array, most: Array) -> Array:
+    """Return waypoints as ``follow`` does; a target is drawn again if links would touch on the way to it.
+
+    Args:
+        batch: The rollouts.
+        targets: As they were drawn, shape (motions, batch, n).
+        center: Centre of the window that they are drawn from, shape (batch, n).
+        reach: Half of its width, shape (n,).
+        most: Greatest distance between neighbouring waypoints, shape (n,).
+    """
+    waypoints = follow(batch.q0, targets, most)
+    model = batch.plant.model
+    if not (model.geom_contype.any() and model.geom_conaffinity.any()):
+        return waypoints
+    data = mujoco.MjData(model)
+    first = model.nq - batch.plant.n
+
+    def touches(start: Array, end: Array) -> bool:
+        looks = max(1, math.ceil(float(np.abs(end - start).max()) / _LOOK))
+        for k in range(1, looks + 1):
+            q = start + (k / looks) * (end - start)
+            data.qpos[first:] = q
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_collision(model, data)
+            if data.ncon:
+                return True
+        return False
+
+    for i, generator in enumerate(batch.generators):
+        again: np.random.Generator | None = None
+        for k in range(1, len(waypoints)):
+            before, target = waypoints[k - 1, i], targets[k - 1, i]
+            for _ in range(_TRIES):
+                waypoints[k, i] = before + np.clip(target - before, -most, most)
+                if not touches(before, waypoints[k, i]) or touches(before, before):  # or it could never leave
+                    break
+                # a stream of its own: a longer run, which draws more targets first, must begin alike
+                again = again or generator.spawn(1)[0]
+                target = center[i] + reach * again.uniform(-1.0, 1.0, size=len(target))
+            else:
+                waypoints[k, i] = before
+    return waypoints
+
+
 class SmoothReference:
     """Minimum-jerk motions from one random waypoint to the next, at rest in each.
 
     The first waypoint is where the rollout starts. The others are uniform in a window around it, ``amplitude`` times
     the joint's range wide, or as near to it as the limits allow. A waypoint that could not be reached within the
-    velocity limit is moved closer. Every motion stays between its two waypoints, so that nothing leaves the limits.
+    velocity limit is moved closer; one is drawn again if links would touch on the way to it, and if they do on all of
+    twenty ways, the arm rests. Every motion stays between its two waypoints, so that nothing leaves the limits.
     """
 
     def __init__(self, batch: RolloutBatch, *, period: float, amplitude: float) -> None:
@@ -223,7 +275,7 @@ class SmoothReference:
         targets = center + reach * uniform(batch.generators, self._motions, plant.n)
         # no joint exceeds its velocity limit, even where a start outside the limits makes the way longer
         most = INSIDE * plant.velocity * period / MINIMUM_JERK_PEAK
-        self._waypoints = follow(batch.q0, targets, most)
+        self._waypoints = _clear_of_links(batch, targets, center, reach, most)
         self._ahead = Motion(q=np.empty((0, 0, 0)), v=np.empty((0, 0, 0)), a=np.empty((0, 0, 0)))
         self._ahead_first = -1
 

@@ -1,7 +1,10 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
+from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,9 +12,11 @@ from hypothesis import strategies as st
 
 from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import RobotSpec
+from dh2sim.simulate import rollout
 from dh2sim.simulate.controllers.trajectories import SmoothReference
 from dh2sim.typing import Array
 from tests.simulate.controllers.samples import arm, make, started
+from tests.simulate.robots import worm
 from tests.strategies import robot_specs
 
 STEPS = 1300
@@ -101,3 +106,20 @@ def test_a_motion_that_time_steps_cannot_show_is_refused(name: str) -> None:
     message = f"controller '{name}': option 'period' must be at least 10 time steps, 0.02 s, got 0.01 s"
     with pytest.raises(ControllerError, match=f"^{re.escape(message)}$"):
         make(f"{name}:period=0.01", arm())
+
+
+def test_links_do_not_touch_along_a_reference(tmp_path: Path) -> None:
+    path = tmp_path / "run.zarr"
+    how: dict[str, Any] = {"rollouts": 12, "steps": 60, "timestep": 0.02, "start": "random", "seed": 5}
+    run = rollout(worm(), controller="computed-torque:amplitude=1,period=0.4", record="reference", out=path, **how)
+    model = mujoco.MjModel.from_xml_string(run.attrs["mjcf"])
+    data = mujoco.MjData(model)
+    travelled = 0.0
+    for reference in run.qpos_ref.values:
+        travelled += float(np.abs(np.diff(reference, axis=0)).sum())
+        for q in reference:
+            data.qpos[:] = q
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_collision(model, data)
+            assert data.ncon == 0
+    assert travelled > 12.0
