@@ -181,7 +181,7 @@ def test_a_simulation_that_mujoco_gives_up_on_is_an_error_of_its_own(controller:
     )
     job = prepare(robots.worm(), options)
     # too little memory for the contacts that come
-    mjcf = job.mjcf.replace("<worldbody>", '<size memory="9K"/><worldbody>')
+    mjcf = job.mjcf.replace("<worldbody>", '<size memory="18K"/><worldbody>')
     assert mjcf != job.mjcf
     found = simulate_block(replace(job, plant=compile_plant(mjcf, robots.worm())), range(4))
     assert set(found["status"].tolist()) == {STATUS["error"]}

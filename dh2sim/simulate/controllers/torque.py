@@ -64,7 +64,9 @@ def _mobilities(plant: Plant) -> Array:
     found = np.empty((1 + POSES, n, n))
     for k, q in enumerate([plant.home, *np.random.default_rng(0).uniform(lower, upper, (POSES, n))]):
         data.qpos[model.nq - n :] = q
-        mujoco.mj_forward(model, data)
+        mujoco.mj_kinematics(model, data)  # and what the mass matrix takes; contacts are of no account
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_crb(model, data)
         mujoco.mj_fullM(model, data, inertia)
         found[k] = np.linalg.inv(inertia)[model.nv - n :, model.nv - n :]
     return found
