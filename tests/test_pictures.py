@@ -47,7 +47,7 @@ def test_camera_frames_the_whole_robot(robot: str) -> None:
     )
     assert done.returncode == 0, done.stderr
     share, top, bottom, left, right, contrast, background = (float(word) for word in done.stdout.split())
-    assert 0.02 < share < 0.5, "the robot fills a good part of the picture"
+    assert 0.015 < share < 0.5, "the robot fills a good part of the picture"
     assert top > 2, "and is cut off nowhere"
     assert bottom < 237
     assert left > 2

@@ -81,7 +81,8 @@ def test_several_robots_are_simulated_one_after_the_other() -> None:
     run = dh2sim("validate", "scara", "rpr", "--samples", "3", "--dynamics", "--json", "-")
     assert run.status == 0
     report = json.loads(run.out)
-    assert [len(robot["engines"]) for robot in report["robots"]] == [24, 24]
+    for robot in report["robots"]:  # PyBullet is not everywhere
+        assert len([entry for entry in robot["engines"] if entry["engine"] != "pybullet"]) == 24
 
 
 def test_the_help_tells_of_it() -> None:

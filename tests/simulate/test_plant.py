@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -108,10 +109,16 @@ def test_arrays_cannot_be_written() -> None:
         assert not getattr(made, name).flags.writeable
 
 
-def test_gains_are_those_that_position_actuators_would_have() -> None:
+def test_gains_make_each_joint_a_critically_damped_oscillator_without_a_payload() -> None:
     made = plant(controller="pd")
-    assert made.kp.tolist() == [joint.actuator.kp for joint in model("odd").moving_joints]
-    assert made.kv.tolist() == [joint.actuator.kv for joint in model("odd").moving_joints]
+    data = mujoco.MjData(made.model)
+    data.qpos[:] = made.home
+    mujoco.mj_forward(made.model, data)
+    M = np.empty((made.model.nv, made.model.nv))
+    mujoco.mj_fullM(made.model, data, M)
+    inertia = np.diag(M)
+    assert np.allclose(made.kp, inertia * 100.0**2, rtol=6e-3)
+    assert np.allclose(made.kv, 2 * np.sqrt(made.kp * inertia), rtol=6e-3)
     assert (made.kp > 0.0).all()
 
 

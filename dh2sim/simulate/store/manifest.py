@@ -289,6 +289,9 @@ def _array_problem(name: str, node: Any) -> str | None:
         return "its files are named in another way"
     if not is_known(node["data_type"], node.get("codecs")):
         return "other types or codecs than those of dh2sim"
+    fill = node.get("fill_value")
+    if fill not in ("", "NaN", 0, -1) or isinstance(fill, bool):
+        return f"its fill value is {shown(fill)}"
     return None
 
 

@@ -27,7 +27,7 @@ ROUNDING = 1e-12
 MOMENTUM_TOLERANCE = 1e-9
 """Of the sum of all links' momenta."""
 MOMENTUM_STARTS = 2
-MOMENTUM_SUBSTEPS = 256
+MOMENTUM_SUBSTEPS = 1024
 
 
 def check_energy(model: RobotModel, compiled: mujoco.MjModel, *, seed: int = 0) -> Check:
