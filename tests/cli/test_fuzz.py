@@ -96,7 +96,8 @@ def _run(*command: str) -> None:
         assert run.err or not command, "bad input is printed"
 
 
-lenient = settings(max_examples=120, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+EXAMPLES = 2 * settings.default.max_examples
+lenient = settings(max_examples=EXAMPLES, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 
 
 @lenient
@@ -112,7 +113,7 @@ def test_no_command_line_makes_a_traceback(command: str, rest: list[str]) -> Non
     _run(command, *rest)
 
 
-@settings(lenient, max_examples=60)
+@settings(lenient, max_examples=EXAMPLES // 2)
 @given(arguments)
 @example(["small.yaml", "--json", ""])
 @example(["small.yaml", "--json", ".", "--junit", "-"])
