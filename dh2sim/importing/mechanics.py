@@ -20,6 +20,8 @@ CONFIGURATIONS = 20
 SEED = 0
 LEAST = 1e-3
 """Lower bound of forces and roots of inertias that errors are relative to, as a share of the greatest."""
+NO_LOAD = 1e-6
+"""Forces below this share of the greatest inertia times 9.81 are rounding, as in an arm that moves on a plane."""
 TOLERANCE = 1e-6
 """Relative; larger differences are reported. Numbers of a robot file are rounded to 1e-9 m."""
 
@@ -48,7 +50,8 @@ def relative_errors(found: tuple[Array, Array], source: tuple[Array, Array]) -> 
     diagonal = np.sqrt(np.maximum(np.einsum("kii->ki", mass_0), 0.0))
     diagonal = np.maximum(diagonal, LEAST * diagonal.max())
     force = np.abs(load_0).max(axis=0)
-    force = np.maximum(force, LEAST * max(force.max(), np.abs(load).max()))
+    rounding = NO_LOAD * 9.81 * float(np.square(diagonal).max())
+    force = np.maximum(force, max(LEAST * max(force.max(), np.abs(load).max()), rounding))
     of_mass = np.abs(mass - mass_0) / (diagonal[:, :, None] * diagonal[:, None, :])
     return of_mass.max(axis=2), np.abs(load - load_0) / np.where(force > 0.0, force, 1.0)
 

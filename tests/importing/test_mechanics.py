@@ -82,3 +82,12 @@ def test_the_command_says_where_masses_had_to_be_estimated(tmp_path: Path) -> No
     run = dh2sim("import", path, "--out", tmp_path / "made.yaml")
     assert run.status == 0
     assert "The mass matrix differs from the file's by up to " in " ".join(run.err.split())
+
+
+def test_rounding_of_an_arm_without_loads_is_no_difference() -> None:
+    mass, load = np.array([[[20.0, 0.0], [0.0, 0.8]]]), np.array([[0.0, 1e-18]])
+    by_mass, by_load = relative_errors((mass, np.array([[3e-14, 1e-15]])), (mass, load))
+    assert by_mass.max() == 0.0
+    assert by_load.max() < 1e-6
+    _, by_load = relative_errors((mass, np.array([[0.2, 0.0]])), (mass, load))
+    assert by_load.max() > 1e-6
