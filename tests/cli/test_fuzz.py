@@ -96,7 +96,7 @@ def _run(*command: str) -> None:
         assert run.err or not command, "bad input is printed"
 
 
-EXAMPLES = 2 * settings.default.max_examples
+EXAMPLES = 2 * settings().max_examples
 lenient = settings(max_examples=EXAMPLES, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 
 

@@ -99,7 +99,7 @@ def test_flips_fixed_rows_and_mixed_conventions_come_back_as_plain_rows(suffix: 
     assert _off_by(spec, again) < 1e-12
 
 
-@settings(max_examples=min(40, settings.default.max_examples))
+@settings(max_examples=min(40, settings().max_examples))
 @given(spec=robot_specs(max_rows=8))
 def test_any_robot_comes_back_from_a_urdf(spec: RobotSpec, tmp_path_factory: pytest.TempPathFactory) -> None:
     model = build_model(spec)

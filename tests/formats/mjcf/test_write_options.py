@@ -51,7 +51,7 @@ def test_the_integrator_reaches_mujoco(name: str, number: int) -> None:
     assert compiled.opt.integrator == number
 
 
-@settings(max_examples=min(50, settings.default.max_examples))
+@settings(max_examples=min(50, settings().max_examples))
 @given(st.floats(1e-12, 1.0))
 def test_the_timestep_reaches_mujoco_as_the_same_double(timestep: float) -> None:
     compiled = mujoco.MjModel.from_xml_string(to_mjcf(model("planar_2r"), MjcfOptions(timestep=timestep)))
