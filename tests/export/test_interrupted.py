@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import random
-import re
 import signal
 import subprocess
 import sys
@@ -133,9 +132,7 @@ def test_an_interruption_while_the_program_starts_is_no_traceback(tmp_path: Path
         # before the program listens, and after it is done, the signal itself ends the process
         assert process.returncode in (0, 130, -signal.SIGINT)
         if process.returncode == 130:
-            # MuJoCo imports glfw, which asks a process of its own for its version, and that one may report its end
-            foreign = re.compile(r'Traceback .*\n  File "<string>", line \d+, in <module>\nEOFError: .*\n')
-            assert foreign.sub("", stderr) == "dh2sim: interrupted\n"
+            assert stderr == "dh2sim: interrupted\n"
 
 
 def test_an_interruption_that_whoever_started_the_program_ignores_is_ignored(tmp_path: Path) -> None:
