@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib.util
 import io
 import os
 import signal
@@ -42,6 +43,22 @@ def _prepare_imports() -> None:
     """
     gc.set_threshold(100_000)
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    _prepare_glfw()
+
+
+def _prepare_glfw() -> None:
+    """Name glfw's own library to glfw, which MuJoCo imports.
+
+    Otherwise it asks a Python process of its own for the library's version, which takes its time, and on Ctrl-C reports
+    its end with a traceback.
+    """
+    found = importlib.util.find_spec("glfw")
+    if found is None or found.origin is None:
+        return
+    variant = "wayland" if os.environ.get("XDG_SESSION_TYPE") == "wayland" else "x11"
+    library = os.path.join(os.path.dirname(found.origin), variant, "libglfw.so")
+    if "PYGLFW_LIBRARY_VARIANT" not in os.environ and os.path.exists(library):
+        os.environ.setdefault("PYGLFW_LIBRARY", library)
 
 
 def _prepare_streams() -> None:

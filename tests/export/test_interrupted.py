@@ -119,6 +119,20 @@ def test_an_interruption_during_a_long_validation_is_heeded_at_once(tmp_path: Pa
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="elsewhere glfw comes without libraries to choose from"
+)
+def test_an_export_starts_no_other_process_that_an_interruption_could_hit(tmp_path: Path) -> None:
+    listening = (
+        'import sys; sys.addaudithook(lambda event, _: event == "subprocess.Popen" and print("STARTED", event))'
+    )
+    process = _start("-c", f"{listening}\n{STARTED}", "export", "stanford", "--out", tmp_path)
+    out, stderr = process.communicate(timeout=60)
+    assert (process.returncode, stderr) == (0, "")
+    assert "stanford.xml" in out
+    assert "STARTED" not in out
+
+
 @pytest.mark.slow
 def test_an_interruption_while_the_program_starts_is_no_traceback(tmp_path: Path) -> None:
     rng = random.Random(0)
