@@ -49,8 +49,8 @@ def _prepare_imports() -> None:
 def _prepare_glfw() -> None:
     """Name glfw's own library to glfw, which MuJoCo imports.
 
-    Otherwise it asks a Python process of its own for the library's version, which takes its time, and on Ctrl-C reports
-    its end with a traceback.
+    Otherwise it starts another Python process to find out the library's version, which takes its time, and which
+    prints a traceback on Ctrl-C.
     """
     found = importlib.util.find_spec("glfw")
     if found is None or found.origin is None:
