@@ -163,7 +163,7 @@ def test_units_become_metres_and_the_up_axis_z(axis: str, turn: list[list[int]])
         ("<p>0 0", "<p>9 0", "<triangles> refers to a vertex that is not there"),
         ("<p>0 0", "<p>-1 0", "<triangles> refers to a vertex that is not there"),
         ("<p>0 0", "<p>0.5 0", "<p> holds what is no index"),
-        ("<p>0 0", "<p>x 0", "<p> holds what is no number"),
+        ("<p>0 0", "<p>x 0", "<p> contains something that is not a number"),
         ('count="5" stride="3"', 'count="5" stride="4"', "<source> has fewer positions than it says"),
         ('count="5" stride="3"', 'count="5" stride="2"', "of fewer than three numbers"),
         ('semantic="VERTEX"', 'semantic="V"', "<triangles> has no <input> of its vertices"),

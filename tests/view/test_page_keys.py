@@ -60,7 +60,7 @@ def test_keys_typed_into_a_field_move_nothing(serve: Serve) -> None:
     page.keyboard.type("147rfvgGyhn")
     wait_until(lambda: "147rfvgGyhn" in served.state.table.rows[1].cells[1], "the cell")
     assert served.state.q[1:] == pytest.approx(home[1:], abs=1e-12)
-    assert served.state.table.errors, "it is no number, and the robot is the one of before"
+    assert served.state.table.errors, "it is not a number, and the robot is unchanged"
 
 
 @pytest.mark.slow
