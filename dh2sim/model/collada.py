@@ -284,7 +284,9 @@ def _numbers(element: ElementTree.Element | None) -> Array:
         try:
             return np.fromstring(text, sep=" ") if text.strip() else np.zeros(0)
         except (DeprecationWarning, ValueError):
-            raise ValueError(f"<{'' if element is None else element.tag}> contains something that is not a number") from None
+            raise ValueError(
+                f"<{'' if element is None else element.tag}> contains something that is not a number"
+            ) from None
 
 
 def _indices(element: ElementTree.Element | None) -> _Indices:
