@@ -26,7 +26,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests that drive a browser by the fixture that they use."""
+    """Mark the tests that drive a browser by the fixture that they use; one that fails is run once more.
+
+    A browser that draws in software beside another test may miss a deadline; what is wrong fails twice.
+    """
     for item in items:
         if "browser" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.browser)
+            item.add_marker(pytest.mark.flaky(reruns=1))

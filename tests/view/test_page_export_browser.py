@@ -234,8 +234,10 @@ def test_a_rollout_moves_the_robot_in_the_page(puma: RobotModel, tab: Tab, tmp_p
     clock = tab.page.locator("input").first
     clock.wait_for()
     stop(tab, clock)
+    clock.fill("0.1")
+    away = orange(tab.picture_when(robot_is_seen))
     clock.fill("0.01")
-    tab.picture_when(robot_is_seen)
+    tab.picture_when(lambda seen: (orange(seen) != away).mean() > 0.005)
     first = orange(tab.picture_at_rest())
     clock.fill("0.1")
     later = orange(tab.picture_when(lambda seen: (orange(seen) != first).mean() > 0.005))

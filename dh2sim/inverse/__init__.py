@@ -1,0 +1,1 @@
+"""Inverse kinematics: the configurations that reach a pose, every branch of them."""
