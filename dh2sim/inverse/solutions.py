@@ -1,0 +1,64 @@
+"""What inverse kinematics returns: the configurations that reach a pose, and what is known of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from dh2sim.typing import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Curve:
+    """Configurations that all reach the pose: a family with one parameter, followed from one of them."""
+
+    q: Array
+    """Points of the curve in order, rad and m, shape (m, n); angles go on without jumps."""
+    kind: str
+    """What moves, in the words of textbooks: wrist singularity, self-motion, ..."""
+    closed: bool
+    """Whether the curve comes back to its first point, angles modulo whole turns."""
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.q)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solutions:
+    """The configurations that reach one pose, the nearest to what was asked for first."""
+
+    q: Array
+    """Joint vectors, rad and m, shape (k, n)."""
+    residual: Array
+    """How far each is from the pose by the table's textbook product, shape (k,): the distance over the arm's reach or
+    the angle, whichever is larger; only what the goal asks for counts."""
+    sigma_min: Array
+    """Least singular value of the goal's Jacobian, with lengths in units of the arm's reach, shape (k,)."""
+    within_limits: Array
+    """Whether each keeps the robot's position limits, bool, shape (k,)."""
+    branch: tuple[str, ...]
+    """Name of each one's branch, '' where no name applies."""
+    complete: bool
+    """Whether every isolated solution is here, as far as trials can show."""
+    found_share: float = 1.0
+    """Share of trial configurations that the solver found again when it was built."""
+    curves: tuple[Curve, ...] = ()
+    """Families of solutions, which are not isolated."""
+    notes: tuple[str, ...] = ()
+    """What else there is to say, in sentences."""
+    reason: str = field(default="")
+    """Why there is no solution, as a phrase: ``out of reach by 0.12 m``; empty where there is one."""
+
+    def __len__(self) -> int:
+        """Return the number of configurations."""
+        return len(self.q)
+
+    def __iter__(self) -> Iterator[Array]:
+        """Yield the joint vectors, each of shape (n,)."""
+        return iter(self.q)
+
+    @property
+    def best(self) -> Array | None:
+        """The first joint vector, shape (n,): the nearest to ``q0``; None where there is no solution."""
+        return self.q[0] if len(self.q) else None
