@@ -30,6 +30,7 @@ COMMANDS: Final = {
     "validate": Command("validate", "validate", "Check every engine against the table."),
     "fk": Command("fk", "fk", "Print the pose of a frame.", NEGATIVE_NUMBERS),
     "jacobian": Command("fk", "jacobian", "Print the Jacobian, and how close it is to singular.", NEGATIVE_NUMBERS),
+    "symbolic": Command("symbolic", "symbolic", "Print kinematics in symbols, as a textbook does."),
     "info": Command("info", "info", "Print the table, frames, mass and reach."),
     "view": Command("view", "view", "Show a robot in the browser, and edit its table."),
     "import": Command("importing", "import_robot", "Make a robot file from a URDF, an MJCF or a table."),
@@ -55,6 +56,7 @@ Examples:
   dh2sim validate stanford           check every engine against the table
   dh2sim fk stanford 17 -40 0.5 63 34 -23
   dh2sim jacobian stanford home
+  dh2sim symbolic puma560            its pose in symbols
   dh2sim view stanford --export stanford.html
   dh2sim import arm.urdf -o arm.yaml
   dh2sim convert stanford --to modified

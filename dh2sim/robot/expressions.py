@@ -15,8 +15,8 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple, TypeAlias
+from collections.abc import Callable, Collection, Mapping
+from typing import Final, Generic, NamedTuple, Protocol, Self, TypeAlias, TypeVar
 
 from dh2sim.messages import did_you_mean, listed, shown
 
@@ -63,6 +63,39 @@ class ExpressionError(ValueError):
     """A text that is not an arithmetic expression, or has no finite real value."""
 
 
+class Operand(Protocol):
+    """What expressions compute with."""
+
+    def __add__(self, other: Self, /) -> Self: ...
+    def __sub__(self, other: Self, /) -> Self: ...
+    def __mul__(self, other: Self, /) -> Self: ...
+    def __truediv__(self, other: Self, /) -> Self: ...
+    def __neg__(self) -> Self: ...
+
+
+Value = TypeVar("Value", bound=Operand)
+
+
+class Arithmetic(Protocol[Value]):
+    """What the pieces of an expression stand for: floats, or anything else that can be added and multiplied."""
+
+    def number(self, text: str) -> Value:
+        """Return what a number stands for."""
+
+    def name(self, name: str) -> Value:
+        """Return what a name stands for.
+
+        Raises:
+            KeyError: There is no such name.
+        """
+
+    def call(self, function: str, arguments: list[Value]) -> Value:
+        """Return the value of one of ``FUNCTIONS``, of as many arguments as it takes."""
+
+    def power(self, base: Value, exponent: Value) -> Value:
+        """Return ``base ** exponent``."""
+
+
 class _Token(NamedTuple):
     kind: str
     text: str
@@ -85,9 +118,9 @@ def evaluate(text: str, names: Mapping[str, float]) -> float:
     Raises:
         ExpressionError: With a message that says what is wrong, fit for a user.
     """
+    doubles = _Doubles(names)
     try:
-        parser = _Parser(_tokens(text), names)
-        value = parser.whole()
+        value = _Parser(_tokens(text), doubles, names).whole()
     except ExpressionError as error:
         raise (error if _NAME.fullmatch(text.strip()) else _within(text, error)) from None
     except ZeroDivisionError:
@@ -96,11 +129,45 @@ def evaluate(text: str, names: Mapping[str, float]) -> float:
         raise _within(text, "the result is too large") from None
     except ValueError:
         raise _within(text, "a function has no real value there") from None
-    if parser.used_unknown_value:
+    if doubles.used_unknown_value:
         return math.nan
     if not math.isfinite(value):
         raise _within(text, "the result is too large")
     return value
+
+
+def evaluate_in(text: str, arithmetic: Arithmetic[Value]) -> Value:
+    """Return the value of an expression in an arithmetic of one's own.
+
+    Raises:
+        ExpressionError: The text is not an expression.
+    """
+    return _Parser(_tokens(text), arithmetic, ()).whole()
+
+
+class _Doubles:
+    """Floats, as Python computes with them."""
+
+    def __init__(self, names: Mapping[str, float]) -> None:
+        self.used_unknown_value = False
+        self._names = names
+
+    def number(self, text: str) -> float:
+        return float(text)
+
+    def name(self, name: str) -> float:
+        value = CONSTANTS[name] if name in CONSTANTS else self._names[name]
+        self.used_unknown_value |= math.isnan(value)
+        return value
+
+    def call(self, function: str, arguments: list[float]) -> float:
+        return FUNCTIONS[function][1](*arguments)
+
+    def power(self, base: float, exponent: float) -> float:
+        result: float | complex = base**exponent
+        if isinstance(result, complex):
+            raise ExpressionError("a negative number has no real power of a fraction")
+        return result
 
 
 def names_in(text: str) -> tuple[str, ...]:
@@ -143,17 +210,17 @@ def _tokens(text: str) -> _Tokens:
     return tokens
 
 
-class _Parser:
+class _Parser(Generic[Value]):
     """Reads tokens from the left and computes as it goes."""
 
-    def __init__(self, tokens: _Tokens, names: Mapping[str, float]) -> None:
-        self.used_unknown_value = False
+    def __init__(self, tokens: _Tokens, arithmetic: Arithmetic[Value], names: Collection[str]) -> None:
         self._tokens = tokens
+        self._arithmetic = arithmetic
         self._names = names
         self._position = 0
         self._depth = 0
 
-    def whole(self) -> float:
+    def whole(self) -> Value:
         """Return the value of all tokens."""
         value = self._sum()
         if self._next is not _END:
@@ -179,21 +246,21 @@ class _Parser:
         hint = "; write a decimal point as ." if self._next.text == "," else ""
         return ExpressionError(f"unexpected {shown(self._next.text)}{after}{hint}")
 
-    def _sum(self) -> float:
+    def _sum(self) -> Value:
         value = self._term()
         while operator := self._take("+", "-"):
             right = self._term()
             value = value + right if operator == "+" else value - right
         return value
 
-    def _term(self) -> float:
+    def _term(self) -> Value:
         value = self._factor()
         while operator := self._take("*", "/"):
             right = self._factor()
             value = value * right if operator == "*" else value / right
         return value
 
-    def _factor(self) -> float:
+    def _factor(self) -> Value:
         self._depth += 1
         if self._depth > MAX_DEPTH:
             raise ExpressionError(f"nested deeper than {MAX_DEPTH} levels")
@@ -202,20 +269,17 @@ class _Parser:
         self._depth -= 1
         return -value if sign == "-" else value
 
-    def _power(self) -> float:
+    def _power(self) -> Value:
         value = self._primary()
         if self._take("**") is None:
             return value
-        result: float | complex = value ** self._factor()
-        if isinstance(result, complex):
-            raise ExpressionError("a negative number has no real power of a fraction")
-        return result
+        return self._arithmetic.power(value, self._factor())
 
-    def _primary(self) -> float:
+    def _primary(self) -> Value:
         token = self._next
         if token.kind == "number":
             self._position += 1
-            return float(token.text)
+            return self._arithmetic.number(token.text)
         if token.kind == "name":
             self._position += 1
             return self._call(token.text) if self._take("(") else self._name(token.text)
@@ -226,25 +290,23 @@ class _Parser:
             return value
         raise self._unexpected()
 
-    def _name(self, name: str) -> float:
+    def _name(self, name: str) -> Value:
         if name in FUNCTIONS:
             raise ExpressionError(f"'{name}' is a function; write {name}(...)")
         if name.casefold() in ("nan", "inf", "infinity") and name not in self._names:
             raise ExpressionError(f"{shown(name)} is not a finite number")
         try:
-            value = CONSTANTS[name] if name in CONSTANTS else self._names[name]
+            return self._arithmetic.name(name)
         except KeyError:
             hint = did_you_mean(name, itertools.chain(CONSTANTS, FUNCTIONS, self._names))
             known = listed(itertools.chain(CONSTANTS, self._names))
             raise ExpressionError(f"unknown name {shown(name)}.{hint} Known names: {known}") from None
-        self.used_unknown_value |= math.isnan(value)
-        return value
 
-    def _call(self, name: str) -> float:
+    def _call(self, name: str) -> Value:
         if name not in FUNCTIONS:
             hint = did_you_mean(name, FUNCTIONS)
             raise ExpressionError(f"unknown function {shown(name)}.{hint} Functions: {listed(FUNCTIONS)}")
-        count, function = FUNCTIONS[name]
+        count, _ = FUNCTIONS[name]
         arguments = [self._sum()]
         while self._take(","):
             arguments.append(self._sum())
@@ -253,7 +315,7 @@ class _Parser:
         if len(arguments) != count:
             takes = "1 argument" if count == 1 else f"{count} arguments"
             raise ExpressionError(f"'{name}' takes {takes}, found {len(arguments)}")
-        return function(*arguments)
+        return self._arithmetic.call(name, arguments)
 
 
 class NumberError(ValueError):

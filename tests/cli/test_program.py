@@ -25,6 +25,7 @@ COMMANDS = (
     "validate",
     "fk",
     "jacobian",
+    "symbolic",
     "info",
     "view",
     "import",

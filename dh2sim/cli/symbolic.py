@@ -1,0 +1,90 @@
+"""``dh2sim symbolic``: the table in symbols."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dh2sim.cli.common import RobotArgument, choice, load_all
+from dh2sim.cli.output import hand_over, require_free
+from dh2sim.symbolic.expression import Lengths, Style
+from dh2sim.symbolic.request import What, symbolic_form
+from dh2sim.symbolic.table import Fold
+
+
+class Format(StrEnum):
+    """How a form is written."""
+
+    TEXT = "text"
+
+
+def symbolic(
+    robot: RobotArgument,
+    what: Annotated[str, typer.Option(metavar="WHAT", help=f"{', '.join(What)}.")] = "pose",
+    source: Annotated[
+        str, typer.Option("--from", metavar="FRAME", help="Frame that the pose is given in.")
+    ] = "base_link",
+    target: Annotated[
+        str, typer.Option("--to", metavar="FRAME", help="tool0, base_link, dh_0 … dh_n or link_1 … link_n.")
+    ] = "tool0",
+    style: Annotated[
+        str, typer.Option(metavar="STYLE", help="Nested from the 'base' or from the 'tool', or 'expanded'.")
+    ] = "base",
+    lengths: Annotated[
+        str | None,
+        typer.Option(metavar="PLACE", help="Lengths 'first' or 'last' in products. [default: first with tool]"),
+    ] = None,
+    names: Annotated[bool, typer.Option("--names/--no-names", help="Name sums that recur #1, #2, …")] = True,
+    numbers: Annotated[bool, typer.Option("--numbers", help="Numbers instead of the file's parameters.")] = False,
+    letters: Annotated[bool, typer.Option("--letters", help="Letters a1, d1, … for lengths, too.")] = False,
+    fold: Annotated[
+        str,
+        typer.Option(metavar="AXES", help="Add up angles across 'parallel' axes, 'all' (antiparallel too), 'none'."),
+    ] = "parallel",
+    no_fold: Annotated[bool, typer.Option("--no-fold", help="The same as --fold none.")] = False,
+    q: Annotated[bool, typer.Option("--q", help="Call all joint coordinates q_i.")] = False,
+    as_: Annotated[str, typer.Option("--as", metavar="FORMAT", help=f"{', '.join(Format)}.")] = "text",
+    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write to a file.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
+) -> None:
+    """Print a robot's kinematics in symbols, as a textbook does.
+
+    Parameters of the robot file stay letters; every expression is compared with the table before it is printed.
+
+    \b
+    Examples:
+      dh2sim symbolic puma560
+      dh2sim symbolic stanford --style tool
+      dh2sim symbolic puma560 --from dh_3 --to dh_6
+      dh2sim symbolic scara --what matrices
+    """
+    wanted = choice(what, What, "--what")
+    format_ = choice(as_, Format, "--as")
+    nested = choice(style, Style, "--style")
+    place = choice(lengths, Lengths, "--lengths")
+    axes = Fold.NONE if no_fold else choice(fold, Fold, "--fold")
+    assert wanted is not None
+    assert nested is not None
+    assert axes is not None
+    require_free(out, force=force)
+    [spec] = load_all([robot])
+    form = symbolic_form(
+        spec,
+        wanted,
+        source=source,
+        target=target,
+        style=nested,
+        lengths=place,
+        names=names,
+        numbers=numbers,
+        letters=letters,
+        fold=axes,
+        joint_names="q" if q else "theta",
+    )
+    match format_:
+        case _:
+            text = f"{spec.name}: {form}\n"
+    hand_over(text, out, summary=f"{spec.name}: {wanted} as {format_}", quiet=out is None)

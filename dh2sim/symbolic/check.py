@@ -1,0 +1,141 @@
+"""Forms compared with the oracle at random configurations, before anybody sees them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from dh2sim.errors import MismatchError
+from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses, table_tool_pose
+from dh2sim.robot.spec import Convention
+from dh2sim.symbolic.angles import slide_row, trig_of
+from dh2sim.symbolic.expression import Sum, evaluated
+from dh2sim.symbolic.form import Form
+from dh2sim.symbolic.polynomial import Atom
+from dh2sim.symbolic.table import SymbolicTable
+from dh2sim.typing import Array
+
+SAMPLES: Final = 20
+TOLERANCE: Final = 1e-13
+"""Of entries without a unit; times the reach for lengths."""
+
+
+class SampledConfigurations:
+    """Random configurations of a robot, and what atoms and frames are there."""
+
+    def __init__(self, table: SymbolicTable, samples: int = SAMPLES, seed: int = 0) -> None:
+        self.table = table
+        spec = table.spec
+        self._metre = spec.units.metres(1.0)
+        rows = spec.moving_rows
+        lengths = [abs(v) for row in spec.rows for v in (row.a, row.d)]
+        lengths += [abs(v) for pose in (spec.base.pose, spec.tool.pose) for v in pose.xyz.tolist()]
+        self.reach = max(math.fsum(lengths), self._metre)
+        """Sum of the lengths of the table, m, and how far slides are moved."""
+        random = np.random.default_rng(seed)
+        shares = random.uniform(-1.0, 1.0, (samples, len(rows)))
+        scale = np.array([math.pi if row.type.turns else self.reach for row in rows])
+        self.q: Array = shares * scale
+        """rad and m, shape (samples, n)."""
+
+    def values(self, atoms: Iterable[Atom]) -> dict[Atom, Any]:
+        """Return what atoms are: lengths in the file's unit, arrays of shape (samples,)."""
+        column = {row: self.q[:, k] for k, row in enumerate(self.table.moving)}
+        letters = self.table.letters
+        result: dict[Atom, Any] = {}
+        for atom in atoms:
+            trig, row = trig_of(atom), slide_row(atom)
+            if trig is not None:
+                angle: Any = math.radians(trig.angle.degrees)
+                for i, n in trig.angle.coordinates:
+                    angle = angle + float(n) * column[i]
+                for name, n in trig.angle.names:
+                    angle = angle + float(n) * letters[name].value
+                result[atom] = np.cos(angle) if trig.function == "cos" else np.sin(angle)
+            elif row is not None:
+                result[atom] = column[row] / self._metre
+            elif atom in letters:
+                result[atom] = letters[atom].value
+        return result
+
+    def pose(self, source: str, target: str) -> Array:
+        """Return the oracle's pose of a frame in another, lengths in the file's unit, shape (samples, 4, 4)."""
+        T_source, T_target = self._in_base(source), self._in_base(target)
+        R = T_source[:, :3, :3].transpose(0, 2, 1)
+        pose = np.zeros_like(T_target)
+        pose[:, :3, :3] = R @ T_target[:, :3, :3]
+        pose[:, :3, 3] = np.einsum("nij,nj->ni", R, T_target[:, :3, 3] - T_source[:, :3, 3]) / self._metre
+        pose[:, 3, 3] = 1.0
+        return pose
+
+    def _in_base(self, frame: str) -> Array:
+        spec = self.table.spec
+        if frame == "base_link":
+            return np.broadcast_to(np.eye(4), (len(self.q), 4, 4))
+        if frame == "tool0":
+            return table_tool_pose(spec, self.q)
+        poses = table_frame_poses(spec, self.q)
+        kind, _, number = frame.rpartition("_")
+        i = int(number)
+        if kind == "dh":
+            return poses[:, i]
+        return self._joint_frame(poses, i)
+
+    def _joint_frame(self, poses: Array, i: int) -> Array:
+        """Return the frame of link i: DH frame i, or where row i's joint part leads to."""
+        from dataclasses import replace
+
+        row = self.table.spec.rows[i - 1]
+        if row.convention is Convention.MODIFIED:
+            return poses[:, i]
+        joint = replace(row, a=0.0, alpha=0.0, beta=0.0)
+        moving = self.table.moving
+        q = self.q[:, moving.index(i)] if i in moving else np.zeros(len(self.q))
+        return poses[:, i - 1] @ row_matrix(joint, q).transpose(2, 0, 1)
+
+
+def check_form(form: Form, expected: Mapping[str, Array], configurations: SampledConfigurations) -> float:
+    """Compare the equations of a form with numbers.
+
+    Args:
+        form: What is to be shown.
+        expected: For names of equations, arrays of shape (samples, rows, columns).
+        configurations: Where they hold.
+
+    Returns:
+        The largest difference, as a share of the largest number in the equation, or of the reach.
+
+    Raises:
+        MismatchError: A difference is larger than 1e-13.
+    """
+    atoms = {atom for sum_ in [*form.sums, *form.named.values()] for atom in atoms_of(sum_)}
+    values = configurations.values(atoms)
+    worst = 0.0
+    for equation in form.equations:
+        wanted = expected[equation.name]
+        rows, columns = len(equation.entries), len(equation.entries[0])
+        found = np.empty(wanted.shape)
+        for k, value in enumerate(evaluated(equation.flat, form.named, values)):
+            found[:, k // columns, k % columns] = value
+        assert wanted.shape[1:] == (rows, columns)
+        scale = max(1.0, float(np.abs(wanted).max()))
+        error = float(np.abs(found - wanted).max()) / scale
+        if not error <= TOLERANCE:
+            raise MismatchError(
+                f"{form.table.spec.name}: {equation.name} in symbols differs from the table by {error:.2g} of its "
+                "size; nothing is printed"
+            )
+        worst = max(worst, error)
+    return worst
+
+
+def atoms_of(sum_: Sum) -> set[Atom]:
+    """Return the atoms and names of an expression."""
+    found: set[Atom] = set()
+    for term in sum_.terms:
+        for base, _ in term.factors:
+            found |= atoms_of(base) if isinstance(base, Sum) else {base}
+    return found

@@ -1,0 +1,75 @@
+"""What is printed: matrices of expressions with the sums that they name, and what their letters mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from dh2sim.symbolic.expression import Named, Nesting, Sum, name_sums
+from dh2sim.symbolic.polynomial import Atom, Matrix
+from dh2sim.symbolic.table import SymbolicTable
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equation:
+    """A named matrix of expressions; a scalar has one row of one."""
+
+    name: str
+    """Such as ``T_0_6``, ``A_2``, ``J``, ``M``, ``det J``."""
+    entries: tuple[tuple[Sum, ...], ...]
+    meaning: str = ""
+    """Such as 'pose of tool0 in base_link'."""
+    entry_names: tuple[tuple[str, ...], ...] = ()
+    """What entries are called where they are printed one by one; empty for a scalar."""
+    columns: tuple[str, ...] = ()
+    """What columns stand for."""
+
+    @property
+    def flat(self) -> list[Sum]:
+        """All entries, row by row."""
+        return [entry for row in self.entries for entry in row]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Form:
+    """Kinematics or dynamics of a robot in symbols, as printers need it."""
+
+    what: str
+    """``pose``, ``matrices``, ``jacobian`` or ``dynamics``."""
+    table: SymbolicTable = field(repr=False)
+    equations: tuple[Equation, ...]
+    named: Named = field(default_factory=dict)
+    """Sums that occur several times, by their names #1, #2, …"""
+    notes: tuple[str, ...] = ()
+    """Sentences to print below."""
+    joint_names: str = "theta"
+    """What coordinates of turning rows are called: ``theta`` or ``q``."""
+
+    @property
+    def sums(self) -> list[Sum]:
+        """All entries of all equations."""
+        return [entry for equation in self.equations for entry in equation.flat]
+
+
+def equation(name: str, matrix: Matrix, nesting: Nesting, **details: Any) -> Equation:
+    """Return a matrix of polynomials as an equation, nested."""
+    return Equation(name=name, entries=tuple(tuple(nesting(entry) for entry in row) for row in matrix), **details)
+
+
+def with_names(equations: Sequence[Equation], *, names: bool) -> tuple[tuple[Equation, ...], Mapping[Atom, Sum]]:
+    """Return equations with the sums that recur in them named, if that is wanted."""
+    if not names:
+        return tuple(equations), {}
+    named, sums = name_sums([entry for equation in equations for entry in equation.flat])
+    rest = iter(sums)
+    return tuple(
+        Equation(
+            name=equation.name,
+            entries=tuple(tuple(next(rest) for _ in row) for row in equation.entries),
+            meaning=equation.meaning,
+            entry_names=equation.entry_names,
+            columns=equation.columns,
+        )
+        for equation in equations
+    ), named

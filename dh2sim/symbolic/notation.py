@@ -1,0 +1,59 @@
+"""How atoms, numbers and products are written: what text, LaTeX and code have in common and where they differ."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Protocol
+
+from dh2sim.symbolic.expression import Sum
+from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
+
+
+class Notation(Protocol):
+    """Writes the parts of an expression."""
+
+    times: str
+    """Between the factors of a product."""
+
+    def atom(self, atom: Atom) -> str:
+        """Return an atom, or the name of a sum."""
+
+    def number(self, number: Rational) -> str:
+        """Return a number that is not negative."""
+
+    def power(self, base: str, exponent: int) -> str:
+        """Return ``base`` to a power greater than 1; a sum comes in parentheses."""
+
+    def parenthesized(self, text: str) -> str:
+        """Return a sum as a factor."""
+
+
+def written(sum_: Sum, notation: Notation) -> str:
+    """Return an expression; spaces are around the plus and minus signs between terms, and nowhere else."""
+    text = ""
+    for term in sum_.terms:
+        factors = []
+        for base, power in term.factors:
+            factor = notation.parenthesized(written(base, notation)) if isinstance(base, Sum) else notation.atom(base)
+            factors.append(factor if power == 1 else notation.power(factor, power))
+        number = magnitude(term.number)
+        if number != 1 or not factors:
+            factors.insert(0, notation.number(number))
+        body = notation.times.join(factors)
+        if text:
+            text += f" - {body}" if term.number < 0 else f" + {body}"
+        else:
+            text = f"-{body}" if term.number < 0 else body
+    return text or notation.number(0)
+
+
+def decimal(number: Rational) -> str | None:
+    """Return a number as a decimal fraction if it is one with at most 17 digits behind the point, else None."""
+    fraction = Fraction(number)
+    for digits in range(18):
+        scaled = fraction * 10**digits
+        if scaled.denominator == 1:
+            text = str(abs(scaled.numerator)).rjust(digits + 1, "0")
+            sign = "-" if fraction < 0 else ""
+            return f"{sign}{text[: len(text) - digits]}.{text[len(text) - digits :]}" if digits else f"{sign}{text}"
+    return None

@@ -1,0 +1,98 @@
+"""The one description of what is asked for in symbols, with its defaults."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from dh2sim.messages import member
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.symbolic.expression import Lengths, Style
+from dh2sim.symbolic.form import Equation, Form
+from dh2sim.symbolic.kinematics import matrices_form, pose_form
+from dh2sim.symbolic.table import Fold, symbolic_table
+from dh2sim.symbolic.text import form_text
+
+
+class What(StrEnum):
+    """What can be had in symbols."""
+
+    POSE = "pose"
+    MATRICES = "matrices"
+
+
+@dataclass(frozen=True, eq=False)
+class SymbolicForm:
+    """Kinematics or dynamics of a robot in symbols, compared with numbers; ``str`` gives it as text."""
+
+    form: Form
+
+    @property
+    def equations(self) -> tuple[Equation, ...]:
+        """The matrices, in nested expressions."""
+        return self.form.equations
+
+    def __str__(self) -> str:
+        """Return the form as text, at most 80 characters wide where that is possible."""
+        return form_text(self.form)
+
+
+def symbolic_form(
+    spec: RobotSpec,
+    what: What | str = "pose",
+    *,
+    source: str = "base_link",
+    target: str = "tool0",
+    style: Style | str = "base",
+    lengths: Lengths | str | None = None,
+    names: bool = True,
+    numbers: bool = False,
+    letters: bool = False,
+    fold: Fold | str = "parallel",
+    joint_names: str = "theta",
+) -> SymbolicForm:
+    """Return the kinematics of a robot in symbols, compared with its table at random configurations.
+
+    Args:
+        spec: The robot.
+        what: 'pose': a frame in another one; 'matrices': the transform of every row and every DH frame in frame 0.
+        source: Frame that a pose is given in.
+        target: Frame whose pose it is.
+        style: 'base': nested from the base, as textbooks print it; 'tool': nested from the tool, as computer
+            algebra does; 'expanded': sums of products.
+        lengths: 'first' (outside) or 'last' (inside); by default first with style 'tool', else last.
+        names: Whether sums that recur are named #1, #2, …
+        numbers: Whether parameters of the robot file are numbers instead of letters.
+        letters: Whether lengths that are plain numbers get letters too: a1, d1, …
+        fold: Across which axes angles are added up: 'parallel', 'all' (antiparallel ones too) or 'none'.
+        joint_names: 'theta', with d_i for slides, or 'q'.
+
+    Returns:
+        The form; ``str`` gives it as text.
+
+    Raises:
+        UnknownFrameError: There is no such frame.
+        MismatchError: The form differs from the table by more than 1e-13 of the reach.
+        Dh2simError: An argument has a value that is not allowed.
+    """
+    table = symbolic_table(spec, letters=letters, numbers=numbers)
+    style_ = member(Style, style, "style")
+    lengths_ = None if lengths is None else member(Lengths, lengths, "lengths")
+    fold_ = member(Fold, fold, "fold")
+    match member(What, what, "form"):
+        case What.POSE:
+            form = pose_form(
+                table,
+                source,
+                target,
+                style=style_,
+                lengths=lengths_,
+                names=names,
+                fold=fold_,
+                joint_names=joint_names,
+            )
+        case What.MATRICES:
+            form = matrices_form(
+                table, style=style_, lengths=lengths_, names=names, fold=fold_, joint_names=joint_names
+            )
+    return SymbolicForm(form)

@@ -1,0 +1,243 @@
+"""Forms as plain text for a terminal: matrices in columns where they fit, entry by entry where they do not."""
+
+from __future__ import annotations
+
+import math
+import re
+import textwrap
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from dh2sim.symbolic.angles import Angle, slide_row, trig_of
+from dh2sim.symbolic.expression import Sum
+from dh2sim.symbolic.form import Equation, Form
+from dh2sim.symbolic.notation import decimal, written
+from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
+from dh2sim.symbolic.table import Letter, SymbolicTable
+
+WIDTH: Final = 80
+_TALLEST: Final = 4
+"""Lines that a row of a matrix may take in columns."""
+
+
+class TextNotation:
+    """Writes c1, s23 for cosines and sines, d3 for the coordinate of a sliding row."""
+
+    times = "*"
+
+    def __init__(self, table: SymbolicTable, joint_names: str = "theta") -> None:
+        """``joint_names`` is 'theta', with sliding coordinates d_i, or 'q'."""
+        self._joint = joint_names
+        self._taken = set(table.letters)
+        self._separator = "_" if len(table.spec.rows) > 9 else ""
+
+    def atom(self, atom: Atom) -> str:
+        """Return an atom as it is called."""
+        row = slide_row(atom)
+        if row is not None:
+            return self.coordinate(row, turns=False)
+        trig = trig_of(atom)
+        if trig is None:
+            return atom
+        if trig.angle.is_constant:
+            return f"{trig.function}({self.angle(trig.angle)})"
+        return self.short(trig.function[0], trig.angle)
+
+    def short(self, letter: str, angle: Angle) -> str:
+        """Return c12 for plain sums of coordinates, c(1-2) for other angles."""
+        if self.is_plain(angle):
+            name = letter + self._separator.join(str(row) for row, _ in angle.coordinates)
+            if name not in self._taken:
+                return name
+        return f"{letter}({angle})"
+
+    @staticmethod
+    def is_plain(angle: Angle) -> bool:
+        """Whether an angle is a sum of coordinates and nothing else."""
+        return not angle.names and not angle.degrees and all(n == 1 for _, n in angle.coordinates)
+
+    def coordinate(self, row: int, *, turns: bool) -> str:
+        """Return what the coordinate of a row is called."""
+        if turns:
+            return f"{self._joint}_{row}"
+        name = f"d{row}" if self._joint == "theta" else f"q{row}"
+        for candidate in (name, f"q{row}", f"q_{row}"):
+            if candidate not in self._taken:
+                return candidate
+        return f"{name}_"
+
+    def angle(self, angle: Angle) -> str:
+        """Return an angle in full."""
+        parts = [(self.coordinate(row, turns=True), n) for row, n in angle.coordinates] + list(angle.names)
+        text = ""
+        for name, n in parts:
+            body = name if abs(n) == 1 else f"{self.number(magnitude(n))}*{name}"
+            text += (f" {'-' if n < 0 else '+'} " if text else "-" if n < 0 else "") + body
+        if angle.degrees:
+            text += f"{' + ' if text else ''}{self.number(angle.degrees)}°"
+        return text
+
+    def number(self, number: Rational) -> str:
+        """Return a decimal fraction, or a quotient."""
+        return decimal(number) or str(number)
+
+    def power(self, base: str, exponent: int) -> str:
+        """Return a power."""
+        return f"{base}^{exponent}"
+
+    def parenthesized(self, text: str) -> str:
+        """Return a sum as a factor."""
+        return f"({text})"
+
+
+def form_text(form: Form, width: int = WIDTH) -> str:
+    """Return a form as text that is at most ``width`` characters wide; what has no sum to wrap at may be wider."""
+    notation = TextNotation(form.table, form.joint_names)
+    blocks = ["\n".join(_equation_lines(equation, notation, width)) for equation in form.equations]
+    if form.named:
+        lines = [line for name, sum_ in form.named.items() for line in _assignment(name, sum_, notation, width)]
+        blocks.append("\n".join(["with", *lines]))
+    legend = "\n".join(legend_lines(form, notation, width))
+    if legend:
+        blocks.append(legend)
+    blocks += ["\n".join(_filled(note, width)) for note in form.notes]
+    return "\n\n".join(blocks)
+
+
+def legend_lines(form: Form, notation: TextNotation, width: int = WIDTH) -> Iterator[str]:
+    """Yield lines that say what cosines, coordinates and letters mean."""
+    atoms = {base for sum_ in [*form.sums, *form.named.values()] for base in _bases(sum_) if not base.startswith("#")}
+    angles = {trig.angle for trig in map(trig_of, atoms) if trig is not None}
+    moving = sorted((a for a in angles if not a.is_constant), key=lambda a: (a.coordinates, a.names, a.degrees))
+    items = []
+    if moving:
+        plain = [a for a in moving if notation.is_plain(a)]
+        if plain:
+            example = max(plain, key=lambda a: len(a.coordinates))
+            c, text = notation.short("c", example), notation.angle(example)
+            items += [f"{c} = cos({text})", f"{notation.short('s', example)} = sin({text})"]
+        items += [f"{notation.short('c', a)} = cos({notation.angle(a)})" for a in moving if not notation.is_plain(a)]
+    items += [letter_text(letter, form.table) for letter in used_letters(form.table, atoms)]
+    yield from _listed(items, width)
+
+
+def used_letters(table: SymbolicTable, atoms: set[Atom]) -> list[Letter]:
+    """Return the letters that atoms have, in the order of the table."""
+    used = atoms | {name for trig in map(trig_of, atoms) if trig is not None for name, _ in trig.angle.names}
+    return [letter for name, letter in table.letters.items() if name in used]
+
+
+def letter_text(letter: Letter, table: SymbolicTable) -> str:
+    """Return what a letter stands for: ``a2 = 0.4318 m``."""
+    definition = f" = {letter.definition}" if letter.definition else ""
+    if letter.kind == "angle":
+        return f"{letter.name}{definition} = {math.degrees(letter.value):.10g}°"
+    unit = f" {table.unit.value}" if letter.kind == "length" else ""
+    return f"{letter.name}{definition} = {letter.value:.12g}{unit}"
+
+
+def _bases(sum_: Sum) -> Iterator[Atom]:
+    for term in sum_.terms:
+        for base, _ in term.factors:
+            if isinstance(base, Sum):
+                yield from _bases(base)
+            else:
+                yield base
+
+
+def _equation_lines(equation: Equation, notation: TextNotation, width: int) -> Iterator[str]:
+    """Yield a heading and a matrix, or an equation for each entry."""
+    cells = [[written(entry, notation) for entry in row] for row in equation.entries]
+    if not equation.entry_names:
+        yield from _wrapped(f"{equation.name} = ", cells[0][0], width, indent="")
+        return
+    yield f"{equation.name} =" if not equation.meaning else f"{equation.name}, {equation.meaning}"
+    grid = matrix_lines(cells, width)
+    if grid is not None:
+        yield from grid
+        return
+    label = max(len(name) for row in equation.entry_names for name in row)
+    for names, row in zip(equation.entry_names, cells, strict=False):
+        for name, cell in zip(names, row, strict=True):
+            if not name:
+                continue
+            yield from _wrapped(f"{name:{label}} = ", cell, width)
+
+
+def matrix_lines(cells: Sequence[Sequence[str]], width: int) -> list[str] | None:
+    """Return a matrix in columns, entries wrapped between terms; None where it would not fit or be too tall."""
+    columns = list(zip(*cells, strict=True))
+    room = width - 6 - 3 * (len(columns) - 1)
+    least = [max(max(map(len, pieces(cell))) for cell in column) for column in columns]
+    whole = [max(map(len, column)) for column in columns]
+    if sum(least) > room:
+        return None
+    widths = list(least)
+    for lines in range(1, _TALLEST + 1):
+        wanted = [
+            next(w for w in range(low, high + 1) if all(len(_filled_cell(cell, w)) <= lines for cell in column))
+            if any(len(_filled_cell(cell, low)) > lines for cell in column)
+            else low
+            for column, low, high in zip(columns, least, whole, strict=True)
+        ]
+        if sum(wanted) <= room:
+            widths = wanted
+            break
+    else:
+        return None
+    result = []
+    tall = any(len(_filled_cell(cell, w)) > 1 for row in cells for cell, w in zip(row, widths, strict=True))
+    for k, row in enumerate(cells):
+        parts = [_filled_cell(cell, w) for cell, w in zip(row, widths, strict=True)]
+        height = max(map(len, parts))
+        if tall and k:
+            result.append(f"  [ {' ' * (sum(widths) + 3 * (len(widths) - 1))} ]")
+        for line in range(height):
+            texts = [part[line] if line < len(part) else "" for part in parts]
+            body = "   ".join(f"{text:<{w}}" for text, w in zip(texts, widths, strict=True))
+            result.append(f"  [ {body} ]")
+    return result
+
+
+def pieces(text: str) -> list[str]:
+    """Return an expression cut before every sign between terms."""
+    return re.split(r" (?=[+-] )", text)
+
+
+def _filled_cell(text: str, width: int) -> list[str]:
+    """Return an expression in lines, cut between terms."""
+    lines: list[str] = []
+    for piece in pieces(text):
+        if lines and len(lines[-1]) + 1 + len(piece) <= width:
+            lines[-1] += f" {piece}"
+        else:
+            lines.append(piece)
+    return lines
+
+
+def _assignment(name: str, sum_: Sum, notation: TextNotation, width: int) -> Iterator[str]:
+    yield from _wrapped(f"{name} = ", written(sum_, notation), width)
+
+
+def _wrapped(head: str, text: str, width: int, indent: str = "  ") -> Iterator[str]:
+    """Yield an assignment in lines, cut between terms."""
+    first, *rest = _filled_cell(text, width - len(indent) - len(head))
+    yield f"{indent}{head}{first}"
+    for line in rest:
+        yield " " * (len(indent) + len(head)) + line
+
+
+def _listed(items: Sequence[str], width: int) -> Iterator[str]:
+    """Yield items in lines, separated by commas and broken between them where that is possible."""
+    line = ""
+    for item in items:
+        if line and len(line) + len(item) + 3 > width:
+            yield line + ","
+            line = ""
+        line += f", {item}" if line else item
+    if line:
+        yield line
+
+
+def _filled(text: str, width: int) -> list[str]:
+    return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False)
