@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
-from dh2sim.errors import Dh2simError, ImportedFileError, MissingExtraError, Problem
+from dh2sim.errors import ImportedFileError, MissingExtraError, Problem
 from dh2sim.extras import require_extra
 from dh2sim.formats.xml_read import Element, XmlReport, parse_xml
+from dh2sim.limited_process import WorkerError, ask_worker
 from dh2sim.messages import shown
 
 DEFINITIONS: Final = ("property", "arg", "macro")
@@ -21,10 +20,9 @@ _EXPANDED: Final = ("link", "joint", "material")
 """Elements of a robot whose attributes xacro fills in; others may keep ``$(...)`` for other programs."""
 
 
-TIME_LIMIT: Final = 60
-"""Seconds for an expansion."""
-
-
+TIME_LIMIT: Final = 20
+"""Seconds of processor time for an expansion."""
+_WORKER: Final = "dh2sim.formats.xacro_worker"
 NO_LINK: Final = "the file has no <link>, only definitions for xacro; import a file that uses them"
 
 
@@ -130,7 +128,12 @@ def expand(data: bytes, *, file: str, path: Path, root: Path | None, arguments: 
         "allowed": "the file's folder" if root is None else str(root),
         "arguments": dict(arguments),
     }
-    answer = _answer(request, file)
+    try:
+        answer = json.loads(ask_worker(_WORKER, json.dumps(request).encode(), seconds=TIME_LIMIT))
+    except WorkerError as error:
+        raise ImportedFileError(
+            [Problem(file=file, line=1, column=1, path="", message=f"xacro cannot expand the file: {error}")]
+        ) from None
     if "problems" in answer:
         raise ImportedFileError(Problem(**problem) for problem in answer["problems"])
     places = [(str(name), int(line), int(column)) for name, line, column in answer["places"]]
@@ -138,25 +141,3 @@ def expand(data: bytes, *, file: str, path: Path, root: Path | None, arguments: 
     if robot.first("link") is None:
         raise XmlReport(file).failure(robot, "", NO_LINK)
     return Expanded(robot, tuple(answer["messages"]))
-
-
-def _answer(request: dict[str, Any], file: str) -> dict[str, Any]:
-    """Return the worker's answer."""
-    environment = {key: os.environ[key] for key in ("SYSTEMROOT", "TEMP", "LANG") if key in os.environ}
-    environment["PYTHONPATH"] = os.pathsep.join(folder for folder in sys.path if folder)
-    try:
-        done = subprocess.run(
-            [sys.executable, "-m", "dh2sim.formats.xacro_worker"],
-            input=json.dumps(request).encode(),
-            capture_output=True,
-            timeout=TIME_LIMIT,
-            env=environment,
-            check=False,
-        )
-        answer: dict[str, Any] = json.loads(done.stdout)
-    except subprocess.TimeoutExpired:
-        raise Dh2simError(f"{file}: xacro took longer than {TIME_LIMIT} seconds, and was stopped") from None
-    except ValueError:
-        reason = f"exit status {done.returncode}" if done.returncode >= 0 else f"stopped by signal {-done.returncode}"
-        raise Dh2simError(f"{file}: xacro needed too much time or memory, or failed ({reason})") from None
-    return answer

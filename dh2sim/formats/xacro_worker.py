@@ -1,8 +1,8 @@
-"""Expands xacro in a process of its own, which ``dh2sim.formats.xacro`` starts: a request in JSON in, an answer out.
+"""Expands xacro in a process of its own (``dh2sim.limited_process``): a request in JSON in, an answer in JSON out.
 
 xacro evaluates Python expressions, and its own checks let some of them reach all of Python (a comprehension, or
 ``$(eval open(...))``). So here every expression is checked as a syntax tree, files are read below one folder only,
-environment variables are not seen, and the process may neither write files nor start others, nor grow without bound.
+environment variables are not seen, and the process may not start others.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import json
 import os
 import re
 import stat
-import sys
 from collections import deque
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -29,10 +28,6 @@ from dh2sim.formats.mesh_paths import package_name
 from dh2sim.formats.xml_read import MAX_BYTES, parse_xml, tolerated
 from dh2sim.messages import did_you_mean, listed, shown
 
-MAX_MEMORY: Final = 2_000_000_000
-"""Bytes."""
-MAX_CPU: Final = 60
-"""Seconds."""
 MAX_FOLDERS: Final = 20_000
 """Searched for packages."""
 MAX_MESSAGES: Final = 20
@@ -330,34 +325,17 @@ def _place_of(error: BaseException) -> tuple[str, int, int] | None:
     return found
 
 
-def _limit() -> None:
-    """Allow the process neither to write files, nor to start others, nor to grow without bound."""
+def answer(request: bytes) -> bytes:
+    """Expand the xacro file of a request; environment variables and other processes are out of reach meanwhile."""
+    asked = json.loads(request)
     try:
-        import resource
-    except ImportError:  # on Windows; the parent's time limit remains
-        return
-    for what, most in (("AS", MAX_MEMORY), ("CPU", MAX_CPU), ("FSIZE", 0), ("NPROC", 0), ("CORE", 0)):
-        with contextlib.suppress(ValueError, OSError):
-            limit = getattr(resource, f"RLIMIT_{what}")
-            hard = resource.getrlimit(limit)[1]
-            resource.setrlimit(limit, (most, most) if hard == resource.RLIM_INFINITY else (min(most, hard), hard))
-
-
-def main() -> None:
-    """Answer the request on standard input."""
-    request = json.load(sys.stdin)
-    answers, sys.stdout = sys.stdout, sys.stderr
-    try:
-        expansion = _Expansion(request)
+        expansion = _Expansion(asked)
     except _ForbiddenError as error:
-        problem = {"file": request["file"], "line": 1, "column": 1, "path": "xacro", "message": str(error)}
-        json.dump({"problems": [problem]}, answers)
-        return
+        problem = {"file": asked["file"], "line": 1, "column": 1, "path": "xacro", "message": str(error)}
+        return json.dumps({"problems": [problem]}).encode()
     os.environ.clear()
-    _limit()
-    json.dump(expansion.answer(), answers)
-    answers.flush()
+    with contextlib.suppress(ImportError, ValueError, OSError):  # not on Windows
+        import resource
 
-
-if __name__ == "__main__":
-    main()
+        resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))
+    return json.dumps(expansion.answer()).encode()

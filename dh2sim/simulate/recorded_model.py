@@ -1,4 +1,4 @@
-"""The model in a run's attributes, compiled.
+"""The model in a run's attributes, compiled in a process of its own.
 
 A run may come from a stranger. What dh2sim writes into a run reads no file and is of moderate size, so nothing else
 is given to MuJoCo: elements that are not on the list, attributes that name files, and huge pictures are refused.
@@ -12,7 +12,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from dh2sim.errors import RunError
+from dh2sim.errors import ModelError, RunError
+from dh2sim.formats.mjcf.compile import compile_text
 from dh2sim.messages import shown
 from dh2sim.robot.fields import name_problem
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     import mujoco
 
 MOST_BYTES: Final = 16 * 2**20
-LARGEST: Final = 16384
+LARGEST: Final = 8192
 """Pixels along a side of a texture, a shadow map or the off-screen buffer."""
 _ELEMENTS: Final = frozenset(
     """mujoco compiler option flag default joint freejoint site geom inertial body worldbody asset material texture
@@ -52,8 +53,6 @@ def recorded_model(attributes: Mapping[str, Any], *, scene: bool = False) -> muj
     Raises:
         RunError: There is none, it is not one as dh2sim writes them, or MuJoCo refuses it.
     """
-    import mujoco
-
     missing = [name for name in ("robot", "mjcf", "scene") if not isinstance(attributes.get(name), str)]
     if missing:
         raise RunError(f"the attribute '{missing[0]}' is missing, so there is no model to show")
@@ -66,11 +65,10 @@ def recorded_model(attributes: Mapping[str, Any], *, scene: bool = False) -> muj
             raise RunError(f"the model in the run's attributes is not one that dh2sim wrote: {name} {problem}")
     try:
         if scene:
-            return mujoco.MjModel.from_xml_string(attributes["scene"], {own: attributes["mjcf"].encode()})
-        return mujoco.MjModel.from_xml_string(attributes["mjcf"])
-    except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise RunError(f"MuJoCo refuses the model in the run's attributes: {reason}") from error
+            return compile_text(attributes["scene"], {own: attributes["mjcf"]})
+        return compile_text(attributes["mjcf"], {})
+    except ModelError as error:
+        raise RunError(f"MuJoCo refuses the model in the run's attributes: {error}") from error
 
 
 def _problems(text: str, *, included: str) -> Iterator[str]:

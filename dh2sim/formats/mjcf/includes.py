@@ -57,8 +57,10 @@ def refused(file: str, line: int, message: str) -> ImportedFileError:
 
 
 MAX_FILES: Final = 200
-MAX_ELEMENTS: Final = 200_000
-"""After includes, attachments and repetitions."""
+MAX_ELEMENTS: Final = 10_000
+"""After includes, attachments and repetitions; MuJoCo's time to read them grows with the square of their number."""
+MAX_POINTS: Final = 4_000_000
+"""Of a height field."""
 MAX_NESTING: Final = 510
 """Elements, through all includes. MuJoCo's own limit in one file is 500."""
 MAX_MODELS: Final = 10
@@ -224,6 +226,11 @@ class _Model:
                 total += self._attached.get(element.attributes.get("model", ""), 0)
             case "flexcomp" if "file" in element.attributes:
                 self._check_inside(element)  # MuJoCo opens it while it reads the text
+            case "hfield":
+                rows, columns = (_whole(element.attributes.get(name, "0")) for name in ("nrow", "ncol"))
+                if rows * columns > MAX_POINTS:
+                    message = f"a height field of {rows} x {columns} points; at most {MAX_POINTS} are read"
+                    raise self._failure(element, message)
         for child in element.children:
             total += self._count(child)
         if element.tag == "replicate":
@@ -286,12 +293,22 @@ class _Model:
 
 
 def _own_count(element: Element) -> int:
-    """Return the number of parts that MuJoCo makes of an element itself, such as a soft body or a built-in mesh."""
-    if element.tag in ("flexcomp", "composite"):
-        return _product(element.attributes.get("count", "1"))
-    if element.tag == "mesh" and "builtin" in element.attributes:
-        return _product(element.attributes.get("params", "1")) // 100 + 1
-    return 1
+    """Return how many elements MuJoCo's work on an element itself is worth.
+
+    A node of a soft body is a body with three joints; a chain of n bodies costs as much as n² / 16 elements side by
+    side, and so does a built-in mesh of n by n vertices.
+    """
+    match element.tag:
+        case "flexcomp":
+            return 4 * _product(element.attributes.get("count", "1"))
+        case "composite":
+            count = _product(element.attributes.get("count", "1"))
+            return count + count * count // 16
+        case "mesh" if "builtin" in element.attributes:
+            sizes = element.attributes.get("params", "1").split()[:2]
+            return 1 + max([_whole(size) ** 2 // 16 for size in sizes], default=0)
+        case _:
+            return 1
 
 
 def _product(text: str) -> int:

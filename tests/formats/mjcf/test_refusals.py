@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import random
 import re
+import struct
+import sys
 import warnings
 from functools import partial
 from pathlib import Path
@@ -13,7 +15,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from dh2sim import limited_process
 from dh2sim.errors import Dh2simError, ImportedFileError
+from dh2sim.formats.mjcf import compile as mjcf_compile
 from dh2sim.formats.mjcf import includes as mjcf_bytes
 from dh2sim.formats.mjcf.read import read_mjcf
 from tests.formats.mjcf.reading import BALL, arm_text, model_text, read_text
@@ -142,12 +146,97 @@ def test_models_that_attach_each_other_are_refused(tmp_path: Path) -> None:
 def test_repetitions_that_explode_are_refused(tmp_path: Path) -> None:
     text = model_text('<replicate count="1000"><replicate count="1000"><body/></replicate></replicate>')
     assert refused(tmp_path, text) == (
-        "robot.xml:1:35: replicate: this makes more than 200000 elements once it is expanded"
+        "robot.xml:1:35: replicate: this makes more than 10000 elements once it is expanded"
     )
     soft = model_text('<flexcomp name="f" type="grid" count="1000 1000 1000"/>')
-    assert "more than 200000 elements" in refused(tmp_path, soft)
+    assert "more than 10000 elements" in refused(tmp_path, soft)
     mesh = model_text(ARM, '<asset><mesh name="m" builtin="box" params="1000 1000 1000 1 1 1"/></asset>')
-    assert "more than 200000 elements" in refused(tmp_path, mesh)
+    assert "more than 10000 elements" in refused(tmp_path, mesh)
+
+
+FIELD = '<asset><hfield name="h" nrow="{0}" ncol="{0}" size="1 1 1 1"/></asset>'
+IN_THE_WORLD = '<geom type="hfield" hfield="h"/>'
+PIECE = '<geom type="capsule" size=".01"/>'
+CABLE = f'<composite type="cable" prefix="c" count="{{}} 1 1" curve="s" size="1">{PIECE}</composite>'
+GRID = '<flexcomp name="f" type="grid" count="{0} {0} {0}" dim="3" radius=".01" spacing=".1 .1 .1"/>'
+
+
+@pytest.mark.parametrize(
+    ("before", "inside", "reported"),
+    [
+        (
+            FIELD.format(46341),
+            IN_THE_WORLD,
+            "hfield: a height field of 46341 x 46341 points; at most 4000000 are read",
+        ),
+        (FIELD.format(2001), IN_THE_WORLD, "hfield: a height field of 2001 x 2001 points; at most 4000000 are read"),
+        ("", GRID.format(40), "flexcomp: this makes more than 10000 elements once it is expanded"),
+        ("", GRID.format(14), "flexcomp: this makes more than 10000 elements once it is expanded"),
+        ("", CABLE.format(1000), "composite: this makes more than 10000 elements once it is expanded"),
+        ("", CABLE.format(500), "composite: this makes more than 10000 elements once it is expanded"),
+        (
+            "",
+            '<replicate count="9999"><geom size="1"/></replicate>',
+            "replicate: this makes more than 10000 elements",
+        ),
+        (
+            '<asset><mesh name="m" builtin="supersphere" params="500 1 1"/></asset>',
+            '<geom type="mesh" mesh="m"/>',
+            "mesh: this makes more than 10000 elements once it is expanded",
+        ),
+    ],
+)
+def test_what_makes_mujoco_work_without_bound_is_refused_at_its_place(
+    before: str, inside: str, reported: str, tmp_path: Path
+) -> None:
+    text = model_text(ARM + inside, before)
+    found = refused(tmp_path, text)
+    assert re.match(r"robot\.xml:1:\d+: ", found)
+    assert reported in found
+
+
+@pytest.mark.parametrize(
+    ("before", "inside"),
+    [
+        (FIELD.format(100), IN_THE_WORLD),
+        ("", GRID.format(5)),
+        ("", CABLE.format(40)),
+        ("", '<replicate count="100"><geom size="1"/></replicate>'),
+        ('<asset><mesh name="m" builtin="supersphere" params="40 1 1"/></asset>', '<geom type="mesh" mesh="m"/>'),
+    ],
+)
+def test_such_parts_of_moderate_size_are_read(before: str, inside: str, tmp_path: Path) -> None:
+    assert read_text(tmp_path, model_text(ARM + inside, before), tip="one").chain.n == 1
+
+
+def test_a_huge_picture_of_a_height_field_is_not_opened(tmp_path: Path) -> None:
+    head = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 13000, 13000)
+    (tmp_path / "h.png").write_bytes(head + bytes(1000))
+    field = '<asset><hfield name="h" file="h.png" size="1 1 1 1"/></asset>'
+    robot = read_text(tmp_path, model_text(ARM + IN_THE_WORLD, field))
+    assert robot.chain.n == 1
+    assert not any("MuJoCo cannot use" in note for note in robot.notes)  # as it would, had it opened the file
+
+
+@pytest.mark.parametrize(
+    ("request_", "reason"),
+    [("loop", "it takes longer than 1 seconds"), ("abort", "it ended the process that read it (signal 6)")],
+)
+def test_a_model_that_mujoco_cannot_cope_with_is_refused_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request_: str, reason: str
+) -> None:
+    asked = partial(limited_process.ask_worker, "tests.hostile_worker", request_.encode(), seconds=1)
+    monkeypatch.setattr(mjcf_compile, "ask_worker", lambda _worker, _request: asked())
+    assert refused(tmp_path, model_text(ARM)) == f"robot.xml:1:1: MuJoCo cannot compile the file: {reason}"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux only")
+def test_a_model_that_takes_too_much_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = model_text(ARM + IN_THE_WORLD, FIELD.format(1500))
+    assert read_text(tmp_path, text).chain.n == 1
+    monkeypatch.setattr(limited_process, "MEMORY", 20_000_000)
+    found = refused(tmp_path, text)
+    assert found == "robot.xml:1:1: MuJoCo cannot compile the file: it needs more than 20 MB of memory"
 
 
 def test_attachments_that_explode_are_refused(tmp_path: Path) -> None:
@@ -157,7 +246,7 @@ def test_attachments_that_explode_are_refused(tmp_path: Path) -> None:
         inner = 8 * twice if i < 8 else 8 * "<body/>"
         (tmp_path / f"{i}.xml").write_text(model_text(f'<body name="b">{inner}</body>', asset if i < 8 else ""))
     text = '<mujoco><asset><model file="0.xml"/></asset></mujoco>'
-    assert "this makes more than 200000 elements once it is expanded" in refused(tmp_path, text)
+    assert "this makes more than 10000 elements once it is expanded" in refused(tmp_path, text)
 
 
 def test_elements_are_not_nested_deeper_through_includes(tmp_path: Path) -> None:
