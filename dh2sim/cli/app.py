@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from importlib import import_module
+from itertools import takewhile
 from typing import Annotated, Any, Final, NamedTuple
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
-from dh2sim.cli.common import guarded
+from dh2sim.cli.common import MANY, guarded
 
 
 class Command(NamedTuple):
@@ -19,6 +20,8 @@ class Command(NamedTuple):
     function: str
     help: str
     settings: dict[str, Any] = {}  # noqa: RUF012
+    many: tuple[str, ...] = ()
+    """Options that take all words up to the next option."""
 
 
 NEGATIVE_NUMBERS: Final = {"ignore_unknown_options": True}
@@ -30,6 +33,7 @@ COMMANDS: Final = {
     "validate": Command("validate", "validate", "Check every engine against the table."),
     "fk": Command("fk", "fk", "Print the pose of a frame.", NEGATIVE_NUMBERS),
     "jacobian": Command("fk", "jacobian", "Print the Jacobian, and how close it is to singular.", NEGATIVE_NUMBERS),
+    "ik": Command("ik", "ik", "Find all joint vectors that reach a pose.", many=("--at", "--near", "--lock")),
     "symbolic": Command("symbolic", "symbolic", "Print kinematics in symbols, as a textbook does."),
     "info": Command("info", "info", "Print the table, frames, mass and reach."),
     "view": Command("view", "view", "Show a robot in the browser, and edit its table."),
@@ -56,6 +60,7 @@ Examples:
   dh2sim validate stanford           check every engine against the table
   dh2sim fk stanford 17 -40 0.5 63 34 -23
   dh2sim jacobian stanford home
+  dh2sim ik puma560 --at 10 20 30 40 50 60     all ways to get there
   dh2sim symbolic puma560            its pose in symbols
   dh2sim view stanford --export stanford.html
   dh2sim import arm.urdf -o arm.yaml
@@ -86,7 +91,8 @@ class LazyGroup(TyperGroup):
         command = COMMANDS[cmd_name]
         single = _plain_app(add_completion=False)
         function = getattr(import_module(f"dh2sim.cli.{command.module}"), command.function)
-        single.command(cmd_name, context_settings={**_SETTINGS, **command.settings})(guarded(function))
+        settings = {**_SETTINGS, **command.settings}
+        single.command(cmd_name, cls=_taking_many(command.many), context_settings=settings)(guarded(function))
         return typer.main.get_command(single)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -110,6 +116,29 @@ class LazyGroup(TyperGroup):
         """List the commands without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, command.help) for name, command in COMMANDS.items()])
+
+
+def _taking_many(options: tuple[str, ...]) -> type[TyperCommand]:
+    """Return the class of a command some of whose options take all words up to the next option.
+
+    Negative numbers among them are no options. The command gets the words of an option as one text, with MANY between
+    them.
+    """
+
+    class TakingMany(TyperCommand):
+        def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+            given = list(args)
+            for start in reversed(range(len(given))):
+                if given[start] in options:
+                    words = list(takewhile(_is_value, given[start + 1 :]))
+                    given[start + 1 : start + 1 + len(words)] = [MANY.join(words)] if words else []
+            return super().parse_args(ctx, given)
+
+    return TakingMany if options else TyperCommand
+
+
+def _is_value(word: str) -> bool:
+    return not word.startswith("--") and word != "-h"
 
 
 _PLAIN: Final = {

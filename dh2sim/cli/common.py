@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from dh2sim.robot.spec import RobotSpec
 
 DONE, FELL_SHORT, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+MANY = "\0"
+"""Stands between the words of an option that takes several; no word can contain it."""
 MOST_ALIKE = 3
 """Notes of one kind that are printed of one file; reports in JSON list them all."""
 

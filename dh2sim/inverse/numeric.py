@@ -26,19 +26,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Final, Literal, TypeAlias
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dh2sim.inverse.goals import Free
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.skeleton import build_skeleton
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.typing import Array, read_only
-
-Free: TypeAlias = Literal["rotation", "roll"]
-"""What a goal leaves open: the whole orientation, or the roll about the frame's z."""
 
 SMALLEST_SIZE: Final = 1e-6
 """m; an arm with less only turns, and counts as of size 1 m."""
@@ -50,6 +48,8 @@ REACHED: Final = 1e-9
 """Error that counts as none."""
 STILL: Final = 1e-11
 """A slope of E below this share of its square root is zero."""
+FARTHEST: Final = 1e3
+"""Sizes of the arm: a goal farther away is as good as one there, in its direction."""
 LONGEST_STEP: Final = 0.7
 """Of a joint, rad or sizes of the arm."""
 KICK: Final = 0.1
@@ -196,23 +196,15 @@ class NumericSolver:
         return self._nearest(best, T, free)
 
     def _goals(self, T: Array, free: Free | None, lever: float) -> _Goals:
-        # a goal very far away is moved nearer along its direction, so that nothing overflows
-        p = T[:, :3, 3] / self.size
-        largest = np.abs(p).max(axis=1, initial=0.0, keepdims=True)
-        p = p * np.minimum(1.0, 1e3 / np.maximum(largest, 1e-300))
-        return _Goals(p=p, R=T[:, :3, :3], weights=lever**2 * np.array(_WEIGHTS[free]))
+        p, farthest = T[:, :3, 3], FARTHEST * self.size
+        far = np.maximum(np.abs(p).max(axis=1, keepdims=True), farthest)
+        return _Goals(p=p * (farthest / far) / self.size, R=T[:, :3, :3], weights=lever**2 * np.array(_WEIGHTS[free]))
 
     def _nearest(self, q: Array, T: Array, free: Free | None) -> Nearest:
         frames = self._frames(q)[-1]
-        x, y, z = (self.size * frames[:, :3, 3] - T[:, :3, 3]).T
-        position = np.hypot(np.hypot(x, y), z)  # the norm's squares would overflow
-        rotation = np.zeros(len(q))
-        if free is None:
-            rotation = rotation_angles(frames[:, :3, :3], T[:, :3, :3])
-        elif free == "roll":
-            axis, wanted = frames[:, :3, 2], T[:, :3, 2]
-            cosine = np.einsum("ni,ni->n", axis, wanted)
-            rotation = np.arctan2(np.linalg.norm(np.cross(axis, wanted), axis=1), cosine)
+        frames[:, :3, 3] *= self.size
+        position = goal_distances(frames, T)
+        rotation = goal_angles(frames, T, free)
         return Nearest(
             q=read_only(q * self._units),
             position_error=read_only(position),
@@ -309,6 +301,23 @@ class NumericSolver:
             before = np.matmul(before, steps[k], out=frames[k])
         np.matmul(before, self._links[-1], out=frames[-1])
         return frames
+
+
+def goal_distances(poses: Array, T: Array) -> Array:
+    """Return the distances of poses from goals, both of shape (N, 4, 4), shape (N,)."""
+    x, y, z = (poses[:, :3, 3] - T[:, :3, 3]).T
+    return np.asarray(np.hypot(np.hypot(x, y), z))  # a norm's squares would overflow
+
+
+def goal_angles(poses: Array, T: Array, free: Free | None) -> Array:
+    """Return the angles by which poses miss what goals ask for, both of shape (N, 4, 4); rad, shape (N,)."""
+    if free == "rotation":
+        return np.zeros(len(T))
+    if free == "roll":
+        axis, wanted = poses[:, :3, 2], T[:, :3, 2]
+        sine, cosine = np.linalg.norm(np.cross(axis, wanted), axis=1), np.einsum("ni,ni->n", axis, wanted)
+        return np.asarray(np.arctan2(sine, cosine))
+    return rotation_angles(poses[:, :3, :3], T[:, :3, :3])
 
 
 def rotation_angles(R_a: Array, R_b: Array) -> Array:

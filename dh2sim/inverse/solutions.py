@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dh2sim.typing import Array
 
 
@@ -35,7 +38,7 @@ class Solutions:
     the angle, whichever is larger; only what the goal asks for counts."""
     sigma_min: Array
     """Least singular value of the goal's Jacobian, with lengths in units of the arm's reach, shape (k,)."""
-    within_limits: Array
+    within_limits: NDArray[np.bool_]
     """Whether each keeps the robot's position limits, bool, shape (k,)."""
     branch: tuple[str, ...]
     """Name of each one's branch, '' where no name applies."""
@@ -49,6 +52,8 @@ class Solutions:
     """What else there is to say, in sentences."""
     reason: str = field(default="")
     """Why there is no solution, as a phrase: ``out of reach by 0.12 m``; empty where there is one."""
+    nearest: Array | None = None
+    """Where there is no solution: the nearest configuration that was found, rad and m, shape (n,)."""
 
     def __len__(self) -> int:
         """Return the number of configurations."""

@@ -26,6 +26,9 @@ OPTIONS = [
     "--json",
     "--junit",
     "--frame",
+    "--at",
+    "--xyz",
+    "--lock",
     "--degrees",
     "--help",
     "-h",
@@ -101,9 +104,11 @@ lenient = settings(max_examples=EXAMPLES, deadline=None, derandomize=True, suppr
 
 
 @lenient
-@given(st.sampled_from(["export", "fk", "info", "list", "schema", "nonsense", ""]), arguments)
+@given(st.sampled_from(["export", "fk", "ik", "info", "list", "schema", "nonsense", ""]), arguments)
 @example("fk", ["stanford", "--frame", "dh_٣"])
 @example("fk", ["stanford", "--", "--", "1"])
+@example("ik", ["rpr", "--xyz", "1", "-pi/2", "1e308"])
+@example("ik", ["rpr", "--at", "0.1", "-1e308", "3", "--lock", "x=", "=", "joint_1=1e400"])
 @example("export", ["small.yaml", "--out", "rich.yaml"])
 @example("export", ["small.yaml", "--out", "x" * 300])
 @example("export", ["small.yaml", "--out", ""])

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from dh2sim.inverse.numeric import Free, Nearest, NumericSolver
+from dh2sim.inverse.goals import Free
+from dh2sim.inverse.numeric import Nearest, NumericSolver
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import pose_from_rpy
