@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
+import pytest
 
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
@@ -24,6 +25,11 @@ ODD = math.radians(37.3)
 ROBOTS_DIR: Final = Path(__file__).parents[1] / "robots"
 
 NAMES: Final = tuple(sorted(path.stem for path in ROBOTS_DIR.glob("*.yaml")))
+
+KINDS: Final = frozenset({"franka_panda", "puma560", "scara", "ssrms", "stanford", "ur5e"})
+
+COSTLY_NAMES: Final = tuple(name if name in KINDS else pytest.param(name, marks=pytest.mark.slow) for name in NAMES)
+"""All robots, for tests that take long for each: the quick suite takes one of a kind."""
 
 
 @cache

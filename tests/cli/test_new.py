@@ -10,7 +10,14 @@ from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.spec import Convention
 from tests.program import Outcome, dh2sim
 
-JOINTS = ("R", "P", "C", "F", "RR", "PP", "PR", "RP", "RCF", "RRPRRR", "RPRRRRRRR")
+JOINTS = (
+    "R",
+    "P",
+    "F",
+    "RCF",
+    "RRPRRR",
+    *(pytest.param(j, marks=pytest.mark.slow) for j in ("C", "RR", "PP", "PR", "RP", "RPRRRRRRR")),
+)
 
 
 @pytest.fixture(autouse=True)

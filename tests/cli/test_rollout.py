@@ -230,7 +230,7 @@ def test_a_robot_that_does_not_move_has_nothing_to_simulate(folder: Path) -> Non
     ]
 
 
-@pytest.mark.parametrize("controller", ["sine", "pd"])
+@pytest.mark.parametrize("controller", ["sine", pytest.param("pd", marks=pytest.mark.slow)])
 def test_sixty_joints_are_no_trouble(controller: str, folder: Path) -> None:
     write(folder, snake(60))
     run = dh2sim("rollout", "snake.yaml", "--out", "run.zarr", *QUICK, "--threads", "999", "--controller", controller)

@@ -183,7 +183,9 @@ def test_an_interruption_while_it_starts_makes_no_traceback() -> None:
     [(signal.SIGINT, 130, "dh2sim: interrupted\n"), (signal.SIGTERM, 143, "")],
     ids=["SIGINT", "SIGTERM"],
 )
-@pytest.mark.parametrize("where", ["callback", "hook", "library"])
+@pytest.mark.parametrize(
+    "where", ["callback", *(pytest.param(name, marks=pytest.mark.slow) for name in ("hook", "library"))]
+)
 def test_a_signal_that_others_swallow_still_wakes_and_ends_the_viewer(
     where: str, kind: signal.Signals, status: int, message: str
 ) -> None:

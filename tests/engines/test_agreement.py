@@ -68,7 +68,7 @@ def test_frames_of_every_engine_are_where_the_table_says(name: str, folder: Path
     np.testing.assert_allclose(engine.frame_poses(q), table(built.spec, q), rtol=0, atol=1e-13)
 
 
-@settings(max_examples=10)
+@settings(max_examples=min(10, settings().max_examples))
 @given(robots_with_joint_vectors(max_rows=6, must_move=False))
 def test_frames_of_any_robot_in_every_engine_are_where_the_table_says(
     tmp_path_factory: pytest.TempPathFactory, drawn: tuple[RobotSpec, Array]

@@ -16,6 +16,7 @@ from dh2sim.robot.spec import BaseSpec, LinkSpec, Pose, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 from tests.formats.readers import body_poses, in_mujoco, site_poses
 from tests.sample_robots import (
+    COSTLY_NAMES,
     FIXED,
     HAYATI,
     MODIFIED,
@@ -54,14 +55,14 @@ def test_frames_of_both_formats_are_where_the_table_says(name: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=80)
+@settings(max_examples=min(80, settings().max_examples))
 @given(robots_with_joint_vectors(max_rows=12, must_move=False))
 def test_frames_of_any_robot_are_where_the_table_says(drawn: tuple[RobotSpec, Array]) -> None:
     spec, q = drawn
     assert_poses_are_the_tables(build_model(spec), q)
 
 
-@settings(max_examples=20)
+@settings(max_examples=min(20, settings().max_examples))
 @given(robot_specs(max_rows=12))
 def test_frames_of_any_robot_are_where_the_table_says_within_all_limits(spec: RobotSpec) -> None:
     built = build_model(spec)
@@ -69,7 +70,7 @@ def test_frames_of_any_robot_are_where_the_table_says_within_all_limits(spec: Ro
 
 
 @pytest.mark.parametrize("quarter", [1.57, 1.570796, 1.5707963, 1.57079633, 1.570796327, 1.5707963267949])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", COSTLY_NAMES)
 def test_frames_are_where_the_table_says_where_right_angles_are_rounded(name: str, quarter: float) -> None:
     spec = robot(name)
     rows = tuple(dataclasses.replace(row, alpha=row.alpha * quarter / (math.pi / 2)) for row in spec.rows)

@@ -37,7 +37,7 @@ def test_a_robot_converted_there_and_back_has_the_same_table(name: str) -> None:
     assert list(back.spec.configurations) == list(spec.configurations)
 
 
-@settings(max_examples=40)
+@settings(max_examples=min(40, settings().max_examples))
 @given(spec=robot_specs(max_rows=8))
 def test_what_is_written_is_the_same_arm(spec: RobotSpec) -> None:
     q = np.random.default_rng(1).uniform(-2, 2, (50, len(spec.moving_rows)))

@@ -17,11 +17,11 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.mass import MassProperties, in_frame
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import Convention, RobotSpec
 from dh2sim.typing import Array
 from tests.robot_files import ODD, RICH
+from tests.sample_robots import COSTLY_NAMES
 from tests.strategies import robot_specs
 
 FORMATS: dict[str, Callable[[RobotModel], str]] = {".urdf": to_urdf, ".xml": to_mjcf}
@@ -51,7 +51,7 @@ def _masses_in_base(model: RobotModel, q: Array) -> list[MassProperties]:
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
-@pytest.mark.parametrize("name", builtin_robots())
+@pytest.mark.parametrize("name", COSTLY_NAMES)
 def test_every_robot_comes_back_with_its_poses_names_and_limits(
     name: str, suffix: str, convention: Convention, tmp_path: Path
 ) -> None:
@@ -107,7 +107,7 @@ def test_any_robot_comes_back_from_a_urdf(spec: RobotSpec, tmp_path_factory: pyt
     assert _off_by(spec, again) <= 1e-9 * max(1.0, model.reach)
 
 
-@settings(max_examples=25)
+@settings(max_examples=min(25, settings().max_examples))
 @given(spec=robot_specs(max_rows=8))
 def test_any_robot_comes_back_from_an_mjcf(spec: RobotSpec, tmp_path_factory: pytest.TempPathFactory) -> None:
     model = build_model(spec)

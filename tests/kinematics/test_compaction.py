@@ -132,7 +132,7 @@ def test_a_compact_table_comes_back_as_it_is(name: str) -> None:
     assert conversion.notes == ()
 
 
-@settings(max_examples=50)
+@settings(max_examples=min(50, settings().max_examples))
 @given(spec=robot_specs(max_rows=8))
 def test_any_table_becomes_compact_at_once(spec: RobotSpec) -> None:
     compact = compact_rows(spec).spec

@@ -70,7 +70,7 @@ def test_a_vertical_slide_behind_vertical_axes_is_held_above_its_travel() -> Non
     assert found.exit_heights[2] == pytest.approx(0.05)
 
 
-@settings(max_examples=60)
+@settings(max_examples=min(60, settings().max_examples))
 @given(robot_specs(max_rows=7, must_move=False))
 def test_points_are_on_the_axes_and_projected_onto_them(spec: RobotSpec) -> None:
     chain = build_chain(spec)
@@ -103,7 +103,7 @@ def test_the_taut_length_of_a_stretched_arm_is_its_length() -> None:
     assert found.taut_length >= math.hypot(1.1, 0.3)
 
 
-@settings(max_examples=60)
+@settings(max_examples=min(60, settings().max_examples))
 @given(robot_specs(max_rows=7, must_move=False))
 def test_the_taut_length_is_no_longer_than_the_steps(spec: RobotSpec) -> None:
     chain = build_chain(spec)

@@ -58,7 +58,7 @@ def test_gravity_may_pull_sideways() -> None:
     assert load < 1e-12
 
 
-@settings(max_examples=30)
+@settings(max_examples=min(30, settings().max_examples))
 @given(robot_specs())
 def test_gravity_loads_and_seen_inertias_of_any_robot_equal_those_of_mujoco(spec: RobotSpec) -> None:
     # MuJoCo takes frames for one that are less than 1e-6 apart, and random robots have such
@@ -103,7 +103,7 @@ def test_assumed_effort_lifts_twice_the_arm_in_any_pose(name: str) -> None:
     assert_strong_enough(model(name), 100)
 
 
-@settings(max_examples=40)
+@settings(max_examples=min(40, settings().max_examples))
 @given(robot_specs())
 def test_assumed_effort_lifts_twice_any_robot_in_any_pose(spec: RobotSpec) -> None:
     assert_strong_enough(build_model(spec), 5)

@@ -143,7 +143,7 @@ def parallel_axes(draw: DrawFn) -> RobotSpec:
     return replace(spec, rows=tuple(rows), tool=tool, payload=payload)
 
 
-@settings(max_examples=80)
+@settings(max_examples=min(80, settings().max_examples))
 @given(parallel_axes(), st.lists(st.floats(-600.0, 600.0), min_size=8, max_size=8))
 def test_slid_frames_and_recut_rows_have_the_same_bodies(spec: RobotSpec, slides: list[float]) -> None:
     other = recut(spec, slides)
@@ -157,7 +157,7 @@ def test_slid_frames_and_recut_rows_have_the_same_bodies(spec: RobotSpec, slides
     assert_same_bodies(built, again)
 
 
-@settings(max_examples=60)
+@settings(max_examples=min(60, settings().max_examples))
 @given(robot_specs(max_rows=7), st.sampled_from([STANDARD, MODIFIED]))
 def test_a_converted_table_has_the_same_bodies(spec: RobotSpec, to: Convention) -> None:
     assert_same_bodies(build_model(spec), build_model(convert_rows(spec, to).spec))

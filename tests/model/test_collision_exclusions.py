@@ -39,7 +39,7 @@ def test_no_links_collide_at_zero_or_at_home(name: str) -> None:
     assert_nothing_collides(model(name))
 
 
-@settings(max_examples=40)
+@settings(max_examples=min(40, settings().max_examples))
 @given(robot_specs(must_move=False))
 def test_no_links_of_any_robot_collide_at_zero_or_at_home(spec: RobotSpec) -> None:
     assert_nothing_collides(build_model(spec))

@@ -117,7 +117,7 @@ def test_nothing_is_farther_away_than_the_reach(name: str) -> None:
     assert farthest_frame(built, q) <= built.extent * (1 + 1e-12)
 
 
-@settings(max_examples=60)
+@settings(max_examples=min(60, settings().max_examples))
 @given(robot_specs(must_move=False))
 def test_nothing_of_any_robot_is_farther_away_than_its_reach(spec: RobotSpec) -> None:
     built = build_model(spec)

@@ -36,7 +36,7 @@ def test_every_moving_link_has_a_shape_and_a_mass(name: str) -> None:
     assert_every_moving_link_is_a_body(model(name))
 
 
-@settings(max_examples=60)
+@settings(max_examples=min(60, settings().max_examples))
 @given(robot_specs(must_move=False))
 def test_every_moving_link_of_any_robot_has_a_shape_and_a_mass(spec: RobotSpec) -> None:
     assert_every_moving_link_is_a_body(build_model(spec))
@@ -136,7 +136,7 @@ def test_every_slide_of_the_robots_stays_guided(name: str) -> None:
     assert assert_slides_stay_together(built, in_limits(built, 50, seed=1)) == 50 * slides
 
 
-@settings(max_examples=60)
+@settings(max_examples=min(60, settings().max_examples))
 @given(robot_specs(max_rows=6))
 def test_every_slide_of_any_robot_stays_guided(spec: RobotSpec) -> None:
     built = build_model(spec)

@@ -73,7 +73,7 @@ def composed_mass_matrix(spec: RobotSpec, robot: Robot, q: Array) -> Array:
     return M
 
 
-@settings(max_examples=25)
+@settings(max_examples=min(25, settings().max_examples))
 @given(massless_robot_specs())
 def test_mass_matrix_with_tools_and_massless_links_equals_the_sum_over_the_bodies(
     spec: RobotSpec,

@@ -120,7 +120,7 @@ def test_what_a_controller_did_is_recorded_so_that_the_plain_loop_can_do_it_agai
 
 
 @pytest.mark.slow
-@settings(max_examples=40)
+@settings(max_examples=min(40, settings().max_examples))
 @given(
     spec=robot_specs(max_rows=5),
     driver=st.sampled_from(sorted(ORACLES)),

@@ -49,7 +49,12 @@ def _numbers(spec: RobotSpec) -> Iterator[float]:
         yield from (*pose.xyz, *pose.rpy)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(
+    max_examples=min(25, settings().max_examples),
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=list(HealthCheck),
+)
 @given(robot_specs(max_rows=6, must_move=False))
 def test_any_robot_matches_its_table(spec: RobotSpec) -> None:
     assume(all(x == 0.0 or abs(x) > SNAPPED for x in _numbers(spec)))

@@ -44,7 +44,7 @@ def origins(state: ViewState) -> Array:
     return np.vstack([np.zeros(3), frames, table_tool_pose(state.spec, state.q)[:3, 3]])
 
 
-@settings(max_examples=40)
+@settings(max_examples=min(40, settings().max_examples))
 @given(st.sampled_from(builtin_robots()), st.floats(0.2, 4.0))
 def test_the_robot_at_home_is_seen_in_pictures_of_any_aspect(robot: str, aspect: float) -> None:
     state = open_state(load_robot(robot))

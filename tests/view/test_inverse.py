@@ -90,7 +90,7 @@ def test_where_the_tool_is_already_nothing_moves(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["planar_2r", "arm_5r", "stanford", "ssrms"])
 @given(data=st.data())
-@settings(max_examples=40)
+@settings(max_examples=min(40, settings().max_examples))
 def test_limits_hold_for_any_pose_and_errors_are_those_of_the_solution(name: str, data: st.DataObject) -> None:
     model = robot(name)
     lower, upper = model.travel
@@ -107,7 +107,7 @@ def test_limits_hold_for_any_pose_and_errors_are_those_of_the_solution(name: str
 
 @pytest.mark.slow
 @given(robot_and_vectors=strategies.robots_with_joint_vectors(max_rows=7))
-@settings(max_examples=60)
+@settings(max_examples=min(60, settings().max_examples))
 def test_any_robot_stays_within_its_limits_and_gets_no_farther_from_the_goal(
     robot_and_vectors: tuple[RobotSpec, Array],
 ) -> None:

@@ -16,7 +16,7 @@ from dh2sim.view.scene.link_poses import poses_at
 from tests.strategies import robots_with_joint_vectors
 
 
-@settings(max_examples=60)
+@settings(max_examples=min(60, settings().max_examples))
 @given(robots_with_joint_vectors(max_rows=7))
 def test_frames_and_tool_are_where_the_table_has_them(robot: tuple[RobotSpec, Array]) -> None:
     spec, vectors = robot

@@ -37,7 +37,7 @@ def frame_path(state: ViewState, number: int) -> str:
     return f"/robot/{state.model.all_links[number].name}/dh_{number}"
 
 
-@settings(max_examples=40)
+@settings(max_examples=min(40, settings().max_examples))
 @given(robots_with_joint_vectors(max_rows=6))
 def test_links_and_frames_are_where_the_table_has_them(robot: tuple[RobotSpec, Array]) -> None:
     spec, vectors = robot

@@ -107,13 +107,13 @@ def assert_sound(state: ViewState) -> None:
     assert len(wrong) == len(state.table.errors)
 
 
-@settings(max_examples=60)
+@settings(max_examples=min(60, settings().max_examples))
 @given(st.lists(anything, max_size=25))
 def test_no_sequence_of_events_leads_to_a_state_that_cannot_be_shown(happened: list[events.Event]) -> None:
     assert_sound(after(STANFORD, *happened))
 
 
-@settings(max_examples=40)
+@settings(max_examples=min(40, settings().max_examples))
 @given(robot_specs(max_rows=5), st.lists(anything, max_size=6))
 def test_a_page_takes_any_robot(spec: RobotSpec, happened: list[events.Event]) -> None:
     assert_sound(after(open_state(spec), *happened))

@@ -227,7 +227,7 @@ def test_an_uploaded_robot_too_large_to_be_drawn_is_refused() -> None:
     )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=min(60, settings().max_examples), deadline=None)
 @given(st.binary(max_size=80) | st.text(max_size=80).map(lambda text: (HEAD + text).encode("utf-8", "replace")))
 def test_no_bytes_bring_a_page_down(data: bytes) -> None:
     state = after(STANFORD, upload(data))

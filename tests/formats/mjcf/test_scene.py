@@ -64,7 +64,7 @@ def test_the_scene_shows_the_robot_on_a_floor_that_it_does_not_touch(name: str) 
     assert_shows_the_robot(model(name))
 
 
-@settings(max_examples=30)
+@settings(max_examples=min(30, settings().max_examples))
 @given(robot_specs(must_move=False))
 def test_the_scene_shows_any_robot_on_a_floor_that_it_does_not_touch(spec: RobotSpec) -> None:
     assert_shows_the_robot(build_model(spec))

@@ -63,7 +63,7 @@ def test_mujoco_reads_names_order_and_numbers_of_the_model(name: str) -> None:
     assert_holds_the_model(model(name), in_mujoco(to_mjcf(model(name))))
 
 
-@settings(max_examples=40)
+@settings(max_examples=min(40, settings().max_examples))
 @given(robot_specs(must_move=False))
 def test_mujoco_reads_names_order_and_numbers_of_any_robot(spec: RobotSpec) -> None:
     built = build_model(spec)

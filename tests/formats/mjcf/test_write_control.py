@@ -16,7 +16,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Limits, RobotSpec, Row
 from dh2sim.typing import read_only
 from tests.formats.readers import in_mujoco
-from tests.sample_robots import CONTINUOUS, MODIFIED, NAMES, ODD, PRISMATIC, REVOLUTE, STANDARD, model
+from tests.sample_robots import CONTINUOUS, COSTLY_NAMES, MODIFIED, ODD, PRISMATIC, REVOLUTE, STANDARD, model
 
 LIMITS = Limits(position=(-1.5, 2.0), velocity=3.0, effort=40.0)
 HOME, BENT = [0.1, 0.2, 0.3, -0.4, 0.5], [-1.0, 0.4, 1.9, 2.5, -0.6]
@@ -131,7 +131,7 @@ def test_a_position_actuator_without_gain_is_asked_for_the_position_itself() -> 
 
 
 @pytest.mark.parametrize("in_scene", [False, True], ids=["alone", "in its scene"])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", COSTLY_NAMES)
 def test_a_robot_stands_still_at_home_for_ten_seconds(
     name: str, in_scene: bool, record_property: Callable[[str, object], None]
 ) -> None:

@@ -100,7 +100,7 @@ def test_frames_on_a_floating_base_are_those_of_the_table_wherever_it_is(name: s
         np.testing.assert_allclose(found["tool0"], T_world_base @ table_tool_pose(robot.spec, q), rtol=0, atol=1e-11)
 
 
-@settings(max_examples=25)
+@settings(max_examples=min(25, settings().max_examples))
 @given(robot_specs(max_rows=6))
 @example(TINY)
 def test_any_robot_can_float(spec: RobotSpec) -> None:

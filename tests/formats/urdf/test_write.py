@@ -91,7 +91,7 @@ def test_every_number_reads_back_as_the_models_double(name: str) -> None:
     assert_numbers_read_back(model(name))
 
 
-@settings(max_examples=40)
+@settings(max_examples=min(40, settings().max_examples))
 @given(robot_specs(must_move=False))
 def test_every_number_of_any_robot_reads_back_as_the_models_double(spec: RobotSpec) -> None:
     assert_numbers_read_back(build_model(spec))

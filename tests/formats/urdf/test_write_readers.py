@@ -9,7 +9,7 @@ from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import RobotSpec
 from tests.formats.readers import in_check_urdf, in_mujoco, in_pinocchio, in_yourdfpy
-from tests.sample_robots import NAMES, model
+from tests.sample_robots import COSTLY_NAMES, model
 from tests.strategies import robot_specs
 
 
@@ -23,19 +23,19 @@ def assert_every_reader_accepts(built: RobotModel) -> None:
     assert [mj.joint(i).name for i in range(mj.njnt)] == moving
 
 
-@pytest.mark.parametrize("name", [*NAMES, "odd"])
+@pytest.mark.parametrize("name", [*COSTLY_NAMES, "odd"])
 def test_every_reader_accepts_the_urdf(name: str) -> None:
     assert_every_reader_accepts(model(name))
 
 
 @pytest.mark.slow
-@settings(max_examples=25)
+@settings(max_examples=min(25, settings().max_examples))
 @given(robot_specs(must_move=False))
 def test_every_reader_accepts_the_urdf_of_any_robot(spec: RobotSpec) -> None:
     assert_every_reader_accepts(build_model(spec))
 
 
-@pytest.mark.parametrize("name", [*NAMES, "odd"])
+@pytest.mark.parametrize("name", [*COSTLY_NAMES, "odd"])
 def test_every_reader_accepts_the_urdf_without_dh_frames(name: str) -> None:
     built = model(name)
     text = to_urdf(built, dh_frames=False)

@@ -49,7 +49,7 @@ def _serial(spec: RobotSpec) -> SerialChain:
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-12, 1e-9, 1e-6, 1e-3])
-@settings(max_examples=60)
+@settings(max_examples=min(60, settings().max_examples))
 @given(seed=st.integers(0, 2**32), count=st.integers(1, 10), convention=st.sampled_from(CONVENTIONS))
 def test_the_table_of_any_chain_is_the_chain_for_all_configurations(
     noise: float, seed: int, count: int, convention: Convention

@@ -43,7 +43,7 @@ def test_hold_asks_for_nothing_outside_of_the_range() -> None:
     np.testing.assert_array_equal(controls, np.clip(wanted, group.plant.control_lower, group.plant.control_upper))
 
 
-@settings(max_examples=25)
+@settings(max_examples=min(25, settings().max_examples))
 @given(
     spec=specs,
     seed=st.integers(0, 99),
@@ -108,7 +108,7 @@ def test_a_frequency_that_time_steps_cannot_show_is_refused() -> None:
         make("sine:frequency=60", arm())
 
 
-@settings(max_examples=25)
+@settings(max_examples=min(25, settings().max_examples))
 @given(
     spec=specs, kind=st.sampled_from([POSITION, MOTOR, VELOCITY]), rate=st.floats(0.2, 40.0), seed=st.integers(0, 99)
 )

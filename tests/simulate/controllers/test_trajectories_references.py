@@ -27,7 +27,7 @@ def quintic(start: Array, end: Array, s: Array) -> Array:
     return start + (start - end) * (15.0 * s**4 - 6.0 * s**5 - 10.0 * s**3)
 
 
-@settings(max_examples=25)
+@settings(max_examples=min(25, settings().max_examples))
 @given(
     spec=robot_specs(max_rows=4), period=st.floats(0.05, 3.0), amplitude=st.floats(0.0, 1.0), seed=st.integers(0, 99)
 )

@@ -17,7 +17,7 @@ from dh2sim.validate.motion.conservation import check_energy, check_momentum
 from dh2sim.validate.motion.free_motion import RECORDS, State, free_model, random_states
 from dh2sim.validate.report import Check
 from tests.robot_files import ODD
-from tests.sample_robots import NAMES
+from tests.sample_robots import COSTLY_NAMES
 from tests.validate.motion.robots import FRICTION, LIFT, PENDULUM, TURNTABLE, built, heavier
 
 
@@ -33,7 +33,7 @@ def error(check: Check) -> float:
     return check.max_error
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", COSTLY_NAMES)
 def test_the_energy_error_of_a_robot_falls_with_the_fourth_power_of_the_timestep(name: str) -> None:
     model = built(name)
     check = check_energy(model, free_model(model))
@@ -111,7 +111,7 @@ def test_an_unstable_simulation_conserves_nothing() -> None:
     )
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", COSTLY_NAMES)
 def test_a_floating_robot_conserves_momentum_while_its_motors_work(name: str) -> None:
     model = built(name)
     check = check_momentum(model, free_model(model, floating_base=True))

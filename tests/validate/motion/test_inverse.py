@@ -12,7 +12,7 @@ import xarray as xr
 from dh2sim.simulate.run import rollout
 from dh2sim.validate.motion.tracking import check_inverse, recorded_rollouts
 from tests.robot_files import ODD, RICH
-from tests.sample_robots import NAMES
+from tests.sample_robots import COSTLY_NAMES
 from tests.validate.motion.robots import FRICTION, built
 
 RECORD = ("qpos", "qvel", "qacc", "torque")
@@ -23,7 +23,7 @@ def runs() -> tuple[xr.Dataset, ...]:
     return recorded_rollouts(built("stanford"))
 
 
-@pytest.mark.parametrize("robot", [*NAMES, ODD, RICH, FRICTION], ids=lambda text: text.split("\n")[0])
+@pytest.mark.parametrize("robot", [*COSTLY_NAMES, ODD, RICH, FRICTION], ids=lambda text: text.split("\n")[0])
 def test_recorded_accelerations_take_the_recorded_torques(robot: str) -> None:
     check = check_inverse(recorded_rollouts(built(robot)))
     assert check.ok

@@ -8,11 +8,11 @@ import pytest
 from dh2sim.validate.motion.tracking import check_rest, resting_rollouts
 from dh2sim.validate.report import LeftOut
 from tests.robot_files import ODD
-from tests.sample_robots import NAMES
+from tests.sample_robots import COSTLY_NAMES
 from tests.validate.motion.robots import FRICTION, WEAK, built
 
 
-@pytest.mark.parametrize("robot", [*NAMES, ODD, FRICTION], ids=lambda text: text.split("\n")[0])
+@pytest.mark.parametrize("robot", [*COSTLY_NAMES, ODD, FRICTION], ids=lambda text: text.split("\n")[0])
 def test_gravity_compensation_leaves_a_robot_at_rest(robot: str) -> None:
     run = resting_rollouts(built(robot))
     check = check_rest(run)

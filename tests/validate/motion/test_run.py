@@ -46,7 +46,12 @@ def test_every_check_is_made_and_the_same_seed_finds_the_same() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=6, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(
+    max_examples=min(6, settings().max_examples),
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=list(HealthCheck),
+)
 @given(robot_specs(max_rows=5))
 @example(NEARLY_CENTERED)
 def test_any_robot_moves_as_physics_has_it(spec: RobotSpec) -> None:

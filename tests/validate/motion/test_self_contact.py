@@ -14,7 +14,7 @@ from dh2sim.validate.motion.free_motion import compile_model
 from dh2sim.validate.motion.self_contact import by_construction, check_self_contact, random_tour
 from dh2sim.validate.report import Check
 from tests.robot_files import ODD, snake
-from tests.sample_robots import NAMES
+from tests.sample_robots import COSTLY_NAMES
 from tests.validate.motion.robots import FOLDED, built
 
 
@@ -22,14 +22,14 @@ def checked(model: RobotModel, *, seed: int = 0) -> Check:
     return check_self_contact(model, compile_model(model), seed=seed)
 
 
-@pytest.mark.parametrize("robot", [*NAMES, ODD, snake(12)], ids=lambda text: text.split("\n")[0])
+@pytest.mark.parametrize("robot", [*COSTLY_NAMES, ODD, snake(12)], ids=lambda text: text.split("\n")[0])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_robot_makes_no_contacts_by_construction(robot: str, seed: int) -> None:
     check = checked(built(robot), seed=seed)
     assert (check.ok, check.max_error, check.samples) == (True, 0.0, 601)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", COSTLY_NAMES)
 def test_links_that_touch_by_construction_are_excluded_ones(name: str) -> None:
     model = built(name)
     excluded = {(pair.link1, pair.link2) for pair in model.excluded}

@@ -14,11 +14,11 @@ from dh2sim.simulate.run import rollout
 from dh2sim.validate.motion.free_motion import without_contacts, without_dry_friction
 from dh2sim.validate.motion.tracking import check_tracking, tracking_rollouts
 from tests.robot_files import ODD
-from tests.sample_robots import NAMES
+from tests.sample_robots import COSTLY_NAMES
 from tests.validate.motion.robots import FRICTION, WEAK, built
 
 
-@pytest.mark.parametrize("robot", [*NAMES, ODD, FRICTION], ids=lambda text: text.split("\n")[0])
+@pytest.mark.parametrize("robot", [*COSTLY_NAMES, ODD, FRICTION], ids=lambda text: text.split("\n")[0])
 def test_a_robot_follows_its_reference(robot: str) -> None:
     check = check_tracking(tracking_rollouts(built(robot)))
     assert check.ok
@@ -57,7 +57,7 @@ def test_arms_with_weak_motors_follow_slower_references() -> None:
     assert not run["saturation"].values.any()
 
 
-@pytest.mark.parametrize("robot", NAMES)
+@pytest.mark.parametrize("robot", COSTLY_NAMES)
 def test_assumed_motors_are_strong_enough_for_the_default_references(robot: str) -> None:
     model = built(robot)
     assumed = all("effort" in joint.assumed for joint in model.moving_joints)
@@ -67,7 +67,7 @@ def test_assumed_motors_are_strong_enough_for_the_default_references(robot: str)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", NAMES)
+@pytest.mark.parametrize("robot", COSTLY_NAMES)
 def test_every_joint_follows_with_the_options_that_controllers_have_by_default(robot: str) -> None:
     # as docs/controllers.md says
     model = without_contacts(without_dry_friction(built(robot)))
