@@ -14,6 +14,7 @@ _HOMES = {
     "Dynamics": "robot.spec",
     "Fixed": "robot_facade",
     "ImportOptions": "importing.sources",
+    "InverseSolver": "inverse.solver",
     "KinematicChain": "kinematics.chain",
     "Limits": "robot.spec",
     "LinkSpec": "robot.spec",
@@ -30,6 +31,7 @@ _HOMES = {
     "SerialChain": "kinematics.serial_chain",
     "SerialJoint": "kinematics.serial_chain",
     "ShapeSpec": "robot.spec",
+    "Solutions": "inverse.solutions",
     "ToolSpec": "robot.spec",
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
@@ -39,6 +41,7 @@ _HOMES = {
     "frame_poses": "kinematics.forward",
     "geometric_jacobian": "kinematics.forward",
     "import_robot": "importing.sources",
+    "inverse_kinematics": "inverse.solver",
     "load_robot": "robot.read",
     "parse_robot": "robot.read",
     "recover_table": "kinematics.frame_assignment.recover",
@@ -61,6 +64,9 @@ if TYPE_CHECKING:
     from dh2sim.importing.convert import convert_robot as convert_robot
     from dh2sim.importing.sources import ImportOptions as ImportOptions
     from dh2sim.importing.sources import import_robot as import_robot
+    from dh2sim.inverse.solutions import Solutions as Solutions
+    from dh2sim.inverse.solver import InverseSolver as InverseSolver
+    from dh2sim.inverse.solver import inverse_kinematics as inverse_kinematics
     from dh2sim.kinematics.chain import KinematicChain as KinematicChain
     from dh2sim.kinematics.chain import build_chain as build_chain
     from dh2sim.kinematics.forward import forward_kinematics as forward_kinematics

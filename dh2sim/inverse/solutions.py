@@ -34,12 +34,15 @@ class Solutions:
     q: Array
     """Joint vectors, rad and m, shape (k, n)."""
     residual: Array
-    """How far each is from the pose by the table's textbook product, shape (k,): the distance over the arm's reach or
-    the angle, whichever is larger; only what the goal asks for counts."""
+    """How far each is from the pose by the table's textbook product, shape (k,): the distance in units of the arm's
+    longest link or the angle, rad, whichever is larger; only what the goal asks for counts."""
     sigma_min: Array
-    """Least singular value of the goal's Jacobian, with lengths in units of the arm's reach, shape (k,)."""
+    """Least singular value of the goal's Jacobian, with lengths in units of the arm's longest link, shape (k,): zero
+    at a singularity."""
     within_limits: NDArray[np.bool_]
     """Whether each keeps the robot's position limits, bool, shape (k,)."""
+    same: NDArray[np.intp]
+    """Which of the isolated solutions each is, a whole number, shape (k,): equal ones differ by whole turns."""
     branch: tuple[str, ...]
     """Name of each one's branch, '' where no name applies."""
     complete: bool

@@ -1,0 +1,259 @@
+"""The elimination that suits an arm, chosen by trial when it is built, and all solutions of many poses by it.
+
+No rule says beforehand which pencils are regular: of the 12 of a UR5 one is. So each is tried on poses that random
+configurations reach, and the best two are kept. What the trial shows that they miss is reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from dh2sim.inverse.loop import Arm, Candidates, Flags, Indices, Loop, close_loop, inverse_poses, pose_and_jacobian
+from dh2sim.inverse.pencil import build_pencil
+from dh2sim.inverse.polish import polish
+from dh2sim.typing import Array
+
+REACHED = 1e-10
+"""Error, in lengths of the arm and rad, up to which a configuration reaches a pose."""
+SAME = 1e-6
+"""Configurations that differ by less, in rad and lengths of the arm, are the same..."""
+SAME_IF_SINGULAR = 1e-4
+"""... and by less than this where the arm is nearly singular, as rounding moves such solutions farther."""
+NEARLY_SINGULAR = 1e-6
+"""Least singular value below which that is so."""
+TRIALS = 24
+"""Poses of the trial."""
+_FIRST = 8
+"""Of them on which a hopeless elimination is told from others."""
+_VIRTUAL = 0.05
+"""How far virtual joints of a candidate may be from zero."""
+_GATE = 0.3
+"""Error of a candidate, in lengths of the arm and rad, above which it is none."""
+_BLOCK = 128
+"""Poses solved at a time, so that their matrices stay in the processor's cache."""
+_SEED = 2026
+_NEIGHBOURS = 6
+"""Solutions of a pose, sorted by a hash of their coordinates, that each one is compared with."""
+
+
+class Elimination(Protocol):
+    """A way from the loop equations to configurations near all solutions."""
+
+    def candidates(self, loop: Loop) -> Candidates:
+        """Return configurations near all solutions of N poses, and some that are none."""
+        ...
+
+    def condition(self, loop: Loop) -> float:
+        """Return how ill-conditioned the elimination is at N poses: the median."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """Distinct solutions of some of N poses."""
+
+    pose: Indices
+    """Index of the pose of each, in ascending order, shape (M,)."""
+    q: Array
+    """Coordinates of all joints in the arm's units, shape (M, n)."""
+    sigma: Array
+    """Least singular value of the Jacobian of the joints that move, in the arm's units, shape (M,)."""
+
+    def of(self, chosen: Indices | Flags) -> Found:
+        """Return some of them, by index or bool."""
+        return Found(pose=self.pose[chosen], q=self.q[chosen], sigma=self.sigma[chosen])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Method:
+    """How an arm's poses are solved, with some of its joints locked."""
+
+    arm: Arm
+    moving: Flags
+    """Which joints are not locked, bool, shape (n,)."""
+    virtual: tuple[Array, ...] = field(repr=False)
+    """Links before, between and behind the virtual joints that make six of fewer joints, each of shape (4, 4)."""
+    eliminations: tuple[Elimination, ...]
+    """The best one, and the one to fall back on."""
+    found_share: float
+    """Share of the solutions known of the trial's poses that these two find."""
+
+    def solve(self, T: Array, locked: Mapping[int, Array]) -> Found:
+        """Return all solutions of N poses.
+
+        Args:
+            T: Poses, positions in units of the arm's length, shape (N, 4, 4).
+            locked: Coordinates of the locked joints in the arm's units, by index, each of shape (N,) or (1,).
+        """
+        blocks = []
+        for start in range(0, len(T), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            values = {joint: q if len(q) == 1 else q[block] for joint, q in locked.items()}
+            found = self._solve_block(T[block], values)
+            blocks.append(Found(pose=found.pose + start, q=found.q, sigma=found.sigma))
+        return _joined(blocks, self.arm.n)
+
+    def _solve_block(self, T: Array, locked: Mapping[int, Array]) -> Found:
+        found = self.solve_by(self.eliminations[0], T, locked)
+        for other in self.eliminations[1:]:
+            again = np.nonzero(self._doubtful(found, len(T)))[0]
+            if len(again):
+                more = self.solve_by(other, T[again], {j: q if len(q) == 1 else q[again] for j, q in locked.items()})
+                more = Found(pose=again[more.pose], q=more.q, sigma=more.sigma)
+                found = self.distinct(_joined([found, more], self.arm.n))
+        return found
+
+    def _doubtful(self, found: Found, poses: int) -> Flags:
+        """Whether solutions of a pose may be missing: there are none, an odd number, or singular ones; bool (N,)."""
+        regular = found.sigma > NEARLY_SINGULAR
+        counts = np.bincount(found.pose[regular], minlength=poses)
+        singular = np.bincount(found.pose[~regular], minlength=poses) > 0
+        even = (counts % 2 == 0) | bool(self.virtual)  # only some solutions of a ring with virtual joints count
+        return np.asarray((counts == 0) | ~even | singular)
+
+    def solve_by(self, elimination: Elimination, T: Array, locked: Mapping[int, Array]) -> Found:
+        """Return the solutions of N poses that one elimination leads to."""
+        loop = close_loop(self.arm, T, locked, self.virtual)
+        candidates = elimination.candidates(loop)
+        pose, ring = candidates.pose, candidates.q
+        count = int(self.moving.sum())
+        near = (np.abs(_wrapped(ring[:, count:])) < _VIRTUAL).all(axis=1)
+        pose, ring = pose[near], ring[near, :count]
+        q = np.empty((len(pose), self.arm.n))
+        q[:, self.moving] = ring
+        for joint, value in locked.items():
+            q[:, joint] = value[0] if len(value) == 1 else value[pose]
+        return self.polished(pose, q, T)
+
+    def polished(self, pose: Indices, q: Array, T: Array) -> Found:
+        """Return the distinct solutions that configurations lead to."""
+        q, error = polish(self.arm, q, T[pose], self.moving, gate=_GATE)
+        reached = error < REACHED
+        pose, q = pose[reached], q[reached]
+        J = pose_and_jacobian(self.arm, q)[1][:, :, self.moving]
+        sigma = np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1], dtype=np.float64)
+        return self.distinct(Found(pose=pose, q=q, sigma=sigma))
+
+    def distinct(self, found: Found) -> Found:
+        """Return solutions without those that are the same but for whole turns, in the order of their poses."""
+        turns = np.array(self.arm.turns)
+        found = Found(pose=found.pose, q=np.where(turns, _wrapped(found.q), found.q), sigma=found.sigma)
+        weights = 1.0 + np.sqrt(2.0 + np.arange(self.arm.n))  # no two joints count alike
+        key = np.where(turns, np.sin(found.q + weights), found.q) @ weights
+        found = found.of(np.lexsort([key, found.pose]))
+        new = np.ones(len(found.pose), dtype=np.bool_)
+        tolerance = np.where(found.sigma < NEARLY_SINGULAR, SAME_IF_SINGULAR, SAME)
+        for lag in range(1, min(_NEIGHBOURS, len(new) - 1) + 1):
+            gap = found.q[lag:] - found.q[:-lag]
+            apart = np.abs(np.where(turns, _wrapped(gap), gap)).max(axis=1)
+            new[lag:] &= (found.pose[lag:] != found.pose[:-lag]) | (apart > tolerance[lag:])
+        return found.of(new)
+
+
+def choose_method(arm: Arm, moving: Flags, ranges: Array) -> Method:
+    """Try the eliminations of an arm and return how its poses are solved.
+
+    Args:
+        arm: The arm.
+        moving: Which joints are not locked, bool, shape (n,): at most six.
+        ranges: Where trial configurations are drawn from, in the arm's units, shape (n, 2).
+    """
+    rng = np.random.default_rng(_SEED)
+    missing = 6 - int(moving.sum())
+    q = rng.uniform(ranges[:, 0], ranges[:, 1], (2 * TRIALS, arm.n))
+    J = pose_and_jacobian(arm, q)[1][:, :, moving]
+    q = q[np.sort(np.argsort(-np.linalg.svd(J, compute_uv=False)[:, -1])[:TRIALS])]  # away from singular ones
+    # three virtual joints make a wrist, unless that leaves the others with a point that they cannot move freely
+    wrists = (True, False) if missing == 3 else (False,)
+    methods = [_tried(arm, moving, q, _virtual_links(missing, rng, wrist=wrist), rng) for wrist in wrists[:1]]
+    if methods[0].found_share < 1.0 and len(wrists) > 1:
+        methods.append(_tried(arm, moving, q, _virtual_links(missing, rng, wrist=False), rng))
+    return max(methods, key=lambda method: method.found_share)
+
+
+def _tried(arm: Arm, moving: Flags, q: Array, virtual: tuple[Array, ...], rng: np.random.Generator) -> Method:
+    """Return the best eliminations for the poses that trial configurations reach."""
+    T = np.zeros((len(q), 4, 4))
+    T[:, :3], T[:, 3, 3] = pose_and_jacobian(arm, q)[0], 1.0
+    locked = {int(joint): q[:, joint] for joint in np.flatnonzero(np.logical_not(moving))}
+    bare = Method(arm=arm, moving=moving, virtual=virtual, eliminations=(), found_share=0.0)
+    loop = close_loop(arm, T, locked, virtual)
+    first = {joint: value[:_FIRST] for joint, value in locked.items()}
+    drawn = Found(pose=np.arange(len(q)), q=q, sigma=np.ones(len(q)))
+    results: list[tuple[int, int, float, Elimination, Found]] = []
+    for elimination in _eliminations(loop, rng):
+        found = bare.solve_by(elimination, T[:_FIRST], first)
+        if _own(bare, found, drawn) < _FIRST // 2:
+            continue
+        found = bare.solve_by(elimination, T, locked)
+        condition = elimination.condition(loop)
+        results.append((_own(bare, found, drawn), len(found.pose), condition, elimination, found))
+    results.sort(key=lambda result: (-result[0], -result[1], result[2]))
+    union = bare.distinct(_joined([drawn, *(result[4] for result in results)], arm.n))
+    best = results[:2]
+    ours = bare.distinct(_joined([result[4] for result in best], arm.n))
+    return Method(
+        arm=arm,
+        moving=moving,
+        virtual=virtual,
+        eliminations=tuple(result[3] for result in best),
+        found_share=len(ours.pose) / len(union.pose),
+    )
+
+
+def _eliminations(loop: Loop, rng: np.random.Generator) -> Iterator[Elimination]:
+    """Yield the eliminations that may suit a ring, the smallest first."""
+    for wrist in (True, False):
+        for hidden in range(2) if wrist else (0,):
+            for backwards in (False, True):
+                for first in range(6):
+                    pencil = build_pencil(loop, first, backwards=backwards, wrist=wrist, hidden=hidden, rng=rng)
+                    if pencil is not None:
+                        yield pencil
+
+
+def _own(method: Method, found: Found, drawn: Found) -> int:
+    """Return how many of the drawn configurations are among the solutions found."""
+    drawn = drawn.of(drawn.pose <= found.pose.max(initial=-1))
+    both = method.distinct(_joined([found, drawn], method.arm.n))
+    return len(found.pose) + len(drawn.pose) - len(both.pose)
+
+
+def _virtual_links(count: int, rng: np.random.Generator, *, wrist: bool) -> tuple[Array, ...]:
+    """Return links around virtual joints: random, so that the ring is not singular; their product is the identity.
+
+    Those of a wrist meet in a point, which then is all that the other joints have to reach.
+    """
+    if count == 0:
+        return ()
+    links = []
+    for k in range(count):
+        K = np.eye(4)
+        K[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        K[:3, :3] *= np.sign(np.linalg.det(K[:3, :3]))
+        if k == 0 or not wrist:
+            K[:3, 3] = rng.choice([-1.0, 1.0], 3) * rng.uniform(0.3, 0.8, 3)
+        links.append(K)
+    product = np.eye(4)
+    for K in links:
+        product = product @ K
+    return (*links, inverse_poses(product))
+
+
+def _wrapped(q: Array) -> Array:
+    """Return angles within half a turn of zero."""
+    return np.asarray(q - 2.0 * np.pi * np.round(q / (2.0 * np.pi)))
+
+
+def _joined(parts: list[Found], n: int) -> Found:
+    if not parts:
+        return Found(pose=np.zeros(0, dtype=np.int64), q=np.zeros((0, n)), sigma=np.zeros(0))
+    return Found(
+        pose=np.concatenate([part.pose for part in parts]),
+        q=np.concatenate([part.q for part in parts]),
+        sigma=np.concatenate([part.sigma for part in parts]),
+    )

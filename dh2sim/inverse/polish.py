@@ -1,0 +1,65 @@
+"""From configurations near a solution to the solution: Levenberg-Marquardt on the true arm, many at a time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from dh2sim.inverse.loop import Arm, Flags, pose_and_jacobian, pose_error
+from dh2sim.typing import Array
+
+_DONE = 1e-14
+"""What is left of a pose, in lengths of the arm and rad, that no step makes less."""
+_STEPS = 16
+_LONGEST = 1.0
+"""Longest step of a coordinate, rad or lengths of the arm."""
+
+
+def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) -> tuple[Array, Array]:
+    """Return configurations moved to where they reach their poses, and how far from that they still are.
+
+    The damping is proportional to the square of what is left, so that convergence is quadratic at regular solutions.
+    Source: N. Yamashita, M. Fukushima, On the rate of convergence of the Levenberg-Marquardt method, Computing
+    Supplement 15, 2001.
+
+    Args:
+        arm: The arm.
+        q: Coordinates of all its joints, in its own units, shape (M, n).
+        T: Poses to reach, positions in units of the arm's length, shape (M, 4, 4).
+        moving: Which joints may move, bool, shape (n,).
+        gate: Configurations farther than that from their poses, in lengths of the arm and rad, stay as they are.
+
+    Returns:
+        Coordinates, shape (M, n), and norms of the errors, shape (M,).
+    """
+    q = np.array(q)
+    frame, J = pose_and_jacobian(arm, q)
+    error = pose_error(frame, T)
+    norm = np.linalg.norm(error, axis=1)
+    damping = np.full(len(q), 1e-6)
+    active = np.flatnonzero((norm > _DONE) & (norm < gate))
+    J, error = J[active][:, :, moving], error[active]
+    diagonal = np.arange(int(moving.sum()))
+    for _ in range(_STEPS):
+        if not len(active):
+            break
+        Jt = np.swapaxes(J, 1, 2)
+        A = Jt @ J
+        A[:, diagonal, diagonal] += (damping[active] * np.minimum(norm[active] ** 2, 1.0) + 1e-15)[:, None]
+        step = np.linalg.solve(A, Jt @ error[:, :, None])[:, :, 0]
+        step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        trial = q[active]
+        trial[:, moving] += step
+        frame, J_trial = pose_and_jacobian(arm, trial)
+        error_trial = pose_error(frame, T[active])
+        norm_trial = np.linalg.norm(error_trial, axis=1)
+        better = norm_trial < norm[active]
+        took = active[better]
+        q[took], norm[took] = trial[better], norm_trial[better]
+        J[better], error[better] = J_trial[better][:, :, moving], error_trial[better]
+        damping[active] = np.where(better, 0.1 * damping[active], 10.0 * np.maximum(damping[active], 1e-8))
+        # near the end an attempt that does not help is the end
+        keep = (norm[active] > _DONE) & (better | (norm[active] > 1e-11)) & (damping[active] < 1e6)
+        active, J, error = active[keep], J[keep], error[keep]
+    return q, norm
