@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dh2sim.errors import ConfigurationError
+from dh2sim.inverse.branches import branch_names
+from dh2sim.inverse.textbook import explain
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from tests.inverse.disguised_arms import CLASSES, disguised, random_configuration, textbook_table
+from tests.sample_robots import ODD_ROBOT, robot
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_names_of_closed_forms_branches_are_those_of_their_configurations(name: str) -> None:
+    spec = disguised(textbook_table(name, 2), 7)
+    explanation = explain(spec, table_tool_pose(spec, random_configuration(spec, 2)))
+    found = np.array([branch.q for branch in explanation.branches])
+    assert branch_names(spec, found) == tuple(branch.name for branch in explanation.branches)
+
+
+def test_whole_turns_do_not_change_a_name() -> None:
+    spec = robot("puma560")
+    q = random_configuration(spec, 1)
+    assert branch_names(spec, [q, q + 2 * np.pi, q - 4 * np.pi]) == branch_names(spec, [q]) * 3
+
+
+@pytest.mark.parametrize(
+    ("q", "name"),
+    [
+        # at zero the upper arm is level and the forearm hangs down from the elbow; the shoulder is to the left
+        ([0.0, 0.0, 0.0, 0.0, 0.5, 0.0], "left, above, no flip"),
+        ([0.0, 0.0, 0.0, 0.0, -0.5, 0.0], "left, above, flip"),
+        # the forearm points upwards: the elbow is below the line from shoulder to wrist
+        ([0.0, 0.0, np.pi, 0.0, 0.5, 0.0], "left, below, no flip"),
+        # the upper arm points backwards over the base
+        ([0.0, -np.pi, np.pi, 0.0, 0.5, 0.0], "right, above, no flip"),
+    ],
+)
+def test_the_pumas_names_say_where_shoulder_and_elbow_are(q: list[float], name: str) -> None:
+    assert branch_names(robot("puma560"), [q]) == (name,)
+
+
+def test_an_elbow_at_the_left_of_the_line_from_base_to_tool_is_a_left_scara() -> None:
+    # joint 2 turns clockwise, seen from above
+    assert branch_names(robot("scara"), [[0.3, -0.7, 0.1, 0.0], [0.3, 0.7, 0.1, 0.0]]) == ("left", "right")
+
+
+def test_where_nothing_is_decided_no_name_is_given() -> None:
+    assert branch_names(robot("scara"), [[0.3, 0.0, 0.1, 0.0]]) == ("",)
+    assert branch_names(ODD_ROBOT, np.zeros((2, 5))) == ("", "")
+
+
+def test_a_calibrated_arm_has_the_names_of_its_class() -> None:
+    spec = robot("puma560")
+    rng = np.random.default_rng(0)
+    bent = replace(
+        spec,
+        rows=tuple(
+            replace(row, a=row.a + rng.normal() * 3e-4, alpha=row.alpha + rng.normal() * 1e-3) for row in spec.rows
+        ),
+    )
+    q = np.array([random_configuration(spec, seed) for seed in range(20)])
+    assert branch_names(bent, q) == branch_names(spec, q)
+    assert all(branch_names(spec, q))
+
+
+def test_a_joint_vector_of_the_wrong_length_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match="expected 6 joint coordinates"):
+        branch_names(robot("puma560"), [[0.0, 0.0]])
