@@ -40,6 +40,8 @@ class SampledConfigurations:
         scale = np.array([math.pi if row.type.turns else self.reach for row in rows])
         self.q: Array = shares * scale
         """rad and m, shape (samples, n)."""
+        self._frames = table_frame_poses(spec, self.q)
+        self._known: dict[str, Array] = {}
 
     def values(self, atoms: Iterable[Atom]) -> dict[Atom, Any]:
         """Return what atoms are: lengths in the file's unit, arrays of shape (samples,)."""
@@ -71,13 +73,41 @@ class SampledConfigurations:
         pose[:, 3, 3] = 1.0
         return pose
 
+    def jacobian(self, source: str, target: str) -> Array:
+        """Return the Jacobian of a frame, in the axes of another one, from the oracle's frames.
+
+        Columns are z x (p - o) and z, of each joint's axis z through o; the target is taken as a frame of the last
+        body. Lengths are in the file's unit.
+
+        Returns:
+            Shape (samples, 6, n).
+        """
+        R = self._in_base(source)[:, :3, :3].transpose(0, 2, 1)
+        point = self._in_base(target)[:, :3, 3]
+        result = np.zeros((len(self.q), 6, len(self.table.moving)))
+        for k, i in enumerate(self.table.moving):
+            row, frame = self.table.spec.rows[i - 1], self._in_base(f"link_{i}")
+            z = (-1.0 if row.flip else 1.0) * frame[:, :3, 2]
+            if row.type.turns:
+                moment = np.cross(z, point - frame[:, :3, 3]) / self._metre
+                result[:, :3, k] = np.einsum("nij,nj->ni", R, moment)
+                result[:, 3:, k] = np.einsum("nij,nj->ni", R, z)
+            else:
+                result[:, :3, k] = np.einsum("nij,nj->ni", R, z)
+        return result
+
     def _in_base(self, frame: str) -> Array:
+        if frame not in self._known:
+            self._known[frame] = self._pose_in_base(frame)
+        return self._known[frame]
+
+    def _pose_in_base(self, frame: str) -> Array:
         spec = self.table.spec
         if frame == "base_link":
             return np.broadcast_to(np.eye(4), (len(self.q), 4, 4))
         if frame == "tool0":
             return table_tool_pose(spec, self.q)
-        poses = table_frame_poses(spec, self.q)
+        poses = self._frames
         kind, _, number = frame.rpartition("_")
         i = int(number)
         if kind == "dh":

@@ -25,7 +25,7 @@ class Style(StrEnum):
     TOOL = "tool"
     """Collected by the angles of the last rows first; lengths outside."""
     EXPANDED = "expanded"
-    """A sum of products."""
+    """A sum of products; of lengths times sums, where lengths are first."""
 
 
 class Lengths(StrEnum):
@@ -103,8 +103,8 @@ class Nesting:
             if trig is not None and not trig.angle.is_constant:
                 by_angle.setdefault(_place(atom), []).append(atom)
         groups = [by_angle[place] for place in sorted(by_angle)]
-        self._groups = groups if style is Style.BASE else groups[::-1]
-        self._style = style
+        order = {Style.BASE: groups, Style.TOOL: groups[::-1], Style.EXPANDED: []}
+        self._groups: Sequence[Sequence[Atom]] = order[style]
         self._lengths = lengths or (Lengths.FIRST if style is Style.TOOL else Lengths.LAST)
 
     def __call__(self, polynomial: Polynomial) -> Sum:
@@ -112,8 +112,6 @@ class Nesting:
         return tidied(self._collected(polynomial))
 
     def _collected(self, polynomial: Polynomial) -> Sum:
-        if self._style is Style.EXPANDED:
-            return Sum(tuple(sorted((_term(m, n) for m, n in polynomial.terms.items()), key=_printing_order)))
         if self._lengths is Lengths.LAST:
             return _collected(polynomial, self._groups)
         return _joined(
@@ -131,7 +129,7 @@ def _collected(polynomial: Polynomial, groups: Sequence[Sequence[Atom]]) -> Sum:
 
 
 def _plain(polynomial: Polynomial) -> Sum:
-    """Return a polynomial without joint angles; a factor that all terms have is pulled out."""
+    """Return a polynomial as a sum of products."""
     terms = sorted((_term(m, n) for m, n in polynomial.terms.items()), key=_printing_order)
     return Sum(tuple(terms))
 
@@ -258,13 +256,15 @@ def name_sums(sums: Sequence[Sum], *, least: int = 2, prefix: str = "#") -> tupl
                 factors.append(Factor(replaced(base), power))
                 continue
             if key not in names:
-                definition = replaced(base)
+                negative = sum(part.number < 0 for part in base.terms)
+                defined = tidied(-base) if 2 * negative > len(base.terms) else base
+                definition = replaced(defined)
                 name = f"{prefix}{len(named) + 1}"
-                names[key] = (name, own)
+                names[key] = (name, defined.key)
                 named[name] = definition
-            name, defined = names[key]
+            name, defined_key = names[key]
             factors.append(Factor(name, power))
-            if defined != own and power % 2:
+            if defined_key != own and power % 2:
                 number = -number
         return Term(number, tuple(factors))
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from dh2sim.symbolic.angles import Angle
 from dh2sim.symbolic.expression import Named, Nesting, Sum, name_sums
 from dh2sim.symbolic.polynomial import Atom, Matrix
 from dh2sim.symbolic.table import SymbolicTable
@@ -31,6 +32,19 @@ class Equation:
         return [entry for row in self.entries for entry in row]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Condition:
+    """Where an expression is zero."""
+
+    expression: Sum
+    name: str = ""
+    """What that is called, such as 'wrist'."""
+    angle: Angle | None = None
+    """The angle that it fixes, if there is only one in it."""
+    degrees: tuple[float, ...] = ()
+    """Values of that angle."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Form:
     """Kinematics or dynamics of a robot in symbols, as printers need it."""
@@ -41,6 +55,8 @@ class Form:
     equations: tuple[Equation, ...]
     named: Named = field(default_factory=dict)
     """Sums that occur several times, by their names #1, #2, …"""
+    conditions: tuple[Condition, ...] = ()
+    """Where the Jacobian is singular."""
     notes: tuple[str, ...] = ()
     """Sentences to print below."""
     joint_names: str = "theta"

@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+import numpy as np
+
 from dh2sim.symbolic.check import SampledConfigurations, check_form
-from dh2sim.symbolic.expression import Lengths, Nesting, Style
-from dh2sim.symbolic.form import Equation, Form, equation, with_names
+from dh2sim.symbolic.expression import Factor, Lengths, Nesting, Style, Sum, Term, evaluated
+from dh2sim.symbolic.form import Condition, Equation, Form, equation, with_names
+from dh2sim.symbolic.jacobian import (
+    Determinant,
+    factored_determinant,
+    geometric_jacobian_matrix,
+    singularities,
+    square_rows,
+)
 from dh2sim.symbolic.polynomial import Matrix, identity
 from dh2sim.symbolic.table import Fold, SymbolicTable, transform
+from dh2sim.typing import Array
 
 POSE_ENTRIES: Final = (
     ("r11", "r12", "r13", "px"),
@@ -100,6 +110,106 @@ def matrices_form(
     form = Form(what="matrices", table=table, equations=shown, named=named, joint_names=joint_names)
     check_form(form, expected, configurations)
     return form
+
+
+VELOCITIES: Final = ("vx", "vy", "vz", "wx", "wy", "wz")
+
+
+def jacobian_form(
+    table: SymbolicTable,
+    source: str = "base_link",
+    target: str = "tool0",
+    *,
+    style: Style = Style.BASE,
+    lengths: Lengths | None = None,
+    names: bool = True,
+    fold: Fold = Fold.PARALLEL,
+    joint_names: str = "theta",
+) -> Form:
+    """Return the geometric Jacobian of a frame in another one, and its determinant in factors.
+
+    The determinant is given for a square Jacobian; for fewer than six joints that of the rows that are not zero, of
+    the linear rows or of the angular ones, if they make it square.
+
+    Args:
+        table: The robot.
+        source: Frame in which velocities are expressed.
+        target: The frame that moves.
+        style: How entries are nested.
+        lengths: Whether lengths are outside or inside; by default as the style has them.
+        names: Whether sums that recur are named #1, #2, …
+        fold: Across which axes angles are added up.
+        joint_names: ``theta`` or ``q``.
+
+    Raises:
+        UnknownFrameError: There is no such frame.
+        MismatchError: It differs from the table's oracle.
+    """
+    configurations = SampledConfigurations(table)
+    J = geometric_jacobian_matrix(table, source, target, fold=fold)
+    numbers = configurations.jacobian(source, target)
+    within = sorted((table.frames[source], table.frames[target]))
+    moves = [within[0] < table.frames[f"link_{i}"] <= within[1] for i in table.moving]
+    numbers = numbers * np.array(moves, dtype=np.float64)
+    nesting = Nesting([entry for row in J for entry in row], style, lengths)
+    columns = tuple(f"q{i}" for i in table.moving)
+    shown = equation(
+        "J",
+        J,
+        nesting,
+        meaning=f"Jacobian of {target} in {source}: vx vy vz wx wy wz",
+        entry_names=tuple(tuple(f"J{r}{c}" for c in range(1, len(columns) + 1)) for r in range(1, 7)),
+        columns=columns,
+    )
+    equations, named = with_names([shown], names=names)
+    expected = {"J": numbers}
+    conditions: tuple[Condition, ...] = ()
+    notes: tuple[str, ...] = ()
+    rows = square_rows(J)
+    if rows is not None and table.frames[source] < table.frames[target]:
+        found = factored_determinant(table, J, rows, configurations, fold=fold)
+        if found is None:
+            notes = ("The determinant has no factors that its structure shows; it is left out.",)
+        else:
+            determinant = np.linalg.det(numbers[:, list(rows), :])
+            term = _signed(found, nesting, determinant, configurations)
+            of = "" if len(rows) == 6 else "(" + ", ".join(VELOCITIES[i] for i in rows) + ")"
+            equations = (*equations, Equation(name=f"det J{of}", entries=((Sum((term,) if term.number else ()),),)))
+            expected[equations[-1].name] = determinant[:, None, None]
+            conditions = tuple(
+                Condition(expression=nesting(s.factor), name=s.name, angle=s.angle, degrees=s.degrees)
+                for s in singularities(table, found)
+            )
+            if not term.number:
+                notes = ("The Jacobian is singular at all configurations.",)
+    form = Form(
+        what="jacobian",
+        table=table,
+        equations=equations,
+        named=named,
+        conditions=conditions,
+        notes=notes,
+        joint_names=joint_names,
+    )
+    check_form(form, expected, configurations)
+    return form
+
+
+def _signed(
+    determinant: Determinant, nesting: Nesting, numbers: Array, configurations: SampledConfigurations
+) -> Term:
+    """Return a determinant as a product, with the sign that the numbers have."""
+    factors: list[Factor] = []
+    for factor in dict.fromkeys(determinant.factors):
+        nested = nesting(factor)
+        power = determinant.factors.count(factor)
+        single = nested.terms[0].factors if len(nested.terms) == 1 else ()
+        factors.append(Factor(single[0].base if len(single) == 1 else nested, power))
+    term = Term(determinant.number, tuple(factors))
+    values = configurations.values({atom for factor in determinant.factors for atom in factor.atoms})
+    (value,) = evaluated([Sum((term,))], {}, values)
+    where = int(np.abs(numbers).argmax())
+    return -term if (np.broadcast_to(value, numbers.shape)[where] < 0) != (numbers[where] < 0) else term
 
 
 def _pose_equation(

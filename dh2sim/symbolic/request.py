@@ -9,7 +9,7 @@ from dh2sim.messages import member
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.form import Equation, Form
-from dh2sim.symbolic.kinematics import matrices_form, pose_form
+from dh2sim.symbolic.kinematics import jacobian_form, matrices_form, pose_form
 from dh2sim.symbolic.table import Fold, symbolic_table
 from dh2sim.symbolic.text import form_text
 
@@ -19,6 +19,7 @@ class What(StrEnum):
 
     POSE = "pose"
     MATRICES = "matrices"
+    JACOBIAN = "jacobian"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,8 @@ def symbolic_form(
 
     Args:
         spec: The robot.
-        what: 'pose': a frame in another one; 'matrices': the transform of every row and every DH frame in frame 0.
+        what: 'pose': a frame in another one; 'matrices': the transform of every row and every DH frame in frame 0;
+            'jacobian': the geometric Jacobian, and its determinant in factors.
         source: Frame that a pose is given in.
         target: Frame whose pose it is.
         style: 'base': nested from the base, as textbooks print it; 'tool': nested from the tool, as computer
@@ -82,6 +84,17 @@ def symbolic_form(
     match member(What, what, "form"):
         case What.POSE:
             form = pose_form(
+                table,
+                source,
+                target,
+                style=style_,
+                lengths=lengths_,
+                names=names,
+                fold=fold_,
+                joint_names=joint_names,
+            )
+        case What.JACOBIAN:
+            form = jacobian_form(
                 table,
                 source,
                 target,

@@ -19,10 +19,12 @@ from dh2sim.messages import Loc, did_you_mean
 from dh2sim.robot.expressions import ExpressionError, evaluate, evaluate_in
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, Pose, RobotSpec, Row
 from dh2sim.robot.yaml_tree import Node, Report, compose
-from dh2sim.symbolic.angles import Angle, slide
+from dh2sim.symbolic.angles import Angle, slide, trig_of
 from dh2sim.symbolic.polynomial import (
     ONE,
+    ROOTS,
     ZERO,
+    Atom,
     Matrix,
     NotPolynomialError,
     Polynomial,
@@ -408,6 +410,22 @@ def _value(polynomial: Polynomial, parameters: Mapping[str, float]) -> float:
         math.prod([float(number), *(({"pi": math.pi} | dict(parameters))[atom] ** power for atom, power in monomial)])
         for monomial, number in polynomial.terms.items()
     )
+
+
+def constant_value(table: SymbolicTable, atom: Atom) -> float | None:
+    """Return the value of an atom that does not depend on the configuration; None for any other."""
+    if atom in ROOTS:
+        return math.sqrt(ROOTS[atom])
+    trig = trig_of(atom)
+    if trig is None:
+        letter = table.letters.get(atom)
+        return None if letter is None else letter.value
+    if not trig.angle.is_constant:
+        return None
+    angle = math.radians(trig.angle.degrees) + math.fsum(
+        float(n) * table.letters[name].value for name, n in trig.angle.names
+    )
+    return math.cos(angle) if trig.function == "cos" else math.sin(angle)
 
 
 def _shift(x: Polynomial = ZERO, y: Polynomial = ZERO, z: Polynomial = ZERO) -> Motion:

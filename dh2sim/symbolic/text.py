@@ -10,7 +10,7 @@ from typing import Final
 
 from dh2sim.symbolic.angles import Angle, slide_row, trig_of
 from dh2sim.symbolic.expression import Sum
-from dh2sim.symbolic.form import Equation, Form
+from dh2sim.symbolic.form import Condition, Equation, Form
 from dh2sim.symbolic.notation import decimal, written
 from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
 from dh2sim.symbolic.table import Letter, SymbolicTable
@@ -100,6 +100,8 @@ def form_text(form: Form, width: int = WIDTH) -> str:
     legend = "\n".join(legend_lines(form, notation, width))
     if legend:
         blocks.append(legend)
+    if form.conditions:
+        blocks.insert(len(form.equations), "\n".join(_condition_lines(form.conditions, notation, width)))
     blocks += ["\n".join(_filled(note, width)) for note in form.notes]
     return "\n\n".join(blocks)
 
@@ -145,6 +147,25 @@ def _bases(sum_: Sum) -> Iterator[Atom]:
                 yield base
 
 
+def _condition_lines(conditions: Sequence[Condition], notation: TextNotation, width: int) -> Iterator[str]:
+    yield "singular where"
+    for condition in conditions:
+        text = f"{written(condition.expression, notation)} = 0"
+        details = condition_text(condition, notation)
+        yield from _wrapped("", f"{text}{details}", width)
+
+
+def condition_text(condition: Condition, notation: TextNotation) -> str:
+    """Return what is known of a condition: ``  (wrist): theta_5 = 0° or 180°``."""
+    text = f" ({condition.name})" if condition.name else ""
+    if condition.angle is not None and condition.degrees:
+        values = " or ".join(f"{value:.6g}°" for value in condition.degrees)
+        text += f": {notation.angle(condition.angle)} = {values}"
+    elif condition.angle is not None:
+        text += ": nowhere"
+    return text
+
+
 def _equation_lines(equation: Equation, notation: TextNotation, width: int) -> Iterator[str]:
     """Yield a heading and a matrix, or an equation for each entry."""
     cells = [[written(entry, notation) for entry in row] for row in equation.entries]
@@ -156,12 +177,15 @@ def _equation_lines(equation: Equation, notation: TextNotation, width: int) -> I
     if grid is not None:
         yield from grid
         return
+    zeros = sum(cell == "0" for row in cells for cell in row) > 4
     label = max(len(name) for row in equation.entry_names for name in row)
     for names, row in zip(equation.entry_names, cells, strict=False):
         for name, cell in zip(names, row, strict=True):
-            if not name:
+            if not name or (zeros and cell == "0"):
                 continue
             yield from _wrapped(f"{name:{label}} = ", cell, width)
+    if zeros:
+        yield "  and all other entries are 0"
 
 
 def matrix_lines(cells: Sequence[Sequence[str]], width: int) -> list[str] | None:

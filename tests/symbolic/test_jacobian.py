@@ -1,0 +1,86 @@
+"""The Jacobian in symbols, its determinant in factors and the singular configurations it names."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dh2sim.kinematics.chain import build_chain
+from dh2sim.kinematics.forward import geometric_jacobian
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.symbolic.check import SampledConfigurations, check_form
+from dh2sim.symbolic.request import symbolic_form
+from dh2sim.symbolic.table import Fold
+from tests.sample_robots import NAMES, row
+from tests.sample_robots import robot as spec_of
+from tests.strategies import robot_specs
+
+
+@given(robot_specs(max_rows=4), st.sampled_from(Fold))
+def test_jacobian_equals_that_of_the_chain(spec: RobotSpec, fold: Fold) -> None:
+    form = symbolic_form(spec, "jacobian", fold=fold).form
+    configurations = SampledConfigurations(form.table, seed=3)
+    J = geometric_jacobian(build_chain(spec), configurations.q)
+    only_J = replace(form, equations=form.equations[:1])
+    assert check_form(only_J, {"J": J}, configurations) <= 1e-13
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if len(spec_of(name).rows) == 6])
+def test_determinant_of_every_six_axis_arm_has_factors_equal_to_that_of_the_chain(name: str) -> None:
+    form = symbolic_form(spec_of(name), "jacobian").form
+    _, determinant = form.equations
+    configurations = SampledConfigurations(form.table, seed=4)
+    expected = np.linalg.det(geometric_jacobian(build_chain(spec_of(name)), configurations.q))
+    only = replace(form, equations=(determinant,))
+    check_form(only, {"det J": expected[:, None, None]}, configurations)
+    assert len(determinant.flat[0].terms) == 1
+
+
+def lines(spec: RobotSpec, what: str = "jacobian") -> list[str]:
+    return [" ".join(line.split()) for line in str(symbolic_form(spec, what)).splitlines()]
+
+
+def test_determinant_of_the_puma_is_elbow_shoulder_and_wrist() -> None:
+    text = lines(spec_of("puma560"))
+    assert "det J = -a2*s5*(a3*s3 + d4*c3)*(a2*c2 + a3*c23 - d4*s23)" in text
+    assert "s5 = 0 (wrist): theta_5 = 0° or 180°" in text
+    assert "a3*s3 + d4*c3 = 0 (elbow): theta_3 = -87.3084° or 92.6916°" in text
+    assert "a2*c2 + a3*c23 - d4*s23 = 0 (shoulder)" in text
+
+
+def test_the_angles_of_a_singular_configuration_are_singular() -> None:
+    chain = build_chain(spec_of("puma560"))
+    for q3 in (-87.3084, 92.6916):
+        q = np.array([0.3, -0.7, math.radians(q3), 1.1, 0.6, -0.4])
+        assert abs(np.linalg.det(geometric_jacobian(chain, q))) < 1e-7
+
+
+def test_determinant_of_the_stanford_arm() -> None:
+    assert "det J = d3^2*s2*s5" in lines(spec_of("stanford"))
+
+
+def test_a_planar_arm_has_the_determinant_of_its_linear_rows_and_a_wrist_that_of_its_angular_ones() -> None:
+    assert "det J(vx, vy) = a1*a2*s2" in lines(spec_of("planar_2r"))
+    assert "det J(wx, wy, wz) = -s2" in lines(spec_of("spherical_wrist"))
+    assert "det J(vx, vy, vz, wz) = a1*a2*s2" in lines(spec_of("scara"))
+
+
+def test_a_redundant_arm_has_no_determinant() -> None:
+    assert not any("det" in line for line in lines(spec_of("kuka_iiwa14")))
+
+
+def test_an_arm_that_is_singular_everywhere_says_so() -> None:
+    rows = tuple(row(f"j{i}", a=0.1) for i in range(6))
+    text = lines(RobotSpec(name="flat", rows=rows))
+    assert "det J" not in " ".join(text)  # six joints, three rows that are not zero
+
+
+def test_an_arm_of_odd_twists_prints_its_jacobian_without_a_determinant() -> None:
+    rows = tuple(row(f"j{i}", a=0.1 + 0.01 * i, d=0.2 - 0.01 * i, alpha=0.3 + 0.1 * i) for i in range(6))
+    text = " ".join(lines(RobotSpec(name="general", rows=rows)))
+    assert "The determinant has no factors that its structure shows; it is left out." in text
