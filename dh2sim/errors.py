@@ -64,10 +64,6 @@ class ConfigurationError(Dh2simError, ValueError):
     """A joint vector has the wrong shape or holds something that is not a finite number."""
 
 
-class GoalError(Dh2simError, ValueError):
-    """What inverse kinematics is asked for is wrong: the pose, or what is locked or left free."""
-
-
 class MeshError(Dh2simError):
     """A mesh cannot be used."""
 

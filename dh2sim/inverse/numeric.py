@@ -125,7 +125,7 @@ class NumericSolver:
         """
         self.n = chain.n
         self.turns = np.array([joint.type.turns for joint in chain.moving_joints], dtype=np.bool_)
-        self.size = _size(chain, lower, upper)
+        self.size = arm_size(chain, lower, upper)
         """What lengths are compared with: how far the arm reaches, m."""
         self._units = np.where(self.turns, 1.0, self.size)
         self._signs = np.array([joint.sign for joint in chain.moving_joints])
@@ -340,7 +340,7 @@ def _pointing(vectors: Array) -> Array:
     return np.asarray(vectors * np.sign(vectors[np.arange(len(vectors)), first])[:, None])
 
 
-def _size(chain: KinematicChain, lower: Array, upper: Array) -> float:
+def arm_size(chain: KinematicChain, lower: Array, upper: Array) -> float:
     """Return a bound on the distance from base_link to tool0, m; a slide without limits counts as none."""
     ranges = iter(zip(lower.tolist(), upper.tolist(), strict=True))
     travels = []

@@ -34,11 +34,11 @@ class Solutions:
     q: Array
     """Joint vectors, rad and m, shape (k, n)."""
     residual: Array
-    """How far each is from the pose by the table's textbook product, shape (k,): the distance in units of the arm's
-    longest link or the angle, rad, whichever is larger; only what the goal asks for counts."""
+    """How far each is from the pose by the table's textbook product, shape (k,): the distance over the
+    arm's size or the angle, rad, whichever is larger; only what the goal asks for counts."""
     sigma_min: Array
-    """Least singular value of the goal's Jacobian, with lengths in units of the arm's longest link, shape (k,): zero
-    at a singularity."""
+    """Least singular value of the goal's Jacobian, lengths in units of the arm's size, shape (k,): 0 at a
+    singularity."""
     within_limits: NDArray[np.bool_]
     """Whether each keeps the robot's position limits, bool, shape (k,)."""
     same: NDArray[np.intp]

@@ -6,29 +6,27 @@ import math
 from collections.abc import Mapping
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.errors import GoalError
+from dh2sim.errors import ConfigurationError
 from dh2sim.inverse.elimination import Found, Method, choose_method
+from dh2sim.inverse.goals import Free, read_goals, require_free
 from dh2sim.inverse.loop import Arm, build_arm, joint_rank
+from dh2sim.inverse.nearest import goal_residuals, goal_sigma_min
+from dh2sim.inverse.numeric import arm_size
+from dh2sim.inverse.reach import position_limits
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.turns import Turns
-from dh2sim.kinematics.chain import SpecLike, build_chain, spec_of
-from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, spec_of
 from dh2sim.messages import did_you_mean, listed, shown
 from dh2sim.robot.spec import BaseSpec, Limits, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 
-Free: TypeAlias = Literal["rotation", "roll"]
-"""What a goal leaves open: the orientation of tool0, or its turning about its own z."""
-
 VERIFIED: Final = 1e-10
 """Residual up to which a configuration is a solution."""
-_RIGID: Final = 1e-6
-"""By which entries of R Rᵀ of a given pose may differ from those of the identity."""
 _GOAL_JOINTS: Final[Mapping[str | None, int]] = {None: 0, "roll": 1, "rotation": 3}
 
 
@@ -54,13 +52,13 @@ class InverseSolver:
         """Names of the joints, in the order of joint vectors."""
         self._limits = tuple(row.limits.position for row in rows)
         self._home = spec.named_configurations["home"]
+        self._chain = build_chain(spec)
         self._built = _shared(_key(spec))
-        arm = self._arm(None)
-        self.length = arm.length
-        """Unit of length of residuals and singular values, m: the longest link, or the longest slide's travel."""
-        lower, upper = zip(*(limit or (-math.inf, math.inf) for limit in self._limits), strict=True)
-        turns = np.array(arm.turns)
-        self._turns = Turns(np.array(lower), np.array(upper), turns, np.where(turns, 1.0, arm.length))
+        lower, upper = position_limits(rows)
+        self.size = arm_size(self._chain, lower, upper)
+        """Unit of length of residuals and singular values, m: a bound on the distance from base_link to tool0."""
+        turns = np.array([row.type.turns for row in rows], dtype=np.bool_)
+        self._turns = Turns(lower, upper, turns, np.where(turns, 1.0, self.size))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a pickle holds: the table, and what is built."""
@@ -96,15 +94,14 @@ class InverseSolver:
             The :class:`Solutions` of one pose, or a list of those of N poses.
 
         Raises:
-            GoalError: A pose is no rigid transform, a joint to lock is unknown, or the arm has more joints than the
-                goal needs.
-            ConfigurationError: ``q0`` has the wrong shape.
+            ConfigurationError: A pose is no rigid transform, ``q0`` has the wrong shape, a joint to lock is unknown,
+                or the arm has more joints than the goal needs.
         """
-        poses, single = _poses(T)
-        near = self._home if q0 is None else self._vector(q0)
+        goals = read_goals(T)
+        poses = goals.reshape(-1, 4, 4)
+        near = self._home if q0 is None else joint_vector(self._chain, q0)
         locked = self._locked(lock or {}, len(poses))
-        if free not in _GOAL_JOINTS:
-            raise GoalError(f"free must be 'rotation', 'roll' or None, got {free!r}")
+        require_free(free)
         method = self._method(free, tuple(sorted(locked)))
         arm = method.arm
         scaled = {
@@ -112,7 +109,7 @@ class InverseSolver:
         }
         found = method.solve(arm.scaled_poses(poses), scaled)
         results = self._results(method, found, poses, near, free, limits=limits)
-        return results[0] if single else results
+        return results[0] if goals.ndim == 2 else results
 
     def _results(
         self, method: Method, found: Found, poses: Array, q0: Array, free: Free | None, *, limits: bool
@@ -120,14 +117,15 @@ class InverseSolver:
         """Verify what was found by the table's own product, and tell it pose by pose."""
         n = len(self.names)
         q = method.arm.unscaled(found.q)[:, :n]
-        residual = _residuals(table_tool_pose(self._spec, q), poses[found.pose], free, self.length)
+        residual = goal_residuals(self._spec, q, poses[found.pose], free=free, size=self.size)
         true = residual <= VERIFIED
         found, q, residual = found.of(true), q[true], residual[true]
+        sigma = goal_sigma_min(self._spec, q, free=free, size=self.size)
         if limits:
             which, q = self._turns.allowed(q, q0)
         else:
             which, q = np.arange(len(q)), self._turns.placed(q, q0)
-        pose, sigma, residual = found.pose[which], found.sigma[which], residual[which]
+        pose, sigma, residual = found.pose[which], sigma[which], residual[which]
         order = np.lexsort([self._turns.distance(q, q0), pose])
         pose, sigma, residual, which, q = pose[order], sigma[order], residual[order], which[order], q[order]
         inside = self._turns.inside(q)
@@ -150,7 +148,7 @@ class InverseSolver:
 
     def _arm(self, free: Free | None) -> Arm:
         if free not in self._built:
-            self._built[free] = build_arm(build_chain(self._spec), self._limits, _GOAL_JOINTS[free])
+            self._built[free] = build_arm(self._chain, self._limits, _GOAL_JOINTS[free])
         arm = self._built[free]
         assert isinstance(arm, Arm)
         return arm
@@ -164,7 +162,7 @@ class InverseSolver:
             surplus = int(moving.sum()) - joint_rank(arm, moving, ranges)
             if surplus:
                 more = "1 joint more" if surplus == 1 else f"{surplus} joints more"
-                raise GoalError(f"the arm has {more} than the goal needs: lock some of {listed(self.names)}")
+                raise ConfigurationError(f"the arm has {more} than the goal needs: lock some of {listed(self.names)}")
             self._built[free, locked] = choose_method(arm, moving, ranges)
         method = self._built[free, locked]
         assert isinstance(method, Method)
@@ -180,21 +178,16 @@ class InverseSolver:
                     ranges[i] = (low, high)
         return np.array(ranges)
 
-    def _vector(self, q0: ArrayLike) -> Array:
-        from dh2sim.kinematics.chain import joint_vector
-
-        return joint_vector(build_chain(self._spec), q0)
-
     def _locked(self, lock: Mapping[str, ArrayLike], poses: int) -> dict[int, Array]:
         """Return the locked joints' coordinates by index, each of shape (1,) or (poses,)."""
         locked = {}
         for name, given in lock.items():
             if name not in self.names:
                 hint = did_you_mean(name, self.names)
-                raise GoalError(f"unknown joint {shown(name)} to lock.{hint} Joints: {listed(self.names)}")
+                raise ConfigurationError(f"unknown joint {shown(name)} to lock.{hint} Joints: {listed(self.names)}")
             value = np.atleast_1d(np.asarray(given, dtype=np.float64))
             if value.shape not in ((1,), (poses,)) or not np.isfinite(value).all():
-                raise GoalError(
+                raise ConfigurationError(
                     f"the value of {name}, which is locked, must be a finite number, or one for each pose"
                 )
             locked[self.names.index(name)] = value
@@ -253,38 +246,3 @@ def _bare(spec: RobotSpec) -> RobotSpec:
         rows=tuple(bare(row) for row in spec.rows),
         configurations=home,
     )
-
-
-def _poses(T: ArrayLike) -> tuple[Array, bool]:
-    """Check poses and make their rotations orthonormal; return shape (N, 4, 4), and whether there is only one.
-
-    Raises:
-        GoalError: They are no rigid transforms.
-    """
-    try:
-        given = np.asarray(T, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise GoalError("poses must be arrays of numbers of shape (4, 4) or (N, 4, 4)") from None
-    if given.shape[-2:] != (4, 4) or given.ndim not in (2, 3):
-        raise GoalError(f"poses must be of shape (4, 4) or (N, 4, 4), got {given.shape}")
-    poses = np.array(given.reshape(-1, 4, 4))
-    R = poses[:, :3, :3]
-    if not np.isfinite(poses).all():
-        raise GoalError("poses must be finite")
-    gap = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(initial=0.0)
-    if gap > _RIGID or (np.linalg.det(R) < 0.0).any() or np.abs(poses[:, 3] - [0, 0, 0, 1]).max(initial=0.0) > 0.0:
-        raise GoalError("poses must be rigid transforms: a rotation and a position, and 0 0 0 1 in the last row")
-    U, _, Vt = np.linalg.svd(R)
-    poses[:, :3, :3] = U @ Vt
-    return poses, given.ndim == 2
-
-
-def _residuals(T: Array, goals: Array, free: Free | None, length: float) -> Array:
-    """Return how far poses are from goals in what counts: distance in units of ``length`` or angle, shape (M,)."""
-    distance = np.linalg.norm(T[:, :3, 3] - goals[:, :3, 3], axis=1) / length
-    if free == "rotation":
-        return np.asarray(distance)
-    axes = slice(2, 3) if free == "roll" else slice(0, 3)
-    gap = np.linalg.norm(T[:, :3, axes] - goals[:, :3, axes], axis=(1, 2))
-    gap *= 1.0 if free == "roll" else math.sqrt(0.5)
-    return np.asarray(np.maximum(distance, 2.0 * np.arcsin(np.minimum(1.0, 0.5 * gap))))

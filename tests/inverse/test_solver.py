@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dh2sim
-from dh2sim.errors import GoalError
+from dh2sim.errors import ConfigurationError
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.solver import InverseSolver
 from dh2sim.kinematics.table_oracle import table_tool_pose
@@ -85,5 +85,5 @@ def test_one_pose_has_its_solutions_and_many_poses_a_list() -> None:
 
 
 def test_a_pose_that_is_no_rigid_transform_is_refused() -> None:
-    with pytest.raises(GoalError, match="must be rigid transforms"):
+    with pytest.raises(ConfigurationError, match="must be a pose"):
         solver("scara").solve(2.0 * np.eye(4))
