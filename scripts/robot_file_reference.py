@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from dh2sim.robot.magnitudes import MAGNITUDES, shown_size
 from dh2sim.robot.schema import json_schema
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "robot-file.md"
@@ -39,6 +40,12 @@ A number may be an arithmetic expression in a string over `parameters` and `pi`:
 `sqrt sin cos tan asin acos atan atan2`. The functions take and return radians, whatever the file's angle unit is: in
 a file in degrees write `atan2(3, 4) * 180 / pi`. NaN and infinity are errors. The joint variable is not written: the
 joint coordinate adds to `theta` or `d`, whose value is the offset (default 0).
+
+Magnitudes have bounds, so that all that is read can be exported, and read by simulators:
+
+@MAGNITUDES@
+
+What must be positive, or is a mass or a gain that is not 0, is at least the least. Numbers below 1e-60 count as 0.
 
 ## Units
 
@@ -124,7 +131,19 @@ TITLES = {
 def page() -> str:
     """Return the page."""
     schema = json_schema()
-    return INTRODUCTION + "\n".join(["", *_section("Top level", schema, schema), *_sections(schema)])
+    introduction = INTRODUCTION.replace("@MAGNITUDES@", "\n".join(_magnitudes()))
+    return introduction + "\n".join(["", *_section("Top level", schema, schema), *_sections(schema)])
+
+
+def _magnitudes() -> Iterator[str]:
+    """Yield a table of the bounds; quantities that have the same ones and the same unit share a row."""
+    shared: dict[tuple[str, float, float], list[str]] = {}
+    for of in MAGNITUDES:
+        shared.setdefault((of.unit, of.least, of.most), []).append(of.name)
+    yield "| numbers | unit | least | most |"
+    yield "|---|---|---|---|"
+    for (unit, least, most), names in shared.items():
+        yield f"| {', '.join(names)} | {unit} | {shown_size(least) if least else ''} | {shown_size(most)} |"
 
 
 def _sections(schema: dict[str, Any]) -> Iterator[str]:
@@ -155,10 +174,8 @@ def _kind(value: dict[str, Any], schema: dict[str, Any]) -> str:
     kind = value.get("type")
     if kind == ["number", "string"]:
         text = "number"
-        if "exclusiveMinimum" in value:
-            text += f" > {value['exclusiveMinimum']:g}"
-        elif "minimum" in value:
-            text += f" >= {value['minimum']:g}"
+        if value.get("minimum", -1) >= 0:
+            text += " > 0" if value["minimum"] else " >= 0"
         return text + _default(value)
     if kind == "array":
         least, most = value.get("minItems"), value.get("maxItems")

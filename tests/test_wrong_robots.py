@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -28,6 +29,20 @@ from dh2sim import (
     ToolSpec,
 )
 from dh2sim.errors import Dh2simError, MeshError, RobotError
+from dh2sim.robot.magnitudes import (
+    ACCELERATION,
+    ANGLE,
+    ARMATURE,
+    DAMPING,
+    DENSITY,
+    EFFORT,
+    FRICTION,
+    LENGTH,
+    MASS,
+    POSITION_GAIN,
+    VELOCITY_GAIN,
+    Magnitude,
+)
 from dh2sim.robot.spec import BaseSpec, MeshSpec
 
 NAN, INF = math.nan, math.inf
@@ -239,6 +254,27 @@ WRONG: list[tuple[Callable[[], object], str]] = [
     (lambda: spec(base=BaseSpec(color=(2, 0, 0, 1))), "base.color[0]: must be from 0 to 1, found 2"),
     (lambda: spec(units="deg"), "units: expected a Units, found 'deg'"),
     (lambda: spec(parameters={"x": NAN}), "parameters.x: expected a finite number, found nan"),
+    # magnitudes
+    (lambda: rows(Revolute(a=1e7)), "joints[0].a: must be from -1e6 to 1e6 m, found 10000000.0"),
+    (
+        lambda: rows(Revolute(), Revolute(alpha=-2e6)),
+        "joints[1].alpha: must be from -1e6 to 1e6 rad, found -2000000.0",
+    ),
+    (lambda: link(mass=1e-16), "joints[0].link.mass: must be 0, or from 1e-12 to 1e30 kg, found 1e-16"),
+    (lambda: link(radius=1e-161), "joints[0].link.radius: must be from 1e-6 to 1e6 m, found 1e-161"),
+    (
+        lambda: rows(Revolute(dynamics=Dynamics(armature=1e305))),
+        "joints[0].dynamics.armature: must be at most 1e60 kg·m² or kg, found 1e+305",
+    ),
+    (
+        lambda: rows(Prismatic(limits=Limits(velocity=1e9))),
+        "joints[0].limits.velocity: must be from 1e-6 to 1e6 m/s, found 1000000000.0",
+    ),
+    (lambda: robot(gravity=(0, 0, 1e307)), "gravity[2]: must be from -1e6 to 1e6 m/s², found 1e+307"),
+    (
+        lambda: robot(configurations={"home": [1e7, 0]}),
+        "configurations.home[0]: must be from -1e6 to 1e6 rad, found 10000000.0",
+    ),
 ]
 
 
@@ -251,19 +287,26 @@ def test_a_wrong_robot_is_refused_when_it_is_made(make: Callable[[], object], me
     assert isinstance(caught.value, ValueError)
 
 
-@pytest.mark.parametrize("size", [1e20, 1e-20, 1e-300])
-def test_a_robot_of_any_size_that_is_taken_has_a_model_of_finite_numbers(size: float) -> None:
-    positive = max(size, 1e-20)
+@pytest.mark.parametrize("large", [True, False])
+def test_a_robot_of_the_largest_and_smallest_numbers_has_a_model_of_finite_numbers(large: bool) -> None:
+    def size(of: Magnitude) -> float:
+        return of.most if large else of.least or 1e-59
+
+    length, angle = (size(of) if large else 1e-59 for of in (LENGTH, ANGLE))
+    shape = LinkSpec(density=size(DENSITY), radius=size(LENGTH))
+    friction = Dynamics(damping=size(DAMPING), friction=size(FRICTION), armature=size(ARMATURE))
     arm = Robot(
         [
-            Revolute(a=size, alpha=size, d=size, theta=size, link=LinkSpec(density=positive, radius=positive)),
-            Revolute(dynamics=Dynamics(damping=size, friction=size, armature=size), link=LinkSpec(mass=positive)),
-            Prismatic(d=size, actuator=ActuatorSpec(kp=positive)),
+            Revolute(a=length, alpha=angle, d=length, theta=angle, link=shape),
+            Revolute(dynamics=friction, link=LinkSpec(mass=size(MASS), com=(length, 0, length))),
+            Prismatic(d=length, actuator=ActuatorSpec(kp=size(POSITION_GAIN), kv=size(VELOCITY_GAIN))),
+            Revolute(a=length, limits=Limits(velocity=size(ANGLE), effort=size(EFFORT))),
         ],
-        gravity=(0.0, 0.0, -size),
+        gravity=(0.0, 0.0, -(size(ACCELERATION) or 1e-59)),
     )
     for text in (arm.urdf(), arm.mjcf()):
         assert not re.search(r"\b(nan|inf)\b", text, re.IGNORECASE)
+        assert mujoco.MjModel.from_xml_string(text).nq == 4
 
 
 def test_a_mesh_that_there_is_not_is_named_with_its_link(tmp_path: Path) -> None:

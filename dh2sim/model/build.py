@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Sequence
+from dataclasses import fields, replace
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -24,8 +24,6 @@ from dh2sim.model.shapes import Shape, given_shape, placed
 from dh2sim.robot.spec import LinkSpec, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 
-LARGEST = 1e20
-"""Size of the largest number that a model is built from, and one over the least mass, density or radius."""
 PALETTE: tuple[Color, ...] = (
     (0.90, 0.45, 0.13, 1.0),
     (0.93, 0.60, 0.18, 1.0),
@@ -74,10 +72,9 @@ def build_model(spec: SpecLike) -> RobotModel:
 
     Raises:
         MeshError: A mesh file cannot be used.
-        ModelError: A number is too large or too small to compute with.
+        ModelError: The last joint moves nothing that has mass.
     """
     spec = spec_of(spec)
-    _check_sizes(spec)
     chain = build_chain(spec)
     travels = travels_of(chain, spec.rows)
     ranges = position_ranges(spec.rows, travels)
@@ -142,22 +139,6 @@ def build_model(spec: SpecLike) -> RobotModel:
     )
 
 
-def _check_sizes(spec: RobotSpec) -> None:
-    """Refuse numbers whose products would leave the range of doubles.
-
-    Raises:
-        ModelError: One is too large, or too small where it is divided by.
-    """
-    parts: dict[str, object] = {f"joints[{index}]": row for index, row in enumerate(spec.rows)}
-    parts |= {"base": spec.base.pose, "tool": spec.tool, "payload": spec.payload, "gravity": spec.gravity}
-    for part, value in parts.items():
-        for path, number in _numbers(part, value):
-            divides = path.endswith(("mass", "density", "radius"))
-            if abs(number) > LARGEST or (divides and 0 < number < 1 / LARGEST):
-                bound = f"at most {LARGEST:g}" if abs(number) > LARGEST else f"at least {1 / LARGEST:g}"
-                raise ModelError(f"{spec.name}: {path} is {number:g}; a model needs numbers of {bound}")
-
-
 def _check_carried(spec: RobotSpec, bodies: Sequence[MassProperties | None]) -> None:
     """Refuse a last joint that moves no mass; ``bodies`` are the links', the last with the tool.
 
@@ -168,19 +149,6 @@ def _check_carried(spec: RobotSpec, bodies: Sequence[MassProperties | None]) -> 
     if last is not None and not any(bodies[last:]):
         name = spec.rows[last].name
         raise ModelError(f"{spec.name}: {name} moves nothing that has mass; give its link a mass, or the tool")
-
-
-def _numbers(path: str, value: object) -> Iterator[tuple[str, float]]:
-    """Yield every number in a part of a spec with its path."""
-    match value:
-        case int() | float():
-            yield path, value
-        case np.ndarray() | tuple():
-            for index, item in enumerate(value):
-                yield from _numbers(f"{path}[{index}]", item)
-        case _ if is_dataclass(value):
-            for field in fields(value):
-                yield from _numbers(f"{path}.{field.name}", getattr(value, field.name))
 
 
 def _payload(spec: RobotSpec, chain: KinematicChain, moving_mass: float) -> MassProperties | None:

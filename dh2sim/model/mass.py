@@ -13,6 +13,7 @@ import numpy as np
 
 from dh2sim.kinematics.transforms import move_point, rotate_tensor
 from dh2sim.model.shapes import Shape, ShapeKind
+from dh2sim.robot.magnitudes import INERTIA
 from dh2sim.robot.parts import inertia_problem
 from dh2sim.robot.spec import LinkSpec
 from dh2sim.typing import Array, read_only
@@ -31,8 +32,6 @@ TOOL_DENSITY = 1000.0
 """kg/m³: of tools and payloads, grippers and boxes that are not full."""
 MIN_MASS = 1e-9
 """kg: estimates are no smaller."""
-MIN_INERTIA = 1e-14
-"""kg·m²: estimates are no smaller. MuJoCo refuses moving bodies of less than 1e-15."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -156,7 +155,8 @@ def thickened(inertia: Array) -> Array | None:
     """Return the inertia, shape (3, 3), of a thin rod with a moment about the rod that survives being turned.
 
     That of an ideal rod is 0; rounding leaves it a little above or below, where turning the axes may make it the
-    other. Every moment is greater by 1e-9 of the trace then. Other inertias are returned as they are.
+    other. Every moment is greater by 1e-9 of the trace then, or by what is lacking to the least that simulators read.
+    Other inertias are returned as they are.
 
     Returns:
         None where no body has such an inertia.
@@ -169,7 +169,7 @@ def thickened(inertia: Array) -> Array | None:
     if abs(least) <= THIN * trace:
         extra = THICKNESS * trace
         inertia = read_only([[float(inertia[i, j]) + (extra if i == j else 0.0) for j in range(3)] for i in range(3)])
-    return inertia if is_possible(inertia) else None
+    return at_least(inertia, INERTIA.least) if is_possible(inertia) else None
 
 
 def at_least(inertia: Array, least: float) -> Array:
@@ -243,7 +243,7 @@ def of_shapes(shapes: Iterable[Shape], density: float) -> MassProperties:
 
 def _of_mass(body: MassProperties, mass: float) -> MassProperties:
     """Return a body of the same shape and another mass, kg; its inertia is not too small for MuJoCo."""
-    return replace(body, mass=mass, inertia=at_least(read_only(body.inertia * (mass / body.mass)), MIN_INERTIA))
+    return replace(body, mass=mass, inertia=at_least(read_only(body.inertia * (mass / body.mass)), INERTIA.least))
 
 
 def _estimate(link: LinkSpec, shapes: tuple[Shape, ...], anchor: Array) -> MassProperties:

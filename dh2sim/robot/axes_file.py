@@ -16,6 +16,7 @@ from dh2sim.robot.parts import Internal, Part, Parts
 from dh2sim.robot.read import read_tree, units_of
 from dh2sim.robot.spec import (
     CONVENTIONS,
+    GRAVITY,
     JOINT_LETTERS,
     LENGTHS,
     ActuatorSpec,
@@ -106,7 +107,9 @@ class AxesSpec:
         default_factory=Pose
     )
     """Pose of tool0 in base_link at joint coordinates zero."""
-    gravity: Annotated[Array, Numbers("m/s² in base_link.")] = field(default_factory=lambda: read_only([0, 0, -9.81]))
+    gravity: Annotated[Array, Numbers("m/s² in base_link.", GRAVITY)] = field(
+        default_factory=lambda: read_only([0, 0, -9.81])
+    )
     configurations: Annotated[Mapping[str, Array], Configurations("Named joint vectors.")] = field(
         default_factory=lambda: MappingProxyType({})
     )

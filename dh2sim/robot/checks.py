@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 from dh2sim.messages import Loc, listed, path_of, shown
-from dh2sim.robot.fields import WRONG, Scope, Tree, is_reserved, name_problem
+from dh2sim.robot.fields import COORDINATE, WRONG, Scope, Tree, is_reserved, name_problem
 
 _SLACK: Final = 1e-12
 """By which a configuration may pass a limit, of the larger of the two limits' sizes."""
@@ -116,7 +117,11 @@ def check_configurations(
             scope.report(loc, f"{expected}, found a list of {len(values)}")
             continue
         for place, (value, index, joint) in enumerate(zip(values, moving, called, strict=True)):
-            if value is not WRONG and (limits := _outside(value, rows[index])):
+            if value is WRONG:
+                continue
+            if problem := COORDINATE.size_problem(value, replace(scope, joint_type=rows[index]["type"])):
+                scope.report((*loc, place), f"{problem}, found {shown(value)}")
+            elif limits := _outside(value, rows[index]):
                 lower, upper = limits
                 outside = f"{value!r} is outside the limits of {joint}: {lower!r} to {upper!r}"
                 scope.report((*loc, place), outside + _whole_turn_hint(value, rows[index], limits, scope))

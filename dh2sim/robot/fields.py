@@ -8,6 +8,7 @@ Checks work on plain values (text, numbers, booleans, None, lists, mappings), wh
 the reader of files makes of YAML.
 """
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,6 +19,7 @@ from typing import Any, Final, Protocol, TypeAlias
 
 from dh2sim.messages import Loc, did_you_mean, listed, shown
 from dh2sim.robot.expressions import NumberError, is_name, names_in, parameter_name_problem, to_number
+from dh2sim.robot.magnitudes import ANGLE, ANY, LENGTH, ZERO, Magnitude, shown_size
 from dh2sim.typing import read_only
 
 Tree: TypeAlias = dict[str, Any]
@@ -72,6 +74,11 @@ class Scope:
     """Unit of the file's lengths."""
     joint_type: object = None
     """Of the row that the value is in, as given."""
+
+    @property
+    def turns(self) -> bool:
+        """Whether the coordinate of the row that the value is in is an angle."""
+        return self.joint_type in ("revolute", "continuous")
 
     @property
     def in_file(self) -> bool:
@@ -183,6 +190,10 @@ class Number(Kind):
 
     dimension: Dimension | None = None
     """None for a number that is in SI units everywhere."""
+    size: Magnitude = field(default=ANY, kw_only=True)
+    """How large it may be, where the dimension does not say so."""
+    rate: bool = field(default=False, kw_only=True)
+    """Whether it is one of the dimension per second."""
     above: float | None = field(default=None, kw_only=True)
     """It must be greater than this."""
     least: float | None = field(default=None, kw_only=True)
@@ -195,10 +206,11 @@ class Number(Kind):
         except NumberError as error:
             hint = number_hint(value, self.dimension, loc, scope) if isinstance(value, str) else None
             return scope.wrong(loc, hint or str(error))
-        if problem := self._problem(number):
+        if problem := self._problem(number) or self.size_problem(number, scope):
             result = f" = {number!r}" if isinstance(value, str) else ""
             return scope.wrong(loc, f"{problem}, found {shown(value)}{result}")
-        return number
+        counts_as_zero = abs(number) < ZERO and self.magnitude(turns=scope.turns) is not ANY
+        return 0.0 if counts_as_zero else number
 
     def _problem(self, number: float) -> str | None:
         if self.above is not None and number <= self.above:
@@ -208,6 +220,42 @@ class Number(Kind):
         if self.least is not None and number < self.least:
             return "must not be negative" if self.least == 0 else f"must be at least {self.least:g}"
         return None
+
+    def size_problem(self, number: float, scope: Scope) -> str | None:
+        """Return what is wrong with how large or small a number is, in the units that it is given in."""
+        bounds, (unit, si) = self.magnitude(turns=scope.turns), self._unit(scope)
+        most, least = bounds.most / si, bounds.least / si
+        size, positive = abs(number), self.above is not None
+        if math.isnan(size) or (size <= most and (size >= least or size == 0 or not self.unsigned)):
+            return None
+        if self.unsigned and not positive:
+            small = f"0, or from {shown_size(least)} to" if least else "at most"
+            return f"must be {small} {shown_size(most)}{unit}"
+        return f"must be from {shown_size(least if positive else -most)} to {shown_size(most)}{unit}"
+
+    @property
+    def unsigned(self) -> bool:
+        """Whether no negative number is allowed."""
+        return self.above is not None or self.least is not None
+
+    def magnitude(self, *, turns: bool) -> Magnitude:
+        """Return its bounds in SI units; ``turns`` says whether a joint coordinate is an angle."""
+        match self.dimension:
+            case Dimension.ANGLE:
+                return ANGLE
+            case Dimension.LENGTH:
+                return LENGTH
+            case Dimension.COORDINATE:
+                return ANGLE if turns else LENGTH
+            case None:
+                return self.size
+
+    def _unit(self, scope: Scope) -> tuple[str, float]:
+        """Return the unit that the number is in, for messages, and its size in SI units."""
+        if self.dimension is None:
+            return f" {self.size.unit}".rstrip(), 1.0
+        unit = scope.angle if self.magnitude(turns=scope.turns) is ANGLE else scope.length
+        return f" {unit}{'/s' if self.rate else ''}", IN_SI[unit]
 
     def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
         """Return the number in SI units."""
@@ -229,13 +277,15 @@ _SPELLINGS: Final = {
     "inches": "in",
 }
 _METRES: Final = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}
+IN_SI: Final = {"rad": 1.0, "deg": math.pi / 180, **_METRES}
+"""Units of robot files in SI units, to a rounding."""
 _VARIABLE: Final = r"(?:q|theta|th|t|θ|ϑ|d)_?(?:[0-9]+|i)?\*?"
 """Names of joint variables in textbooks."""
 
 
 def number_hint(text: str, dimension: Dimension | None, loc: Loc, scope: Scope) -> str | None:
     """Return what is wrong with a number that has a unit or is the joint variable; None for other mistakes."""
-    turns = scope.joint_type in ("revolute", "continuous")
+    turns = scope.turns
     moving = "theta" if turns else "d" if scope.joint_type == "prismatic" else None
     if moving is not None and loc[-1] == moving:
         whole = re.fullmatch(_VARIABLE, text.strip())
@@ -270,6 +320,8 @@ def number_hint(text: str, dimension: Dimension | None, loc: Loc, scope: Scope) 
 
 _ANY: Final = Number()
 _FRACTION: Final = Number(least=0, most=1)
+COORDINATE: Final = Number("", Dimension.COORDINATE)
+"""Of a joint."""
 
 
 @dataclass(eq=False, repr=False)
@@ -368,7 +420,7 @@ class Parameters(Kind):
         for name in value:
             if not isinstance(name, str) or not is_name(name):
                 scope.report(loc, parameter_name_problem(name))
-        return {name: Number().check(number, (*loc, str(name)), scope) for name, number in value.items()}
+        return {name: _ANY.check(number, (*loc, str(name)), scope) for name, number in value.items()}
 
     def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:  # noqa: ARG002
         """Return them as they are: what they measure is not known."""
@@ -387,4 +439,4 @@ class Configurations(Kind):
     def _vector(self, value: object, loc: Loc, scope: Scope) -> Any:
         if not isinstance(value, list):
             return scope.wrong(loc, f"expected a list, found {shown(value)}")
-        return [Number().check(number, (*loc, index), scope) for index, number in enumerate(value)]
+        return [_ANY.check(number, (*loc, index), scope) for index, number in enumerate(value)]

@@ -19,6 +19,7 @@ import numpy as np
 
 from dh2sim.messages import Loc, closest, did_you_mean, listed, shown
 from dh2sim.robot.fields import WRONG, Choice, Kind, Number, Scope, Tree, UnitsLike
+from dh2sim.robot.magnitudes import INERTIA, shown_size
 from dh2sim.typing import Array, read_only
 
 _TRIANGLE_TOLERANCE: Final = 1e-9
@@ -127,12 +128,12 @@ class Parts(Kind):
 class InertiaNumbers:
     """Inertia about the centre of mass along DH frame i's axes, kg·m²."""
 
-    ixx: Annotated[float, Number("kg·m²", required=True)]
-    iyy: Annotated[float, Number("kg·m²", required=True)]
-    izz: Annotated[float, Number("kg·m²", required=True)]
-    ixy: Annotated[float, Number("kg·m²; the matrix entry, as in URDF.")] = 0.0
-    ixz: Annotated[float, Number("kg·m²; the matrix entry, as in URDF.")] = 0.0
-    iyz: Annotated[float, Number("kg·m²; the matrix entry, as in URDF.")] = 0.0
+    ixx: Annotated[float, Number("kg·m²", size=INERTIA, required=True)]
+    iyy: Annotated[float, Number("kg·m²", size=INERTIA, required=True)]
+    izz: Annotated[float, Number("kg·m²", size=INERTIA, required=True)]
+    ixy: Annotated[float, Number("kg·m²; the matrix entry, as in URDF.", size=INERTIA)] = 0.0
+    ixz: Annotated[float, Number("kg·m²; the matrix entry, as in URDF.", size=INERTIA)] = 0.0
+    iyz: Annotated[float, Number("kg·m²; the matrix entry, as in URDF.", size=INERTIA)] = 0.0
 
 
 class Inertia(Kind):
@@ -143,7 +144,7 @@ class Inertia(Kind):
         matrix = self._named(value, loc, scope) if scope.in_file else self._matrix(value, loc, scope)
         if matrix is WRONG:
             return WRONG
-        problem = inertia_problem(np.array(matrix))
+        problem = inertia_problem(np.array(matrix)) or _small(np.array(matrix))
         return matrix if problem is None else scope.wrong(loc, problem)
 
     def _named(self, value: object, loc: Loc, scope: Scope) -> Any:
@@ -160,7 +161,7 @@ class Inertia(Kind):
     def _matrix(self, value: object, loc: Loc, scope: Scope) -> Any:
         if not isinstance(value, list) or [len(row) for row in value if isinstance(row, list)] != [3, 3, 3]:
             return scope.wrong(loc, f"expected a 3 × 3 matrix, found {shown(value)}")
-        number = Number()
+        number = Number(size=INERTIA)
         matrix = [
             [number.check(x, (*loc, i, j), scope) for j, x in enumerate(row)]  # a place in the matrix
             for i, row in enumerate(value)
@@ -188,6 +189,17 @@ def inertia_problem(matrix: Array) -> str | None:
     if a + b < c * (1 - _TRIANGLE_TOLERANCE):
         return f"no body has the principal moments {moments}: two make less than the third"
     return None
+
+
+def _small(matrix: Array) -> str | None:
+    """Return that a principal moment of a possible inertia is too small for simulators, or None."""
+    scale = float(np.abs(matrix).max())
+    if math.isnan(scale):
+        return None
+    least = float(np.linalg.eigvalsh(matrix / scale)[0]) * scale
+    if least >= INERTIA.least * (1 - _TRIANGLE_TOLERANCE):
+        return None
+    return f"the principal moments must be at least {shown_size(INERTIA.least)} kg·m², found {least:.6g}"
 
 
 def _article(part: type) -> str:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
 
 from dh2sim.robot.fields import (
+    IN_SI,
     LONGEST_NAME,
     NAME_PATTERN,
     Choice,
@@ -20,8 +22,9 @@ from dh2sim.robot.fields import (
     Numbers,
     Parameters,
 )
+from dh2sim.robot.magnitudes import ANGLE, LENGTH, Magnitude
 from dh2sim.robot.parts import Inertia, InertiaNumbers, Part, Parts, fields_of
-from dh2sim.robot.spec import ROBOT
+from dh2sim.robot.spec import ROBOT, AngleUnit, LengthUnit
 
 _NAME = {"pattern": NAME_PATTERN, "maxLength": LONGEST_NAME}
 _NUMBER = {"type": ["number", "string"]}
@@ -86,8 +89,7 @@ def _value(kind: Kind, definitions: dict[str, Any]) -> dict[str, Any]:
             }
             return {"$ref": f"#/$defs/{kind.of.__name__}"}
         case Number():
-            limits = {"exclusiveMinimum": kind.above, "minimum": kind.least, "maximum": kind.most}
-            return _NUMBER | {key: limit for key, limit in limits.items() if limit is not None}
+            return _NUMBER | _bounds(kind)
         case Color():
             least, most = kind.counts
             return {"type": "array", "items": _value(kind.item, definitions), "minItems": least, "maxItems": most}
@@ -107,6 +109,29 @@ def _value(kind: Kind, definitions: dict[str, Any]) -> dict[str, Any]:
             return {"type": "boolean"}
         case _:  # texts and the names of files
             return {"type": "string"}
+
+
+def _bounds(kind: Number) -> dict[str, float]:
+    """Return the bounds of a number as far as a schema can have them: it does not depend on the units of the file.
+
+    The most is in the smallest unit, the least in the largest; the reader is exact.
+    """
+    if kind.most is not None and kind.least is not None:
+        return {"minimum": kind.least, "maximum": kind.most}
+    sizes = [kind.magnitude(turns=turns) for turns in (False, True)]
+    most = max(size.most / min(_units(size)) for size in sizes)
+    if math.isinf(most):
+        return {}
+    if kind.least is not None:
+        return {"minimum": kind.least, "maximum": most}
+    least = min(size.least / max(_units(size)) for size in sizes)
+    return {"minimum": least if kind.above is not None else -most, "maximum": most}
+
+
+def _units(of: Magnitude) -> list[float]:
+    """Return the units that a file may give numbers in, in SI units."""
+    names = {ANGLE: AngleUnit, LENGTH: LengthUnit}.get(of)
+    return [IN_SI[unit.value] for unit in names] if names else [1.0]
 
 
 def _defaults(part: type) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from dh2sim.errors import Problem, RobotError
 from dh2sim.messages import Loc, path_of
 from dh2sim.robot.checks import check, default_name
 from dh2sim.robot.fields import (
+    COORDINATE,
     Choice,
     Color,
     Configurations,
@@ -32,6 +33,18 @@ from dh2sim.robot.fields import (
     Text,
     Tree,
     UnitsLike,
+)
+from dh2sim.robot.magnitudes import (
+    ACCELERATION,
+    ARMATURE,
+    DAMPING,
+    DENSITY,
+    EFFORT,
+    FRICTION,
+    MASS,
+    POSITION_GAIN,
+    SCALE,
+    VELOCITY_GAIN,
 )
 from dh2sim.robot.parts import Inertia, Internal, Part, Parts, kept, plain_part
 from dh2sim.typing import Array, read_only
@@ -170,6 +183,7 @@ class SourceFile:
 
 LENGTHS: Final = Number("", Dimension.LENGTH)
 _ANGLES: Final = Number("", Dimension.ANGLE)
+GRAVITY: Final = Number("", size=ACCELERATION)
 _RPY: Final = "roll, pitch, yaw"
 
 
@@ -197,7 +211,7 @@ class MeshSpec:
     ]
     """Of a robot that was read from a file: absolute, and known to have existed then."""
     scale: Annotated[
-        float, Number("Metres per unit of the mesh file; a DAE file has its own unit already.", above=0)
+        float, Number("Metres per unit of the mesh file; a DAE file has its own unit already.", size=SCALE, above=0)
     ] = 1.0
     pose: Annotated[Pose, Part("Pose of the mesh file's own frame in the DH frame.", Pose, inline=True)] = field(
         default_factory=Pose
@@ -212,23 +226,22 @@ class Limits:
 
     position: Annotated[
         tuple[float, float] | None,
-        Range(
-            "Lower and upper joint coordinate, in the file's angle or length unit.", Number("", Dimension.COORDINATE)
-        ),
+        Range("Lower and upper joint coordinate, in the file's angle or length unit.", COORDINATE),
     ] = None
     velocity: Annotated[
-        float | None, Number("In the file's angle or length unit per second.", Dimension.COORDINATE, above=0)
+        float | None,
+        Number("In the file's angle or length unit per second.", Dimension.COORDINATE, rate=True, above=0),
     ] = None
-    effort: Annotated[float | None, Number("N·m or N.", above=0)] = None
+    effort: Annotated[float | None, Number("N·m or N.", size=EFFORT, above=0)] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Dynamics:
     """Joint dynamics, in SI units."""
 
-    damping: Annotated[float, Number("N·m·s/rad or N·s/m.", least=0)] = 0.0
-    friction: Annotated[float, Number("Coulomb friction, N·m or N.", least=0)] = 0.0
-    armature: Annotated[float, Number("Rotor inertia seen at the joint, kg·m² or kg.", least=0)] = 0.0
+    damping: Annotated[float, Number("N·m·s/rad or N·s/m.", size=DAMPING, least=0)] = 0.0
+    friction: Annotated[float, Number("Coulomb friction, N·m or N.", size=FRICTION, least=0)] = 0.0
+    armature: Annotated[float, Number("Rotor inertia seen at the joint, kg·m² or kg.", size=ARMATURE, least=0)] = 0.0
 
 
 _Rgba = tuple[float, float, float, float]
@@ -239,11 +252,14 @@ _COLOR: Final = Color("Red, green, blue and optionally alpha, each 0 to 1.")
 class LinkSpec:
     """The link that a joint moves."""
 
-    mass: Annotated[float | None, Number("kg; 0 for a link that weighs nothing, between others.", least=0)] = None
+    mass: Annotated[
+        float | None, Number("kg; 0 for a link that weighs nothing, between others.", size=MASS, least=0)
+    ] = None
     com: Annotated[Array | None, Numbers("Centre of mass in DH frame i, in the file's length unit.", LENGTHS)] = None
     inertia: Annotated[Array | None, Inertia("About com, along DH frame i's axes, kg·m².")] = None
     density: Annotated[
-        float | None, Number("kg/m³, for shapes made from the table; used where mass is not given.", above=0)
+        float | None,
+        Number("kg/m³, for shapes made from the table; used where mass is not given.", size=DENSITY, above=0),
     ] = None
     radius: Annotated[
         float | None,
@@ -260,10 +276,16 @@ class ActuatorSpec:
     type: Annotated[
         ActuatorType, Choice("What the control signal is; default position.", ActuatorType, inherited=True)
     ] = ActuatorType.POSITION
-    kp: Annotated[float | None, Number("Position gain, N·m/rad or N/m; for position.", above=0)] = None
+    kp: Annotated[
+        float | None, Number("Position gain, N·m/rad or N/m; for position.", size=POSITION_GAIN, above=0)
+    ] = None
     kv: Annotated[
         float | None,
-        Number("Velocity gain, N·m·s/rad or N·s/m; for position (0: no damping) and velocity (not 0).", least=0),
+        Number(
+            "Velocity gain, N·m·s/rad or N·s/m; for position (0: no damping) and velocity (not 0).",
+            size=VELOCITY_GAIN,
+            least=0,
+        ),
     ] = None
 
 
@@ -354,7 +376,7 @@ class ShapeSpec:
 class ToolSpec(Pose):
     """Pose of tool0 in DH frame n, and what the last link carries: a gripper, say. All of it in DH frame n."""
 
-    mass: Annotated[float | None, Number("kg", least=0)] = None
+    mass: Annotated[float | None, Number("kg", size=MASS, least=0)] = None
     com: Annotated[
         Array | None,
         Numbers("Centre of mass in DH frame n, in the file's length unit; default the shape's, or tool0.", LENGTHS),
@@ -387,7 +409,7 @@ class ToolSpec(Pose):
 class PayloadSpec:
     """What the arm is to carry besides its tool: assumed efforts and gains hold it, but no export contains it."""
 
-    mass: Annotated[float | None, Number("kg; default a share of the arm's moving mass.", least=0)] = None
+    mass: Annotated[float | None, Number("kg; default a share of the arm's moving mass.", size=MASS, least=0)] = None
     com: Annotated[
         Array | None,
         Numbers("Centre of mass in DH frame n, in the file's length unit; default just before tool0.", LENGTHS),
@@ -435,7 +457,9 @@ class RobotSpec:
             number_is="mass",
         ),
     ] = field(default_factory=PayloadSpec)
-    gravity: Annotated[Array, Numbers("m/s² in base_link.")] = field(default_factory=lambda: read_only([0, 0, -9.81]))
+    gravity: Annotated[Array, Numbers("m/s² in base_link.", GRAVITY)] = field(
+        default_factory=lambda: read_only([0, 0, -9.81])
+    )
     rows: Annotated[
         tuple[Row, ...],
         Parts("The DH table, a row each, base first.", Part("", Row), required=True, key="joints"),

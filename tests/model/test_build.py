@@ -5,19 +5,17 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from dh2sim.errors import ModelError
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.actuators import ASSUMED_BANDWIDTH, ActuatorModel
 from dh2sim.model.build import BASE_COLOR, JOINT_COLOR, PALETTE, build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType, BaseSpec, Dynamics, JointType, LinkSpec, RobotSpec, Row
+from dh2sim.robot.spec import ActuatorSpec, ActuatorType, BaseSpec, Dynamics, LinkSpec, RobotSpec, Row
 from tests.arrays import arrays_in
 from tests.sample_robots import NAMES, ODD_ROBOT, REVOLUTE, STANDARD, model
 
@@ -120,7 +118,7 @@ def test_an_assumed_velocity_gain_answers_at_the_assumed_bandwidth() -> None:
     ("actuator", "gains"),
     [
         (ActuatorSpec(type=ActuatorType.POSITION, kp=100.0, kv=7.5), (100.0, 7.5)),
-        (ActuatorSpec(type=ActuatorType.POSITION, kp=1e-300, kv=1e-300), (1e-300, 1e-300)),
+        (ActuatorSpec(type=ActuatorType.POSITION, kp=1e-15, kv=1e-15), (1e-15, 1e-15)),
         (ActuatorSpec(type=ActuatorType.VELOCITY, kv=8.5), (0.0, 8.5)),
         (ActuatorSpec(type=ActuatorType.MOTOR), (0.0, 0.0)),
         (ActuatorSpec(type=ActuatorType.NONE), (0.0, 0.0)),
@@ -139,24 +137,3 @@ def test_a_model_keeps_its_robot_and_its_chain() -> None:
     assert built.name == "odd"
     assert [link.name for link in built.all_links] == ["base_link", *(f"link_{i}" for i in range(1, 7))]
     assert [joint.name for joint in built.moving_joints] == ["one", "two", "four", "five", "six"]
-
-
-@pytest.mark.parametrize(
-    ("row", "message"),
-    [
-        ({"a": 1e200}, "arm: joints[0].a is 1e+200; a model needs numbers of at most 1e+20"),
-        (
-            {"link": LinkSpec(radius=1e-200)},
-            "arm: joints[0].link.radius is 1e-200; a model needs numbers of at least 1e-20",
-        ),
-        (
-            {"dynamics": Dynamics(armature=1e30)},
-            "arm: joints[0].dynamics.armature is 1e+30; a model needs numbers of at most 1e+20",
-        ),
-    ],
-)
-def test_a_number_whose_products_are_no_doubles_is_refused(row: dict[str, Any], message: str) -> None:
-    spec = RobotSpec(name="arm", rows=(Row(name="one", type=JointType.REVOLUTE, convention=STANDARD, **row),))
-    with pytest.raises(ModelError) as caught:
-        build_model(spec)
-    assert str(caught.value) == message

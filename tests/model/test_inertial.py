@@ -11,9 +11,10 @@ from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
 from dh2sim.model.link_shapes import HOUSING, TUBE
-from dh2sim.model.mass import ASSUMED_DENSITY, MIN_INERTIA, MIN_MASS, MassProperties
+from dh2sim.model.mass import ASSUMED_DENSITY, MIN_MASS, MassProperties
 from dh2sim.model.robot_model import LinkModel
 from dh2sim.model.shapes import neat
+from dh2sim.robot import magnitudes
 from dh2sim.robot.spec import Convention, LinkSpec, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 from tests.model.test_mass import plates
@@ -148,10 +149,10 @@ def test_mujoco_reads_robots_however_small_they_are(size: float) -> None:
     for link in built.links:
         assert link.inertial is not None
         assert link.inertial.mass >= MIN_MASS
-        assert np.linalg.eigvalsh(link.inertial.inertia)[0] >= 0.999 * MIN_INERTIA
+        assert np.linalg.eigvalsh(link.inertial.inertia)[0] >= 0.999 * magnitudes.INERTIA.least
 
 
 def test_a_given_mass_is_kept_however_small_it_is() -> None:
-    _, body = first_link(LinkSpec(mass=1e-12, com=COM, inertia=read_only(1e-16 * np.eye(3))))
+    _, body = first_link(LinkSpec(mass=1e-12, com=COM, inertia=read_only(1e-14 * np.eye(3))))
     assert body.mass == 1e-12
-    np.testing.assert_allclose(body.inertia, 1e-16 * np.eye(3), rtol=0, atol=1e-30)
+    np.testing.assert_allclose(body.inertia, 1e-14 * np.eye(3), rtol=0, atol=1e-28)

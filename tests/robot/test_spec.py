@@ -206,11 +206,16 @@ def test_the_error_is_one_of_dh2sim_and_of_values() -> None:
 
 
 def test_a_number_that_is_wrong_in_si_units_alone_is_reported_at_its_place() -> None:
-    text = "name: r\nconvention: standard\nunits: {length: mm}\njoints: [{type: fixed, link: {radius: 1e-323}}]\n"
+    limits = "[1004, 1004.0000000000001]"  # two numbers of millimetres that are one of metres
+    text = (
+        "name: r\nconvention: standard\nunits: {length: mm}\n"
+        f"joints: [{{type: prismatic, a: 1, limits: {{position: {limits}}}}}]\n"
+    )
     with pytest.raises(RobotError) as error:
         robot(text)
     assert str(error.value) == (
-        "r.yaml:4:39: joints[0].link.radius: must be greater than 0, found 0.0 once converted to SI units"
+        "r.yaml:4:50: joints[0].limits.position: the lower limit 1.004 is not below the upper limit 1.004 "
+        "once converted to SI units"
     )
 
 
