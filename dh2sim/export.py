@@ -155,7 +155,7 @@ def _drives(actuator: ActuatorSpec) -> bool:
 
 
 TOLERANCE = 1e-12
-"""Of rotations in rad, and of positions as a share of the larger of 1 m and the reach."""
+"""Of rotations in rad, and of positions as a share of the larger of 1 m and the reach; more for very large angles."""
 SAMPLES = 32
 
 
@@ -196,11 +196,12 @@ def verify(model: RobotModel, folder: Path, formats: Collection[Format]) -> list
         result = Verified(
             format=format_, position_error=float(np.max(position)), rotation_error=float(np.max(rotation))
         )
-        allowed = TOLERANCE * max(1.0, model.extent)
-        if not (result.position_error <= allowed and result.rotation_error <= TOLERANCE):
+        angle = max(TOLERANCE, model.angle_rounding)
+        allowed = angle * max(1.0, model.extent)
+        if not (result.position_error <= allowed and result.rotation_error <= angle):
             raise MismatchError(
                 f"{model.name}: the {format_.value.upper()} differs from the table by {result.position_error:.3g} m "
-                f"and {result.rotation_error:.3g} rad (allowed: {allowed:.3g} m and {TOLERANCE:.3g} rad); nothing "
+                f"and {result.rotation_error:.3g} rad (allowed: {allowed:.3g} m and {angle:.3g} rad); nothing "
                 "was written. This is a defect of dh2sim: please report it with the robot file"
             )
         results.append(result)

@@ -153,6 +153,8 @@ def keep_centers_of_mass(model: mujoco.MjModel) -> None:
     """Let MuJoCo compute with the centres of mass of the model file.
 
     Otherwise it takes one that is within 1 µm of its body's origin for the origin, a shortcut whose error is larger
-    than the tolerances of ours. ``mj_setConst`` introduces the shortcut anew.
+    than the tolerances of ours, and has computed the inertia of a body that turns alone in advance with it.
+    ``mj_setConst`` introduces both anew.
     """
+    model.dof_simplenum[:] = 0
     model.body_sameframe[:] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)

@@ -13,10 +13,11 @@ from dh2sim.messages import Notes, listed
 from dh2sim.model.mass import MassProperties, thickened
 from dh2sim.model.robot_model import Color
 from dh2sim.robot.fields import MESH_SUFFIXES
+from dh2sim.robot.magnitudes import LARGEST
 from dh2sim.robot.spec import ActuatorSpec, Dynamics, Limits
 from dh2sim.typing import Array, read_only
 
-GREATEST: Final = 1e30
+GREATEST: Final = LARGEST
 """Of any number in a file: a product of a few of them is still a finite double."""
 _SAME_SCALE: Final = 1e-6
 """By which the three scales of a mesh may differ, relative to the greatest."""

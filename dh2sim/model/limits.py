@@ -12,6 +12,7 @@ from dh2sim.kinematics.skeleton import Skeleton, build_skeleton
 from dh2sim.model.actuators import Duty
 from dh2sim.model.mass import MassProperties
 from dh2sim.model.shapes import neat
+from dh2sim.robot.magnitudes import LENGTH
 from dh2sim.robot.spec import JointType, Limits, Row
 from dh2sim.typing import Array
 
@@ -41,7 +42,7 @@ def travels_of(chain: KinematicChain, rows: Sequence[Row]) -> list[Range]:
     """
     given = [_displacements(joint, row.limits.position) for joint, row in zip(chain.joints, rows, strict=True)]
     rest = reach_bound(build_skeleton(chain, [travel or (0.0, 0.0) for travel in given]))
-    assumed = neat(rest) if rest > NO_LENGTH else 1.0
+    assumed = min(neat(rest), LENGTH.most) if rest > NO_LENGTH else 1.0
     return [travel or (-assumed, assumed) for travel in given]
 
 

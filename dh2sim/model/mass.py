@@ -169,12 +169,18 @@ def thickened(inertia: Array) -> Array | None:
     if abs(least) <= THIN * trace:
         extra = THICKNESS * trace
         inertia = read_only([[float(inertia[i, j]) + (extra if i == j else 0.0) for j in range(3)] for i in range(3)])
-    return at_least(inertia, INERTIA.least) if is_possible(inertia) else None
+    return substantial(inertia) if is_possible(inertia) else None
 
 
-def at_least(inertia: Array, least: float) -> Array:
-    """Return the inertia, shape (3, 3); where a principal moment may be below ``least``, all are greater by that."""
-    if min(_pivots(inertia.tolist())) >= least:
+def substantial(inertia: Array) -> Array:
+    """Return the inertia, shape (3, 3), with all principal moments great enough for simulators.
+
+    Where one may be below ``INERTIA.least``, or ``THIN`` of the trace, which is rounding, all are greater by that.
+    """
+    trace = float(inertia[0, 0]) + float(inertia[1, 1]) + float(inertia[2, 2])
+    least = max(INERTIA.least, THIN * trace) * (1.0 - 1e-9)  # turned, one that is just enough may be less
+    less = [[float(inertia[i, j]) - (least if i == j else 0.0) for j in range(3)] for i in range(3)]
+    if min(_pivots(less)) > 0.0:
         return inertia
     return read_only([[float(inertia[i, j]) + (least if i == j else 0.0) for j in range(3)] for i in range(3)])
 
@@ -230,7 +236,7 @@ def link_inertial(
         com = in_dh.com
     if link.inertia is not None:
         inertia = in_dh.inertia
-    body = MassProperties(mass=mass, com=com, inertia=made_possible(inertia))
+    body = MassProperties(mass=mass, com=com, inertia=made_possible(substantial(inertia)))
     return body, tuple(k for k, v in given.items() if v is None)
 
 
@@ -243,7 +249,7 @@ def of_shapes(shapes: Iterable[Shape], density: float) -> MassProperties:
 
 def _of_mass(body: MassProperties, mass: float) -> MassProperties:
     """Return a body of the same shape and another mass, kg; its inertia is not too small for MuJoCo."""
-    return replace(body, mass=mass, inertia=at_least(read_only(body.inertia * (mass / body.mass)), INERTIA.least))
+    return replace(body, mass=mass, inertia=substantial(read_only(body.inertia * (mass / body.mass))))
 
 
 def _estimate(link: LinkSpec, shapes: tuple[Shape, ...], anchor: Array) -> MassProperties:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -123,6 +124,10 @@ class JointModel(Joint):
         return clamped(position, self.position_range)
 
 
+MANY_TURNS = 100.0
+"""rad: smaller angles are rounded by less than 1e-14."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotModel:
     """A robot with everything that the writers need; SI units."""
@@ -214,6 +219,21 @@ class RobotModel:
                     continue
             controls.append(clamped(control, joint.control_range))
         return controls
+
+    @property
+    def angle_rounding(self) -> float:
+        """Upper bound of the error, rad, of orientations where theta and a coordinate of many turns are added.
+
+        0 where no angle is larger than ``MANY_TURNS``.
+        """
+        rows = zip(self.spec.rows, self.joints, strict=True)
+        angles = [abs(row.theta) + max(map(abs, joint.travel)) for row, joint in rows if joint.type.turns]
+        return sys.float_info.epsilon * math.fsum(angle for angle in angles if angle > MANY_TURNS)
+
+    @property
+    def longest_lever(self) -> float:
+        """The extent, or how far a centre of mass is from its joint, whichever is greater, m."""
+        return max(self.extent, *(math.hypot(*body.com.tolist()) for body in self.bodies if body is not None), 0.0)
 
     @property
     def estimates(self) -> tuple[FilledIn, ...]:

@@ -226,7 +226,7 @@ class Number(Kind):
         bounds, (unit, si) = self.magnitude(turns=scope.turns), self._unit(scope)
         most, least = bounds.most / si, bounds.least / si
         size, positive = abs(number), self.above is not None
-        if math.isnan(size) or (size <= most and (size >= least or size == 0 or not self.unsigned)):
+        if math.isnan(size) or (size <= most * _SLACK and (size * _SLACK >= least or size == 0 or not self.unsigned)):
             return None
         if self.unsigned and not positive:
             small = f"0, or from {shown_size(least)} to" if least else "at most"
@@ -318,6 +318,8 @@ def number_hint(text: str, dimension: Dimension | None, loc: Loc, scope: Scope) 
     return f"{here}: write {converted}, or set 'units: {{{what.removesuffix('s')}: {unit}}}' for all"
 
 
+_SLACK: Final = 1 + 1e-9
+"""By which a number may pass its bound: another unit and back is rounding."""
 _ANY: Final = Number()
 _FRACTION: Final = Number(least=0, most=1)
 COORDINATE: Final = Number("", Dimension.COORDINATE)

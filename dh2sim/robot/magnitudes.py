@@ -38,9 +38,9 @@ ACCELERATION: Final = Magnitude("gravity", "m/s²", 1e6)
 MASS: Final = Magnitude("masses", "kg", 1e30, 1e-12)
 """MuJoCo reads masses from 1e-15, and 2e-14 stands for a link that weighs nothing."""
 DENSITY: Final = Magnitude("densities", "kg/m³", 1e5, 1e-6)
-INERTIA: Final = Magnitude("inertias", "kg·m²", 1e60, 1e-14)
-"""The least is that of a principal moment."""
-ARMATURE: Final = Magnitude("armature", "kg·m² or kg", 1e60)
+INERTIA: Final = Magnitude("inertias", "kg·m²", 1e50, 2e-14)
+"""The least is that of a principal moment. MuJoCo takes 1e-14 for 0."""
+ARMATURE: Final = Magnitude("armature", "kg·m² or kg", 1e50)
 EFFORT: Final = Magnitude("effort limits", "N·m or N", 1e60, 1e-15)
 FRICTION: Final = Magnitude("friction", "N·m or N", 1e60)
 DAMPING: Final = Magnitude("damping", "N·m·s/rad or N·s/m", 1e60)
@@ -67,6 +67,8 @@ MAGNITUDES: Final = (
     SCALE,
 )
 """All that have bounds."""
+LARGEST: Final = max(of.most for of in MAGNITUDES)
+"""Greatest number of any kind."""
 
 
 def shown_size(value: float) -> str:

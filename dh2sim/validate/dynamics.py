@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -21,6 +22,8 @@ LEAST_FORCE = 1e-3
 """Lower bound of the force that errors are relative to, as a share of that of the robot's weight at its reach."""
 LEAST_LEVER = 0.1
 """m; lower bound of the reach in both."""
+ROUNDING = 1e-6
+"""Lower bound of both, as a share of those of its mass at its longest lever, of which ``TOLERANCE`` is rounding."""
 
 
 def check_inertias(engine: MujocoEngine, model: RobotModel) -> Check:
@@ -75,11 +78,13 @@ def check_dynamics(
     """
     terms = engine.dynamic_terms(q, velocity, model.spec.gravity)
     lever = max(model.reach, LEAST_LEVER)
-    diagonal = np.sqrt(np.einsum("kii->ki", reference.mass_matrix))
-    diagonal = np.maximum(diagonal, np.sqrt(LEAST_INERTIA * model.mass) * lever)
+    inertia, rounded = _inertia(model, lever), _inertia(model, max(model.longest_lever, LEAST_LEVER))
+    least = np.sqrt(max(LEAST_INERTIA * inertia, ROUNDING * rounded))
+    diagonal = np.maximum(np.sqrt(np.maximum(np.einsum("kii->ki", reference.mass_matrix), 0.0)), least)
     mass = np.abs(terms.mass_matrix - reference.mass_matrix) / (diagonal[:, :, None] * diagonal[:, None, :])
     weight = model.mass * (1.0 + float(np.linalg.norm(model.spec.gravity)))  # 1 m/s^2 for what the motion makes
-    force = np.maximum(np.abs(reference.bias).max(axis=0), LEAST_FORCE * weight * lever)
+    least_force = max(LEAST_FORCE * weight * lever, ROUNDING * (weight * model.longest_lever + rounded))
+    force = np.maximum(np.abs(reference.bias).max(axis=0), least_force)
     names = [joint.name for joint in model.moving_joints]
     bias, gravity = np.abs(terms.bias - reference.bias) / force, np.abs(terms.gravity - reference.gravity) / force
     tolerance = max(TOLERANCE, engine.inertia_rounding)
@@ -88,6 +93,12 @@ def check_dynamics(
         _check(engine.name, Quantity.BIAS, bias, names, q, tolerance),
         _check(engine.name, Quantity.GRAVITY, gravity, names, q, TOLERANCE),
     ]
+
+
+def _inertia(model: RobotModel, lever: float) -> float:
+    """Return the inertia, kg·m², of the robot's mass at the end of a lever, and of its links about themselves."""
+    own = [float(np.trace(body.inertia)) for body in model.bodies if body is not None]
+    return model.mass * lever * lever + math.fsum(own)
 
 
 def _check(engine: str, quantity: Quantity, error: Array, names: Sequence[str], q: Array, tolerance: float) -> Check:

@@ -26,6 +26,7 @@ from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
 from dh2sim.validate.dynamics import check_dynamics, check_inertias
 from dh2sim.validate.kinematics import (
+    DIFFERENCE_STEP,
     DIFFERENCE_TOLERANCE,
     LibraryEngine,
     check_jacobian,
@@ -115,13 +116,15 @@ def _validate(
     library = LibraryEngine(model.chain)
     mjcf, urdf = folder / f"{model.name}.xml", folder / f"{model.name}.urdf"
     engines, unread = _read(model, mjcf, urdf)
+    allowed = max(tolerance, model.angle_rounding)
 
     def poses(engine: Mover | YourdfpyEngine) -> list[Check]:
         quick = isinstance(engine, MujocoEngine)
         some, threads = (q, 0) if quick else (q[: slow_samples(len(q), len(model.joints))], 1)
-        return [check_poses(engine, model.spec, some, tolerance, model.extent, threads=threads, advance=advance)]
+        scale = model.longest_lever if isinstance(engine, PybulletEngine) else model.extent
+        return [check_poses(engine, model.spec, some, allowed, scale, threads=threads, advance=advance)]
 
-    checks = [check_poses(library, model.spec, q, tolerance, model.extent, threads=0, advance=advance)]
+    checks = [check_poses(library, model.spec, q, allowed, model.extent, threads=0, advance=advance)]
     for engine in engines:
         checks += _checks_of(engine, Quantity.POSE, poses)
     if any(engine.name == "mujoco-mjcf" for engine in engines):
@@ -184,15 +187,16 @@ def _jacobians(
             library,
             table_jacobian(model.spec, q),
             q,
-            DIFFERENCE_TOLERANCE,
+            max(DIFFERENCE_TOLERANCE, model.angle_rounding / DIFFERENCE_STEP),
             model.extent,
             names,
             differences=True,
         )
     ]
+    scale = model.longest_lever  # MuJoCo computes relative to the centre of mass of all
     for engine in engines:
         checks += _checks_of(
-            engine, Quantity.JACOBIAN, lambda engine: [check_jacobian(engine, own, q, tolerance, model.extent, names)]
+            engine, Quantity.JACOBIAN, lambda engine: [check_jacobian(engine, own, q, tolerance, scale, names)]
         )
     return checks
 

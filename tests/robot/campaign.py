@@ -127,6 +127,8 @@ def _kind(error: Exception) -> str:
 
 
 if __name__ == "__main__":
-    made, failed = {"read": read, "whole": whole}[sys.argv[1]](int(sys.argv[2]), int((*sys.argv, 0)[3]))
+    made, failed = {"read": read, "whole": whole}[sys.argv[1]](
+        int(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 0
+    )
     print("\n\n".join(failed), file=sys.stderr)
     print(json.dumps(made))

@@ -221,8 +221,10 @@ class RandomFiles:
             return self._number(magnitudes.LENGTH, self._length)
 
         kind = self._chance.choice(("box", "cylinder", "sphere"))
-        sizes = {"box": {"size": [side(), side(), side()]}, "cylinder": {"radius": side(), "length": side()}}
-        return {"type": kind, **sizes.get(kind, {"radius": side()}), **self._pose()}
+        shape: dict[str, Any] = {"type": kind, **self._pose()}
+        if kind == "box":
+            return shape | {"size": [side(), side(), side()]}
+        return shape | {"radius": side()} | ({"length": side()} if kind == "cylinder" else {})
 
     # texts
 

@@ -214,7 +214,7 @@ def test_a_number_that_is_wrong_in_si_units_alone_is_reported_at_its_place() -> 
     with pytest.raises(RobotError) as error:
         robot(text)
     assert str(error.value) == (
-        "r.yaml:4:50: joints[0].limits.position: the lower limit 1.004 is not below the upper limit 1.004 "
+        "r.yaml:4:53: joints[0].limits.position: the lower limit 1.004 is not below the upper limit 1.004 "
         "once converted to SI units"
     )
 

@@ -314,13 +314,13 @@ def test_huge_sizes_cost_nothing(tmp_path: Path) -> None:
 
 def test_numbers_that_are_no_use_are_refused(tmp_path: Path) -> None:
     text = model_text(
-        f'<body name="base"><body name="one" pos="nan 0 0"><joint name="a" pos="1e40 0 0"/>{BALL}</body></body>'
+        f'<body name="base"><body name="one" pos="nan 0 0"><joint name="a" pos="1e70 0 0"/>{BALL}</body></body>'
     )
     column = text.index('<body name="one"') + 1
     assert refused(tmp_path, text) == (
-        f"robot.xml:1:{column}: body[one]: the body's pose has a number that is not finite, or greater than 1e+30\n"
+        f"robot.xml:1:{column}: body[one]: the body's pose has a number that is not finite, or greater than 1e+60\n"
         f"robot.xml:1:{text.index('<joint') + 1}: joint[a]: the joint has a number that is not finite, "
-        "or greater than 1e+30"
+        "or greater than 1e+60"
     )
 
 

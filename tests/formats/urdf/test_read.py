@@ -184,7 +184,7 @@ def test_every_wrong_number_of_the_arm_is_reported_with_its_place() -> None:
         "arm.urdf:5:1: joint[ab].limit.velocity: expected a number, found 'nan'",
         "arm.urdf:5:59: joint[ab].dynamics.damping: expected a number, found 'inf'",
         "arm.urdf:6:66: joint[bc].origin.rpy: expected 3 numbers, found '0,5 0 0'; decimals are set off with a point",
-        "arm.urdf:6:66: joint[bc].origin.xyz: expected 3 numbers no greater than 1e+30, found '1e999 0 0'",
+        "arm.urdf:6:66: joint[bc].origin.xyz: expected 3 numbers no greater than 1e+60, found '1e999 0 0'",
         "arm.urdf:7:69: joint[cd].origin: unknown attribute 'quat_xyzw'. Allowed: xyz, rpy",
         "arm.urdf:7:69: joint[cd].origin: unknown attribute 'xzy'. Did you mean 'xyz'? Allowed: xyz, rpy",
         "arm.urdf:7:110: joint[cd].axis: unknown attribute 'rpy'. Allowed: xyz",
@@ -202,7 +202,7 @@ def test_a_number_as_xml_writes_it_is_read(word: str, number: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "word", ["nan", "inf", "-inf", "1e999", "1e31", "1_0", "0x1", "١", "1,0", ".", "e5", "--1", ""]
+    "word", ["nan", "inf", "-inf", "1e999", "1e61", "1_0", "0x1", "١", "1,0", ".", "e5", "--1", ""]
 )
 def test_a_word_that_only_some_readers_take_for_a_number_is_refused(word: str) -> None:
     text = robot(links("a", "b"), joint("j", "a", "b", inside=f'<origin xyz="{word} 0 0"/>'))
