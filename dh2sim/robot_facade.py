@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     import mujoco
     import xarray as xr
 
+    from dh2sim.codegen.languages import Language
     from dh2sim.export import ExportReport, Format
     from dh2sim.importing.sources import ImportOptions
     from dh2sim.kinematics.chain import KinematicChain, SpecLike
@@ -549,6 +550,24 @@ class Robot:
         return validate_robot(
             self.model, samples=samples, seed=seed, tolerance=tolerance, source=source, source_options=options
         )
+
+    def code(
+        self, language: Language | str = "python", what: str | Iterable[str] = "pose", *, name: str | None = None
+    ) -> str:
+        """Return code for the robot's kinematics and dynamics, in one file that needs no other; rad and m.
+
+        Args:
+            language: 'python', 'numpy', 'c', 'cpp', 'matlab' or 'javascript'.
+            what: 'pose' of tool0 in base_link, its 'jacobian', 'inverse-dynamics', or several of them.
+            name: Begins the names of functions in C, is the namespace in C++ and the function's name in MATLAB; by
+                default the robot's name.
+
+        Raises:
+            Dh2simError: There is no such language or code; or the code differs from the table.
+        """
+        from dh2sim.codegen.generate import generate
+
+        return generate(self, what, language, name=name)
 
     def rollout(
         self,

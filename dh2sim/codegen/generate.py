@@ -1,0 +1,186 @@
+"""A robot's pose, Jacobian and inverse dynamics as a file of code, compared with the table before it is returned."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterable
+from dataclasses import replace
+from enum import StrEnum
+from typing import Any, Final
+
+from dh2sim.codegen.base_parameters import base_parameters
+from dh2sim.codegen.check import force_error, jacobian_error, pose_error
+from dh2sim.codegen.forward import joint_turns, tool_jacobian, tool_pose
+from dh2sim.codegen.languages import Language, program_text
+from dh2sim.codegen.mechanism import Mechanism, build_mechanism
+from dh2sim.codegen.newton_euler import inverse_dynamics
+from dh2sim.codegen.program import Function, Program
+from dh2sim.codegen.trace import Number, Trace
+from dh2sim.errors import Dh2simError
+from dh2sim.kinematics.chain import spec_of
+from dh2sim.messages import member
+from dh2sim.model.build import ModelLike, model_of
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.robot.spec import RobotSpec
+
+_WIDTH: Final = 100
+
+
+class What(StrEnum):
+    """What there is code for."""
+
+    POSE = "pose"
+    JACOBIAN = "jacobian"
+    INVERSE_DYNAMICS = "inverse-dynamics"
+
+
+def generate(
+    robot: ModelLike,
+    what: What | str | Iterable[What | str] = (What.POSE,),
+    language: Language | str = Language.PYTHON,
+    *,
+    name: str | None = None,
+) -> str:
+    """Return code that computes a robot's kinematics or dynamics, in one file that needs no other.
+
+    Its constants are named, its angles are in rad and its lengths in m. Before it is returned it is run, as Python,
+    and compared with the table.
+
+    Args:
+        robot: The robot.
+        what: 'pose' of tool0 in base_link, its 'jacobian', and 'inverse-dynamics', one or several.
+        language: 'python', 'numpy', 'c', 'cpp', 'matlab' or 'javascript'.
+        name: Begins the names of functions in C, is the namespace in C++ and the function's name in MATLAB; by
+            default the robot's name.
+
+    Returns:
+        The text of the file.
+
+    Raises:
+        MismatchError: The code differs from the table by more than rounding.
+        MeshError, ModelError: There is no model to take masses from, for 'inverse-dynamics'.
+        Dh2simError: An argument has a value that is not allowed.
+    """
+    language = member(Language, language, "language")
+    wanted = {member(What, each, "code") for each in ([what] if isinstance(what, str) else what)}
+    if not wanted:
+        raise Dh2simError(f"choose at least one of {', '.join(What)}")
+    model = model_of(robot) if What.INVERSE_DYNAMICS in wanted else None
+    spec = spec_of(robot) if model is None else model.spec
+    program = _program(spec, model, [each for each in What if each in wanted], name or spec.name)
+    return program_text(replace(program, header=(*program.header, *_measured(program, spec, model))), language)
+
+
+def _program(spec: RobotSpec, model: RobotModel | None, wanted: list[What], name: str) -> Program:
+    trace = Trace()
+    mechanism = build_mechanism(spec, trace, trace.constant)
+    n = len(mechanism.joints)
+    q = trace.variables("q", n)
+    functions: list[Function] = []
+    for each in wanted:
+        match each:
+            case What.POSE:
+                rows = tool_pose(mechanism, q, trace)
+                functions.append(_function("fk", "q", "T", (4, 4), rows, "the pose of tool0 in base_link"))
+            case What.JACOBIAN:
+                rows = tool_jacobian(mechanism, q, trace)
+                text = "the Jacobian of tool0 in base_link, linear above angular"
+                functions.append(_function("jacobian", "q", "J", (6, n), rows, text))
+            case What.INVERSE_DYNAMICS:
+                assert model is not None
+                rows = [_forces(model, mechanism, trace)]
+                text = "the forces on the joints, N m or N, for rates qd and accelerations qdd"
+                functions.append(_function("inverse_dynamics", "q qd qdd", "tau", (n,), rows, text))
+    return Program(
+        name=name,
+        n=n,
+        trace=trace,
+        functions=tuple(functions),
+        header=tuple(_header(spec, model)),
+    )
+
+
+def _function(
+    name: str, arguments: str, result: str, shape: tuple[int, ...], rows: list[list[Number]], text: str
+) -> Function:
+    values = tuple(value for row in rows for value in row)
+    return Function(
+        name=name, arguments=tuple(arguments.split()), result=result, shape=shape, values=values, text=text
+    )
+
+
+def _forces(model: RobotModel, mechanism: Mechanism, trace: Trace) -> list[Number]:
+    n = len(mechanism.joints)
+    q, qd, qdd = (trace.variables(argument, n) for argument in ("q", "qd", "qdd"))
+    x, y, z = (
+        trace.constant(f"g{axis}", float(g), "m/s^2") for axis, g in zip("xyz", model.spec.gravity, strict=True)
+    )
+    forces = inverse_dynamics(
+        mechanism,
+        base_parameters(model, mechanism, trace),
+        joint_turns(mechanism, q, trace),
+        q,
+        qd,
+        qdd,
+        (x, y, z),
+    )
+    armatures = [
+        trace.constant(f"armature{joint.row}", model.joints[joint.row - 1].dynamics.armature, "kg m^2 or kg")
+        for joint in mechanism.joints
+    ]
+    return [force + armature * rate for force, armature, rate in zip(forces, armatures, qdd, strict=True)]
+
+
+def _header(spec: RobotSpec, model: RobotModel | None) -> list[str]:
+    source = spec.source_file
+    origin = "a robot made in code" if source is None else f"{source.name} (SHA-256 {source.sha256})"
+    conventions = " and ".join(dict.fromkeys(row.convention.value for row in spec.rows))
+    joints = [f"{row.name} ({'rad' if row.type.turns else 'm'})" for row in spec.moving_rows]
+    lines = [
+        f"{spec.name}: made by dh2sim from {origin}.",
+        f"Convention: {conventions}. Units: rad, m, s, kg, N, N m.",
+        f"q holds the joint coordinates as in the table: {', '.join(joints) or 'none'}.",
+    ]
+    if model is not None:
+        lines += [
+            "Inverse dynamics: links, tool, gravity and armature; no friction, damping or payload. Constants such as "
+            "XX2, MX2 are base parameters of what row 2 moves: inertia and first moment about its joint, with all "
+            "that may be regrouped from links after it. They contain masses and lengths of the robot file: make this "
+            "file anew after changing one.",
+            *(entry.sentence for entry in model.estimates),
+        ]
+    return _wrapped(lines)
+
+
+def _wrapped(lines: Iterable[str]) -> list[str]:
+    """Return lines that fit a page, in ASCII and without control characters."""
+    wrapper = textwrap.TextWrapper(_WIDTH, break_on_hyphens=False, break_long_words=False)
+    return [part for line in lines for part in wrapper.wrap(line.encode("ascii", "replace").decode())]
+
+
+def _measured(program: Program, spec: RobotSpec, model: RobotModel | None) -> list[str]:
+    """Return lines that say what each function costs and how exact it is."""
+    names: dict[str, Any] = {}
+    exec(compile(program_text(program, Language.PYTHON), f"<{program.name}>", "exec"), names)
+    lines = []
+    for function in program.functions:
+        call = names[function.name]
+        match function.name:
+            case "fk":
+                error = f"{_bound(pose_error(spec, call))} off the table's product"
+            case "jacobian":
+                error = f"{_bound(jacobian_error(spec, call))} off the chain's"
+            case _:
+                assert model is not None
+                error = f"{_bound(force_error(model, call))} of the greatest force off Kane's equations"
+        lines.append(f"{function.name}: {program.operations(function)}; at most {error}.")
+    return _wrapped(lines)
+
+
+def _bound(error: float) -> str:
+    """Return an error with one digit, rounded up."""
+    if error == 0.0:
+        return "0"
+    unit = 10.0 ** math.floor(math.log10(error))
+    return f"{math.ceil(error / unit) * unit:.0e}"

@@ -1,0 +1,305 @@
+"""The table as joints about z, each an offset and a twist from the one before, with constants that have names.
+
+Between two joints a table may have rows of any convention, fixed rows and second twists. Whatever they are, the
+constant motion between them is T(p) Rz(gamma) Rx(alpha) Rz(theta): gamma and theta turn about the axes of the joints
+themselves and are added to their angles, so that one twist remains. What slides along an axis commutes with the
+joint: it is moved on to the next offset, past all axes that are parallel. Rows as in textbooks keep their numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple, TypeAlias, cast
+
+from dh2sim.codegen.trace import Number, Trace
+from dh2sim.kinematics.trig import atan2, sin_cos
+from dh2sim.robot.spec import Convention, Pose, RobotSpec, Row
+
+Vector: TypeAlias = tuple[Number, Number, Number]
+ORIGIN: Final[Vector] = (0.0, 0.0, 0.0)
+_NO_TILT = 4e-16
+"""Sine of a twist, at and below which nothing but rounding is left of it."""
+
+
+class Turn(NamedTuple):
+    """A rotation about an axis."""
+
+    cosine: Number
+    sine: Number
+
+    @property
+    def inverse(self) -> Turn:
+        """The opposite rotation."""
+        return Turn(self.cosine, -self.sine)
+
+
+NO_TURN: Final = Turn(1.0, 0.0)
+HALF_TURN: Final = Turn(-1.0, 0.0)
+
+
+def about_x(turn: Turn, v: Sequence[Number]) -> Vector:
+    """Rotate a vector: Rx v."""
+    (c, s), (x, y, z) = turn, v
+    return x, c * y - s * z, s * y + c * z
+
+
+def about_y(turn: Turn, v: Sequence[Number]) -> Vector:
+    """Rotate a vector: Ry v."""
+    (c, s), (x, y, z) = turn, v
+    return c * x + s * z, y, c * z - s * x
+
+
+def about_z(turn: Turn, v: Sequence[Number]) -> Vector:
+    """Rotate a vector: Rz v."""
+    (c, s), (x, y, z) = turn, v
+    return c * x - s * y, s * x + c * y, z
+
+
+def added(v: Sequence[Number], w: Sequence[Number]) -> Vector:
+    """Return the sum of two vectors."""
+    return v[0] + w[0], v[1] + w[1], v[2] + w[2]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MovingJoint:
+    """A joint; its frame in that of the joint before is T(offset) Rx(twist) Rz(angle), then Tz if it slides."""
+
+    row: int
+    """Number of its row in the table, from 1."""
+    turns: bool
+    sign: float
+    """-1 where the coordinate subtracts."""
+    offset: Vector
+    twist: Turn
+    angle: float
+    """rad; the coordinate of one that turns adds to it."""
+    chain_angle: float
+    """rad, about z, from the joint frame of the kinematic chain to this one."""
+    chain_offset: float
+    """m, along z, from this frame to the joint frame of the kinematic chain."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mechanism:
+    """What a table makes of base_link, the joints that move, and tool0."""
+
+    base: Turn
+    """About z of base_link, between the first joint's offset and its twist."""
+    joints: tuple[MovingJoint, ...]
+    tool_offset: Vector
+    """tool0 is T(tool_offset) Rx(tool_twist) Rz(tool_angle) in the frame of the last joint."""
+    tool_twist: Turn
+    tool_angle: Turn
+
+
+class Step(NamedTuple):
+    """An elementary motion."""
+
+    axis: str
+    """x, y or z: a rotation about it; t: a translation."""
+    angle: float = 0.0
+    """rad."""
+    name: str = ""
+    """Of the angle."""
+    offset: Vector = ORIGIN
+
+
+Lengths: TypeAlias = Callable[[str, float, str], Number]
+"""Returns the constant for a length, given its name (``a3``, ``tool_x``), its value, m, and a note on it."""
+
+
+def build_mechanism(spec: RobotSpec, trace: Trace, length: Lengths) -> Mechanism:
+    """Turn a table into a mechanism whose numbers are constants of a trace.
+
+    Args:
+        spec: The robot; rows of all conventions may be mixed.
+        trace: Takes the constants.
+        length: Makes the constants for lengths.
+    """
+    constants = _Constants(trace)
+    moving: list[tuple[int, Row]] = []
+    segments: list[_Segment] = []
+    steps = _pose_steps("base", spec.base.pose, length)
+    for number, row in enumerate(spec.rows, start=1):
+        before, after = _row_steps(number, row, length)
+        steps += before
+        if row.type.moves:
+            moving.append((number, row))
+            segments.append(_reduced(steps, constants, str(number), first=not segments))
+            steps = []
+        steps += after
+    steps += _pose_steps("tool", spec.tool.pose, length)
+    last = _reduced(steps, constants, "_tool", first=not segments, last=True)
+
+    joints: list[MovingJoint] = []
+    carried: Number = 0.0
+    for (number, row), segment, following in zip(moving, segments, [*segments, last][1:], strict=True):
+        x, y, z = segment.offset
+        if segment.twist in (NO_TURN, HALF_TURN):  # parallel axes: on along them
+            z, carried = 0.0, segment.twist.cosine * (z + carried) + segment.lift
+        else:
+            z, carried = z + carried, segment.lift
+        joints.append(
+            MovingJoint(
+                row=number,
+                turns=row.type.turns,
+                sign=-1.0 if row.flip else 1.0,
+                offset=(x, y, z),
+                twist=segment.twist,
+                angle=segment.theta + following.gamma,
+                chain_angle=following.gamma,
+                chain_offset=trace.value(carried) + row.d,
+            )
+        )
+    return Mechanism(
+        base=constants.turn((segments[0] if segments else last).gamma, "base"),
+        joints=tuple(joints),
+        tool_offset=added(last.offset, (0.0, 0.0, carried)),
+        tool_twist=last.twist,
+        tool_angle=constants.turn(last.theta, "tool"),
+    )
+
+
+class _Step(NamedTuple):
+    """An elementary motion."""
+
+    axis: str
+    """x, y or z: a rotation about it; t: a translation."""
+    angle: float = 0.0
+    """rad."""
+    name: str = ""
+    """Of the angle."""
+    offset: Vector = ORIGIN
+
+
+class _Segment(NamedTuple):
+    """The constant motion between two joints: T(offset) Rz(gamma) Rx(twist) Rz(theta) Tz(lift).
+
+    Where there is a joint before it, gamma belongs to that joint's angle, and the offset is in the turned frame.
+    """
+
+    offset: Vector
+    gamma: float
+    twist: Turn
+    theta: float
+    lift: Number
+
+
+class _Constants:
+    """Makes sines and cosines of constant angles; equal ones are one constant."""
+
+    def __init__(self, trace: Trace) -> None:
+        self._trace = trace
+        self._known: dict[float, Number] = {}
+
+    def turn(self, angle: float, name: str) -> Turn:
+        """Return a constant rotation by an angle, rad."""
+        s, c = sin_cos(angle)
+        return Turn(self._shared(c, f"cos_{name}"), self._shared(s, f"sin_{name}"))
+
+    def _shared(self, value: float, name: str) -> Number:
+        size = abs(value)
+        if size not in self._known:
+            self._known[size] = self._trace.constant(name, size)
+        return self._known[size] if value >= 0 else -self._known[size]
+
+
+def _pose_steps(name: str, pose: Pose, length: Lengths) -> list[_Step]:
+    """Return T(xyz) Rz(yaw) Ry(pitch) Rx(roll)."""
+    x, y, z = (length(f"{name}_{axis}", float(value), "m") for axis, value in zip("xyz", pose.xyz, strict=True))
+    roll, pitch, yaw = (float(angle) for angle in pose.rpy)
+    return [
+        _Step("t", offset=(x, y, z)),
+        _Step("z", yaw, f"{name}_yaw"),
+        _Step("y", pitch, f"{name}_pitch"),
+        _Step("x", roll, f"{name}_roll"),
+    ]
+
+
+def _row_steps(number: int, row: Row, length: Lengths) -> tuple[list[_Step], list[_Step]]:
+    """Return what comes before the joint of a row and what comes after it; names have the textbooks' indices."""
+    link_number = number - 1 if row.convention is Convention.MODIFIED else number
+    link = [
+        _Step("t", offset=(length(f"a{link_number}", row.a, f"m, row {number}"), 0.0, 0.0)),
+        _Step("x", row.alpha, f"alpha{link_number}"),
+    ]
+    turn = _Step("z", row.theta, f"theta{number}")
+    slide = _Step("t", offset=(0.0, 0.0, length(f"d{number}", row.d, f"m, row {number}")))
+    match row.convention:
+        case Convention.STANDARD:
+            return [turn], [slide, *link]
+        case Convention.MODIFIED:
+            return [*link, turn], [slide]
+        case Convention.HAYATI:
+            return [turn], [slide, *link, _Step("y", row.beta, f"beta{number}")]
+
+
+_ROTATE: Final = {"x": about_x, "y": about_y, "z": about_z}
+
+
+def _reduced(
+    steps: Iterable[_Step], constants: _Constants, name: str, *, first: bool = False, last: bool = False
+) -> _Segment:
+    """Return the constant motion that elementary motions make.
+
+    Args:
+        steps: The motions.
+        constants: Makes the constants.
+        name: Of the twist, where the table has none for it.
+        first: Whether no joint comes before, to whose angle gamma could be added.
+        last: Whether no joint comes after, past which the lift could be moved.
+    """
+    offset: Vector = ORIGIN
+    lift: Number = 0.0
+    rotations: list[_Step] = []
+
+    def turned(v: Vector) -> Vector:
+        for step in reversed(rotations):
+            v = _ROTATE[step.axis](constants.turn(step.angle, step.name), v)
+        return v
+
+    for step in steps:
+        if step.axis == "t":
+            x, y, z = step.offset
+            offset, lift = added(offset, turned((x, y, 0.0))), lift + z
+        elif not _is_nothing(step.angle):
+            if step.axis != "z":
+                offset, lift = added(offset, turned((0.0, 0.0, lift))), 0.0
+            if rotations and rotations[-1].axis == step.axis:
+                step = step._replace(angle=rotations.pop().angle + step.angle)
+            if not _is_nothing(step.angle):
+                rotations.append(step)
+    if last:
+        offset, lift = added(offset, turned((0.0, 0.0, lift))), 0.0
+    gamma, alpha, theta = _zxz_angles(rotations)
+    if not first:
+        offset = about_z(constants.turn(-gamma, f"gamma{name}"), offset)
+    twists = [step.name for step in rotations if step.axis == "x"]
+    return _Segment(
+        offset, gamma, constants.turn(alpha, twists[0] if len(twists) == 1 else f"twist{name}"), theta, lift
+    )
+
+
+def _is_nothing(angle: float) -> bool:
+    return sin_cos(angle) == (0.0, 1.0)
+
+
+def _zxz_angles(rotations: Sequence[_Step]) -> tuple[float, float, float]:
+    """Return gamma, alpha and theta, rad: the product of the rotations is Rz(gamma) Rx(alpha) Rz(theta)."""
+    axes = "".join(step.axis for step in rotations)
+    if axes in ("", "x", "z", "xz", "zx", "zxz"):  # as they are, without rounding
+        angles = [step.angle for step in rotations]
+        gamma = angles.pop(0) if axes.startswith("zx") else 0.0
+        theta = angles.pop() if axes.endswith("z") else 0.0
+        return gamma, sum(angles), theta
+    columns: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+    for step in reversed(rotations):
+        s, c = sin_cos(step.angle)
+        columns = [_ROTATE[step.axis](Turn(c, s), column) for column in columns]
+    (r11, _, r31), (r12, _, r32), (r13, r23, r33) = cast("list[tuple[float, float, float]]", columns)
+    tilt = math.sqrt(r13 * r13 + r23 * r23)
+    if tilt <= _NO_TILT:
+        return 0.0, 0.0 if r33 > 0 else math.pi, atan2(-r12, r11)
+    return atan2(r13, -r23), atan2(tilt, r33), atan2(r31, r32)
