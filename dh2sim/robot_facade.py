@@ -640,13 +640,16 @@ class Robot:
         with atomic_file(file) as draft:
             draft.write_text(text, encoding="utf-8")
 
-    def view(self, *, host: str = "127.0.0.1", port: int = 8080, browser: bool = True) -> Viewer:
+    def view(
+        self, *, host: str = "127.0.0.1", port: int = 8080, browser: bool = True, allow_hosts: Iterable[str] = ()
+    ) -> Viewer:
         """Show the robot in the browser, and return at once.
 
         Args:
             host: Address to listen at; by default only this machine can reach it.
             port: Port to listen at, or the next that is free.
             browser: Whether to open the page in a browser, if there is a screen.
+            allow_hosts: Names of this machine that browsers may use, besides those that it knows of itself.
 
         Returns:
             The server: its ``url`` is where the page is, ``wait()`` keeps a script alive, ``stop()`` ends it.
@@ -659,7 +662,7 @@ class Robot:
 
         file = self.spec.source_file
         state = open_state(self.spec, None if file is None else folder_of(file.path))
-        viewer = Viewer(state, host=host, port=free_port(host, port))
+        viewer = Viewer(state, host=host, port=free_port(host, port), allow_hosts=allow_hosts)
         if browser:
             viewer.open_browser()
         return viewer

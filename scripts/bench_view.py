@@ -2,7 +2,7 @@
 """The part of ``scripts/bench`` that measures the viewer in a real browser, which draws without a graphics card.
 
 scripts/bench_view.py --minutes 3       this part alone, clicking at random for so long
-scripts/bench_view.py --only delays     of this part, first pictures, delays, a long chain, or memory
+scripts/bench_view.py --only delays     of this part; also first, chain, memory, or pages
 """
 
 from __future__ import annotations
@@ -40,15 +40,17 @@ SECONDS = 8.0
 """For how long frames are counted."""
 WARM_UP = 60.0
 """s of clicking, before memory is measured: until then libraries are loaded, and what is kept is filled."""
+PAGES, TOGETHER = 50, 2
+"""Pages that are opened and closed, and how many of them at once."""
 FIRST_PAINT = "() => performance.timeOrigin + performance.getEntriesByName('first-contentful-paint')[0].startTime"
 """ms since 1970."""
 
 
-PARTS = ("first", "delays", "chain", "memory")
+PARTS = ("first", "delays", "chain", "memory", "pages")
 
 
 def view(minutes: float = 2.0, parts: Sequence[str] = PARTS) -> Iterator[Row]:
-    """First picture, delay of a slider, frames a second of a long chain, and memory after clicking at random."""
+    """First picture, delay of a slider, frames a second of a long chain, and memory after clicks and closed pages."""
     what = "viewer in a browser"
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     try:
@@ -68,6 +70,7 @@ def view(minutes: float = 2.0, parts: Sequence[str] = PARTS) -> Iterator[Row]:
                 lambda: _delays(browser),
                 lambda: _long_chain(browser),
                 lambda: _memory(browser, minutes),
+                lambda: _pages(browser),
             ]
             for part, measure in zip(PARTS, measures, strict=True):
                 if part in parts:
@@ -218,6 +221,39 @@ def _memory(browser: Browser, minutes: float) -> Iterator[Row]:
         page.context.close()
     figures = f"{after / before:.2f} ({before / 1e6:.0f} to {after / 1e6:.0f} MB, {count} clicks)"
     yield what, figures, "1.1", after <= 1.1 * before
+
+
+def _pages(browser: Browser) -> Iterator[Row]:
+    """Memory of the server once 50 pages that drew are closed, of that after the first."""
+    what = f"view: memory after {PAGES} pages, times"
+    if not Path("/proc/self/status").exists():
+        yield what, "not measured (there is no /proc)", "1.1", None
+        return
+    with program() as (process, url):
+        _open_and_close(browser, url, 1)
+        before, most = _resident(process), 0
+        for _ in range(PAGES // TOGETHER):
+            most = max(most, _open_and_close(browser, url, TOGETHER, process))
+        after = _resident(process)
+    figures = f"{after / before:.2f} ({before / 1e6:.0f} to {after / 1e6:.0f} MB, {most / 1e6:.0f} MB meanwhile)"
+    yield what, figures, "1.1", after <= 1.1 * before
+
+
+def _open_and_close(browser: Browser, url: str, count: int, process: subprocess.Popen[str] | None = None) -> int:
+    """Open pages at once, let them draw the robot, and close them; return the memory before that."""
+    pages = [window(browser, FIRST_PICTURE) for _ in range(count)]
+    for page in pages:
+        page.set_default_timeout(120_000.0)
+        page.set_viewport_size({"width": 400, "height": 300})  # drawn in software
+        go(page, url)
+    for page in pages:
+        page.wait_for_function("() => window.robotShown !== undefined")
+        page.get_by_role("button", name="random").click()
+    most = 0 if process is None else _resident(process)
+    for page in pages:
+        page.context.close()
+    time.sleep(5.0)
+    return most
 
 
 def _resident(process: subprocess.Popen[str]) -> int:

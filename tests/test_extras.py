@@ -19,7 +19,7 @@ from tests.program import Outcome, dh2sim, environment
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 MODULES = {
-    "view": {"viser", "mink"},
+    "view": {"viser", "mink", "websockets", "msgspec"},
     "plot": {"matplotlib", "xarray"},
     "video": {"PIL", "imageio_ffmpeg", "xarray"},
     "data": {"xarray", "pyarrow", "h5netcdf", "h5py"},
@@ -34,7 +34,6 @@ BROUGHT = {
     "scipy",
     "qpsolvers",
     "daqp",
-    "websockets",
     "requests",
     "imageio",
     "lxml",

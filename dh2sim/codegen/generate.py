@@ -13,6 +13,7 @@ from dh2sim.codegen.base_parameters import base_parameters
 from dh2sim.codegen.check import force_error, jacobian_error, pose_error
 from dh2sim.codegen.forward import joint_turns, tool_jacobian, tool_pose
 from dh2sim.codegen.languages import Language, program_text
+from dh2sim.codegen.lengths import length_constants
 from dh2sim.codegen.mechanism import Mechanism, build_mechanism
 from dh2sim.codegen.newton_euler import inverse_dynamics
 from dh2sim.codegen.program import Function, Program
@@ -74,7 +75,7 @@ def generate(
 
 def _program(spec: RobotSpec, model: RobotModel | None, wanted: list[What], name: str) -> Program:
     trace = Trace()
-    mechanism = build_mechanism(spec, trace, trace.constant)
+    mechanism = build_mechanism(spec, trace, length_constants(spec, trace))
     n = len(mechanism.joints)
     q = trace.variables("q", n)
     functions: list[Function] = []

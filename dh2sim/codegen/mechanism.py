@@ -106,8 +106,11 @@ class Step(NamedTuple):
     offset: Vector = ORIGIN
 
 
-Lengths: TypeAlias = Callable[[str, float, str], Number]
-"""Returns the constant for a length, given its name (``a3``, ``tool_x``), its value, m, and a note on it."""
+Lengths: TypeAlias = Callable[[int | str, str, float, str], Number]
+"""Returns a constant for the length of a part (the number of a row, ``base``, ``tool``) and an axis (``a``, ``x``).
+
+Then follow its value, m, and the name that it has if it has no other.
+"""
 
 
 def build_mechanism(spec: RobotSpec, trace: Trace, length: Lengths) -> Mechanism:
@@ -197,18 +200,20 @@ class _Constants:
     def turn(self, angle: float, name: str) -> Turn:
         """Return a constant rotation by an angle, rad."""
         s, c = sin_cos(angle)
-        return Turn(self._shared(c, f"cos_{name}"), self._shared(s, f"sin_{name}"))
+        note = f"of {angle!r} rad"
+        return Turn(self._shared(c, f"cos_{name}", note), self._shared(s, f"sin_{name}", note))
 
-    def _shared(self, value: float, name: str) -> Number:
+    def _shared(self, value: float, name: str, note: str) -> Number:
         size = abs(value)
         if size not in self._known:
-            self._known[size] = self._trace.constant(name, size)
+            self._known[size] = self._trace.constant(name, size, note)
         return self._known[size] if value >= 0 else -self._known[size]
 
 
 def _pose_steps(name: str, pose: Pose, length: Lengths) -> list[_Step]:
     """Return T(xyz) Rz(yaw) Ry(pitch) Rx(roll)."""
-    x, y, z = (length(f"{name}_{axis}", float(value), "m") for axis, value in zip("xyz", pose.xyz, strict=True))
+    values = zip("xyz", pose.xyz.tolist(), strict=True)
+    x, y, z = (length(name, axis, value, f"{name}_{axis}") for axis, value in values)
     roll, pitch, yaw = (float(angle) for angle in pose.rpy)
     return [
         _Step("t", offset=(x, y, z)),
@@ -222,11 +227,11 @@ def _row_steps(number: int, row: Row, length: Lengths) -> tuple[list[_Step], lis
     """Return what comes before the joint of a row and what comes after it; names have the textbooks' indices."""
     link_number = number - 1 if row.convention is Convention.MODIFIED else number
     link = [
-        _Step("t", offset=(length(f"a{link_number}", row.a, f"m, row {number}"), 0.0, 0.0)),
+        _Step("t", offset=(length(number, "a", row.a, f"a{link_number}"), 0.0, 0.0)),
         _Step("x", row.alpha, f"alpha{link_number}"),
     ]
     turn = _Step("z", row.theta, f"theta{number}")
-    slide = _Step("t", offset=(0.0, 0.0, length(f"d{number}", row.d, f"m, row {number}")))
+    slide = _Step("t", offset=(0.0, 0.0, length(number, "d", row.d, f"d{number}")))
     match row.convention:
         case Convention.STANDARD:
             return [turn], [slide, *link]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from dh2sim.errors import Dh2simError
+from dh2sim.messages import printable
 from dh2sim.view.events import Event, Notify
 from dh2sim.view.motion.dragging import LinkGrabs, ToolHandle
 from dh2sim.view.motion.motion_source import MotionControl
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 DISCONNECTED = ("on a closed connection", "Event loop is closed")
 """In messages of viser (a warning, or an error if warnings are errors) and asyncio about a browser that is gone."""
 
+_log: Final = logging.getLogger(__name__)
+
 Task: TypeAlias = "Event | Callable[[], None]"
 
 
@@ -36,21 +40,33 @@ def is_disconnect(error: Exception) -> bool:
     return any(words in str(error) for words in DISCONNECTED)
 
 
+def _bug(error: Exception) -> str:
+    return f"This is a bug in dh2sim, please report it: {type(error).__name__}: {error}"
+
+
 class Page:
     """Shows a state to a viser client, and changes it by events."""
 
-    def __init__(self, client: viser.ClientHandle, state: ViewState, replay: Callable[[], Replay | None]) -> None:
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        state: ViewState,
+        replay: Callable[[], Replay | None],
+        disconnect: Callable[[], None],
+    ) -> None:
         """Draw nothing before ``start``.
 
         Args:
             client: The page's viser client.
             state: The initial state.
             replay: Opens a run of the same robot, if there is one.
+            disconnect: Closes the connection to the browser.
         """
         self.client = client
         self.state = state
         """Written by the page's own thread alone."""
         self.motion = MotionControl(lambda: self.state, self.apply, replay)
+        self._disconnect = disconnect
         self._files = RobotFiles(lambda: self.state, self.apply, self._download, self._on_open)
         self._queue: queue.SimpleQueue[tuple[Task, Callable[[], None] | None] | None] = queue.SimpleQueue()
         self._closed = threading.Event()
@@ -85,12 +101,13 @@ class Page:
         self._queue.put((task, on_start))
 
     def _run(self) -> None:
-        """Work until the page is closed, or sending shows that the browser is gone."""
+        """Work until the page is closed, or sending shows that the browser is gone; other pages go on after a bug."""
         try:
             self._work()
-        except (UserWarning, RuntimeError) as error:
+        except Exception as error:
             if not is_disconnect(error):
-                raise
+                _log.error("dh2sim: a page was closed. %s", printable(_bug(error)))
+                self._disconnect()
 
     def _work(self) -> None:
         self._draw()
@@ -138,7 +155,7 @@ class Page:
         except Dh2simError as error:
             self.apply(Notify(notice=str(error)))
         except Exception as error:  # the page goes on
-            self.apply(Notify(notice=f"This is a bug in dh2sim, please report it: {type(error).__name__}: {error}"))
+            self.apply(Notify(notice=_bug(error)))
 
     def apply(self, event: Event) -> None:
         """Apply an event at once; on the page's own thread alone."""

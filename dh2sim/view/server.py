@@ -6,10 +6,11 @@ It is viser's, without its messages, and without its tunnel to the internet.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import errno
+import gc
 import importlib
 import io
-import ipaddress
 import logging
 import os
 import socket
@@ -18,39 +19,54 @@ import threading
 import time
 import warnings
 import webbrowser
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Final, cast
-from urllib.parse import urlsplit
+from typing import TYPE_CHECKING, Final
 
 from dh2sim.errors import Dh2simError
+from dh2sim.view.access import ANY_ADDRESS, Access, closer
 from dh2sim.view.page import Page
 from dh2sim.view.scene.camera import aim
 from dh2sim.view.state import ViewState
 
 if TYPE_CHECKING:
     import viser
-    from viser import infra
 
     from dh2sim.view.motion.replay import Replay
 
-LOOPBACK: Final = ("127.0.0.1", "localhost", "::1")
-ANY_ADDRESS: Final = ("0.0.0.0", "::")
-"""Listening at these means at all addresses of this machine."""
 PORTS_TRIED: Final = 100
 STOP_TIMEOUT: Final = 5.0
 """s that a page may take to end."""
+CLEAR_UP_DELAY: Final = 1.0
+"""s from when a page is closed until its memory is given back."""
 
 
-def start_server(host: str, port: int) -> viser.ViserServer:
-    """Start a viser server that prints nothing and never shares its pages."""
+def start_server(host: str, port: int, access: Access | None = None) -> viser.ViserServer:
+    """Start a viser server that prints nothing and never shares its pages.
+
+    Args:
+        host: Address to listen at.
+        port: Port to listen at, 0 for any free one.
+        access: Checks requests; by default for the names of ``host``.
+
+    Raises:
+        Dh2simError: Requests cannot be checked with this version of viser.
+    """
     import viser
 
     # pages detect by themselves that their browser is gone
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection", category=UserWarning)
+    # nor does it matter what a page sends: what cannot be used closes it
+    warnings.filterwarnings("ignore", message=r"\[viser\] [\s\S]* does not match annotation", category=UserWarning)
     logging.getLogger("websockets.server").addFilter(_is_worth_logging)
-    with contextlib.redirect_stdout(io.StringIO()):  # it prints its address even if it is not verbose
-        server = viser.ViserServer(host=host, port=port, verbose=False)
+    server: viser.ViserServer | None = None
+    try:
+        with (access or Access(host)).guarding(), contextlib.redirect_stdout(io.StringIO()):  # it prints its address
+            server = viser.ViserServer(host=host, port=port, verbose=False)
+    except Dh2simError:
+        if server is not None:
+            stop_server(server)
+        raise
     server.request_share_url = _refuse_to_share  # type: ignore[method-assign]
     return server
 
@@ -84,7 +100,13 @@ class Viewer:
     """Serves pages until it is stopped."""
 
     def __init__(
-        self, state: ViewState, *, host: str = "127.0.0.1", port: int = 0, run: FilePath | None = None
+        self,
+        state: ViewState,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        run: FilePath | None = None,
+        allow_hosts: Iterable[str] = (),
     ) -> None:
         """Start to serve.
 
@@ -93,10 +115,11 @@ class Viewer:
             host: Address to listen at; by default only this machine can reach it.
             port: Port to listen at, 0 for any free one; see ``free_port``.
             run: A run of the same robot that pages can play.
+            allow_hosts: Names of this machine that browsers may use, besides those that it knows of itself.
 
         Raises:
             RunError: The run cannot be read, or is of a robot with other joints.
-            Dh2simError: The origin of requests cannot be checked with this version of viser.
+            Dh2simError: Requests cannot be checked with this version of viser.
         """
         self._state = state
         self._host = host
@@ -104,15 +127,15 @@ class Viewer:
         self._open_replay()  # raises early
         self._pages: dict[int, Page] = {}
         self._leaving: list[Page] = []
-        """Pages whose browser is gone, and whose thread may still run."""
+        """Pages whose browser is gone, and which are not cleared up yet."""
+        self._stopping = threading.Event()
         self._lock = threading.Lock()
-        self._server = start_server(host, port)
+        self.access: Final = Access(host, allow_hosts)
+        self._server = start_server(host, port, self.access)
         self.port: int = self._server.get_port()
         _configure(self._server, state)
         # not a daemon: Python crashes if it ends while a library is being loaded
         threading.Thread(target=_preload, name="preload").start()
-        self._websockets = _websockets(self._server)
-        self._websockets.on_client_connect(self._check_origin)
         self._server.on_client_connect(self._open)
         self._server.on_client_disconnect(self._close)
 
@@ -141,30 +164,17 @@ class Viewer:
 
     def stop(self) -> None:
         """Close all pages, and stop the server."""
-        pages = self.pages
+        self._stopping.set()
+        with self._lock:
+            pages = (*self._pages.values(), *self._leaving)
         for page in pages:
             page.close()
-        for page in (*pages, *self._leaving):  # a stopped server complains about what is sent to it
+        for page in pages:  # a stopped server complains about what is sent to it
             page.join(STOP_TIMEOUT)
         stop_server(self._server)
 
-    async def _check_origin(self, connection: infra.WebsockClientConnection) -> None:
-        """Close a connection from another site's page before anything is sent to it."""
-        live = self._websockets._live_connections.get(connection.client_id)
-        if live is not None and live.request is not None and self._is_foreign(live.request.headers):
-            await live.close(1008, "not a page of this server")
-
-    def _is_foreign(self, headers: Mapping[str, str]) -> bool:
-        """Return whether another site's page, open in a browser on this machine, made a request."""
-        origin = headers.get("Origin")
-        if origin is None:  # no browser
-            return False
-        site = urlsplit(origin)
-        local = self._host not in LOOPBACK or site.hostname in LOOPBACK
-        return site.netloc != headers.get("Host") or not local
-
     async def _open(self, client: viser.ClientHandle) -> None:
-        page = Page(client, self._state, self._open_replay)
+        page = Page(client, self._state, self._open_replay, closer())
         with self._lock:
             self._pages[client.client_id] = page
         page.start()
@@ -180,24 +190,36 @@ class Viewer:
     async def _close(self, client: viser.ClientHandle) -> None:
         with self._lock:
             page = self._pages.pop(client.client_id, None)
-        if page is not None:
+            if page is None:
+                return
             page.close()
-            self._leaving = [*(left for left in self._leaving if left.is_alive), page]
+            self._leaving.append(page)
+            if len(self._leaving) == 1:
+                threading.Thread(target=self._clear_up, name="clear up").start()
+
+    def _clear_up(self) -> None:
+        """Give back the memory of pages that are closed, of several at once, for that takes a tenth of a second.
+
+        They consist of cycles, which Python finds late, and more so as short commands let it wait (``cli/main.py``).
+        """
+        while not self._stopping.wait(CLEAR_UP_DELAY):
+            with self._lock:
+                ended = [page for page in self._leaving if not page.is_alive]
+                self._leaving = [page for page in self._leaving if page.is_alive]
+                done = not self._leaving
+            if ended:
+                ended.clear()
+                gc.collect()
+                give_back_memory()
+            if done:
+                return
 
 
-def _websockets(server: viser.ViserServer) -> infra.WebsockServer:
-    """Return the part of a server that knows the headers of requests, to which viser gives no public access.
-
-    Raises:
-        Dh2simError: viser has changed; the server is stopped, since it would serve other sites' pages.
-    """
-    websockets = getattr(server, "_websock_server", None)
-    if not hasattr(websockets, "_live_connections"):
-        import viser
-
-        stop_server(server)
-        raise Dh2simError(f"viser {viser.__version__} is not supported: the origin of requests cannot be checked")
-    return cast("infra.WebsockServer", websockets)
+def give_back_memory() -> None:
+    """Give memory that is free back to the system, where the C library needs to be told (glibc)."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
+    if trim is not None:
+        trim(0)
 
 
 def free_port(host: str, port: int) -> int:
@@ -219,12 +241,6 @@ def free_port(host: str, port: int) -> int:
             if error.errno != errno.EADDRINUSE:
                 raise Dh2simError(f"cannot listen at {host}, port {candidate}: {error.strerror or error}") from error
     raise Dh2simError(f"cannot listen at {host}: ports {port} to {candidate} are all taken")
-
-
-def is_local_only(host: str) -> bool:
-    """Return whether only this machine can reach a server at a valid address."""
-    addresses = [str(info[4][0]) for info in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)]
-    return all(ipaddress.ip_address(address).is_loopback for address in addresses)
 
 
 def _preload() -> None:

@@ -25,7 +25,6 @@ from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.read import load_robot
 from dh2sim.view.initial_state import folder_of, open_state
 from dh2sim.view.scene.scene import scene_of
-from dh2sim.view.server import is_local_only
 from tests.program import STARTED, dh2sim, dh2sim_process, environment
 
 ADDRESS = "127.0.0.1"
@@ -208,16 +207,15 @@ def test_by_default_only_this_machine_can_reach_it() -> None:
         with socket.socket() as other:
             assert other.connect_ex(("127.0.0.2", port)) == 0
         process.send_signal(signal.SIGINT)
-        warning = "dh2sim: anyone who can reach this machine at any of its addresses can open the page\n"
-        assert process.communicate(timeout=TIMEOUT)[1] == f"{warning}dh2sim: interrupted\n"
-
-
-@pytest.mark.parametrize(
-    ("host", "private"),
-    [("127.0.0.1", True), ("127.8.0.1", True), ("localhost", True), ("0.0.0.0", False), ("192.0.2.1", False)],
-)
-def test_whether_others_can_reach_an_address_is_known(host: str, private: bool) -> None:
-    assert is_local_only(host) is private
+        warning, names, *rest = process.communicate(timeout=TIMEOUT)[1].splitlines()
+    assert warning == "dh2sim: anyone who can reach this machine at any of its addresses can open the page"
+    machine = socket.gethostname()
+    assert re.fullmatch(
+        rf"dh2sim: by an IP address or as localhost, {machine}, {machine}\.local; --allow-host adds a name",
+        names,
+        re.IGNORECASE,
+    )
+    assert rest == ["dh2sim: interrupted"]
 
 
 def test_an_address_that_only_this_machine_can_reach_gives_no_warning() -> None:
@@ -271,6 +269,16 @@ def test_an_invalid_host_is_refused(host: str) -> None:
     assert (done.status, done.out) == (2, "")
     assert done.err.startswith(f"dh2sim: cannot listen at {host}, port 8080: ")
     assert done.err.count("\n") == 1, "a sentence, no traceback"
+
+
+@pytest.mark.parametrize("name", ["", "http://lab.example.org", "lab.example.org:80", "a b", "*"])
+def test_an_invalid_name_of_this_machine_is_refused(name: str) -> None:
+    done = dh2sim("view", "stanford", "--no-browser", "--allow-host", name)
+    assert (done.status, done.out) == (2, "")
+    assert done.err.endswith(
+        "Invalid value for --allow-host: must be a name such as lab.example.org, without a scheme or a port, got "
+        f"{name!r}\n"
+    )
 
 
 @pytest.mark.parametrize("port", ["0", "65536", "-1", "eighty"])

@@ -1,17 +1,20 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dh2sim import Dh2simError, Fixed, Revolute, Robot
+from dh2sim import Dh2simError, Fixed, LinkSpec, Revolute, Robot
 from dh2sim.codegen.generate import generate
-from dh2sim.errors import ModelError
+from dh2sim.errors import MeshError, ModelError
 from dh2sim.kinematics.forward import geometric_jacobian
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.read import parse_robot
+from dh2sim.robot.spec import MeshSpec, RobotSpec
 from dh2sim.typing import Array
 from tests.codegen.running import python_functions
 from tests.sample_robots import NAMES, robot
@@ -99,9 +102,9 @@ def test_the_same_robot_gives_the_same_code(language: str) -> None:
 
 
 def test_masses_are_needed_for_inverse_dynamics_alone() -> None:
-    spec = Robot([Revolute(a=1e21)], name="huge").spec
+    spec = Robot([Revolute(a=0.3, link=LinkSpec(mesh=MeshSpec(file=Path("nowhere.stl"))))]).spec
     assert "def fk" in generate(spec)
-    with pytest.raises(ModelError, match="a model needs numbers of at most 1e"):
+    with pytest.raises(MeshError, match=r"nowhere\.stl"):
         generate(spec, "inverse-dynamics")
 
 
@@ -127,3 +130,33 @@ def test_each_function_can_be_had_alone(what: str, drawn: tuple[RobotSpec, Array
     assert [name for name in wanted.values() if name in names] == [wanted[what]]
     arguments = [q[0].tolist()] * (3 if what == "inverse-dynamics" else 1)
     assert np.isfinite(np.array(names[wanted[what]](*arguments))).all()
+
+
+PARAMETERS = """\
+name: letters
+convention: standard
+units: {{length: {unit}}}
+parameters: {{reach: {reach}, half: "reach / 2", factor: 3}}
+joints:
+  - {{type: revolute, a: half, alpha: 0.4}}
+  - {{type: revolute, a: "2 * reach - 0.1 * half + {own}", d: "{power}"}}
+  - {{type: prismatic, d: "half + reach", alpha: 1.2, flip: true}}
+tool: {{xyz: [0, 0, "reach - half"]}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("unit", "reach", "own", "power"), [("m", 0.5, 0.25, "factor * half ** 2"), ("mm", 500, 250, "sqrt(half)")]
+)
+def test_lengths_follow_the_parameters_that_they_are_made_of(unit: str, reach: float, own: float, power: str) -> None:
+    spec = parse_robot(PARAMETERS.format(unit=unit, reach=reach, own=own, power=power))
+    text = generate(spec, ["pose", "jacobian"], "python")
+    assert "reach = 0.5  # m" in text
+    q = [0.3, -0.4, 0.2]
+    np.testing.assert_allclose(python_functions(text)["fk"](q), table_tool_pose(spec, q), rtol=0, atol=1e-14)
+    longer = python_functions(text.replace("reach = 0.5 ", "reach = 0.7 ").replace("half = 0.25 ", "half = 0.35 "))
+    if unit == "m":
+        changed = parse_robot(PARAMETERS.format(unit=unit, reach=0.7, own=own, power=power))
+        np.testing.assert_allclose(longer["fk"](q), table_tool_pose(changed, q), rtol=0, atol=1e-14)
+    else:
+        assert "d2 = " in text, "a square root of mm is a number in m"

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import socket
 import threading
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+import websockets
 
 from dh2sim.errors import Dh2simError
 from dh2sim.robot.read import load_robot
-from dh2sim.view import server
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import is_disconnect
-from dh2sim.view.server import Viewer, start_server
+from dh2sim.view.server import Viewer, free_port
 from tests.view.on_page import wait_until
 from tests.view.without_browser import speaking
-
-if TYPE_CHECKING:
-    import viser
 
 
 @pytest.mark.parametrize(
@@ -70,26 +68,34 @@ def test_a_page_that_is_closed_leaves_what_is_queued() -> None:
         viewer.stop()
 
 
-def test_no_page_is_served_if_the_origin_of_requests_cannot_be_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_page_is_served_if_requests_cannot_be_checked(monkeypatch: pytest.MonkeyPatch) -> None:
     import viser
+    import websockets.asyncio.server as public
 
-    started = start_server("127.0.0.1", 0)
-    monkeypatch.setattr(server, "start_server", lambda _host, _port: Changed(started))
+    started: list[int] = []
+
+    def serve(*arguments: Any, **options: Any) -> Any:
+        started.append(options.get("port", arguments[2]))
+        return original(*arguments, **options)
+
+    original = public.serve
+    elsewhere = SimpleNamespace(asyncio=SimpleNamespace(server=SimpleNamespace(serve=serve)))
+    # a viser that has its server from elsewhere
+    monkeypatch.setattr("viser.infra._infra.websockets", Layered(elsewhere, websockets))
+    port = free_port("127.0.0.1", 18080)
     with pytest.raises(Dh2simError) as caught:
-        Viewer(open_state(load_robot("stanford")))
-    message = f"viser {viser.__version__} is not supported: the origin of requests cannot be checked"
-    assert str(caught.value) == message
+        Viewer(open_state(load_robot("stanford")), port=port)
+    assert str(caught.value) == f"viser {viser.__version__} is not supported: its requests cannot be checked"
+    assert started == [port]
     with pytest.raises(OSError, match="refused"):
-        socket.create_connection(("127.0.0.1", started.get_port()), timeout=10.0)
+        socket.create_connection(("127.0.0.1", port), timeout=10.0)
 
 
-class Changed:
-    """A viser server without private parts."""
+class Layered:
+    """A module of which some names are replaced."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._server = server
+    def __init__(self, first: object, then: object) -> None:
+        self._layers = (first, then)
 
     def __getattr__(self, name: str) -> object:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        return getattr(self._server, name)
+        return next(getattr(layer, name) for layer in self._layers if hasattr(layer, name))

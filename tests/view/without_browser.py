@@ -8,30 +8,45 @@ from typing import Any
 
 import pytest
 
+CAMERA = {
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (3.0, 0.0, 0.0),
+    "fov": 1.0,
+    "near": 0.01,
+    "far": 100.0,
+    "image_height": 10,
+    "image_width": 10,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+"""What a page reports first."""
+
+
+def encoded(kind: str, **content: Any) -> bytes:
+    """A message of a kind and with a content."""
+    import msgspec
+
+    return msgspec.msgpack.encode({"type": kind, **content})
+
+
+@contextlib.contextmanager
+def connected(url: str, **options: Any) -> Iterator[Any]:
+    """Connect to a server as a page of it does; gives the connection, on which nothing was sent."""
+    client = pytest.importorskip("websockets.sync.client")
+    import viser
+
+    address, protocols = url.replace("http", "ws", 1), [f"viser-v{viser.__version__}"]
+    with client.connect(address, **{"origin": url, **options}, subprotocols=protocols, max_size=None) as connection:
+        yield connection
+
 
 @contextlib.contextmanager
 def speaking(url: str) -> Iterator[Callable[..., None]]:
     """Come to a server as a page; gives what sends it a message, of a kind and with a content."""
-    client = pytest.importorskip("websockets.sync.client")
-    import msgspec
-    import viser
-
-    address, protocols = url.replace("http", "ws"), [f"viser-v{viser.__version__}"]
-    with client.connect(address, origin=url, subprotocols=protocols, max_size=None) as connection:
+    with connected(url) as connection:
 
         def say(kind: str, **content: Any) -> None:
-            connection.send(msgspec.msgpack.encode({"type": kind, **content}))
+            connection.send(encoded(kind, **content))
 
-        say(
-            "ViewerCameraMessage",
-            wxyz=(1.0, 0.0, 0.0, 0.0),
-            position=(3.0, 0.0, 0.0),
-            fov=1.0,
-            near=0.01,
-            far=100.0,
-            image_height=10,
-            image_width=10,
-            look_at=(0.0, 0.0, 0.0),
-            up_direction=(0.0, 0.0, 1.0),
-        )
+        say("ViewerCameraMessage", **CAMERA)
         yield say

@@ -84,6 +84,8 @@ class ToolHandle:
         if self._handle is None or state.mode is not Mode.MANUAL:
             return
         T = _pose(self._handle.position, self._handle.wxyz)
+        if not np.isfinite(T).all():
+            return
         solution = self._inverse_kinematics(state.model).solve(state.q, T)
         rows: Matrix = tuple(tuple(row) for row in T.tolist())
         q = tuple(solution.q.tolist())
@@ -98,9 +100,10 @@ class ToolHandle:
 
 
 def _pose(position: Array, wxyz: Array) -> Array:
-    """Return the pose, shape (4, 4), of a position and a quaternion of any length."""
+    """Return the pose, shape (4, 4), of a position and a quaternion of any length; not finite if that is zero."""
     T = np.eye(4)
-    T[:3, :3] = rotation_matrix(np.asarray(wxyz, dtype=np.float64) / np.linalg.norm(wxyz))
+    with np.errstate(invalid="ignore"):
+        T[:3, :3] = rotation_matrix(np.asarray(wxyz, dtype=np.float64) / np.linalg.norm(wxyz))
     T[:3, 3] = position
     return T
 
