@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -19,6 +20,9 @@ class Format(StrEnum):
     """How a form is written."""
 
     TEXT = "text"
+    LATEX = "latex"
+    MARKDOWN = "markdown"
+    JSON = "json"
 
 
 def symbolic(
@@ -85,6 +89,12 @@ def symbolic(
         joint_names="q" if q else "theta",
     )
     match format_:
+        case Format.LATEX:
+            text = form.latex()
+        case Format.MARKDOWN:
+            text = form.markdown()
+        case Format.JSON:
+            text = json.dumps(form.data(), indent=2, ensure_ascii=False) + "\n"
         case _:
             text = f"{spec.name}: {form}\n"
     hand_over(text, out, summary=f"{spec.name}: {wanted} as {format_}", quiet=out is None)

@@ -12,7 +12,7 @@ from dh2sim.errors import MismatchError
 from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses, table_tool_pose
 from dh2sim.robot.spec import Convention
 from dh2sim.symbolic.angles import slide_row, trig_of
-from dh2sim.symbolic.expression import Sum, evaluated
+from dh2sim.symbolic.expression import evaluated
 from dh2sim.symbolic.form import Form
 from dh2sim.symbolic.polynomial import Atom
 from dh2sim.symbolic.table import SymbolicTable
@@ -141,8 +141,7 @@ def check_form(form: Form, expected: Mapping[str, Array], configurations: Sample
     Raises:
         MismatchError: A difference is larger than 1e-13.
     """
-    atoms = {atom for sum_ in [*form.sums, *form.named.values()] for atom in atoms_of(sum_)}
-    values = configurations.values(atoms)
+    values = configurations.values(form.atoms)
     worst = 0.0
     for equation in form.equations:
         wanted = expected[equation.name]
@@ -160,12 +159,3 @@ def check_form(form: Form, expected: Mapping[str, Array], configurations: Sample
             )
         worst = max(worst, error)
     return worst
-
-
-def atoms_of(sum_: Sum) -> set[Atom]:
-    """Return the atoms and names of an expression."""
-    found: set[Atom] = set()
-    for term in sum_.terms:
-        for base, _ in term.factors:
-            found |= atoms_of(base) if isinstance(base, Sum) else {base}
-    return found

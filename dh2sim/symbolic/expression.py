@@ -292,6 +292,15 @@ def operation_count(sums: Iterable[Sum]) -> tuple[int, int]:
     return multiplications, additions
 
 
+def atoms_of(sum_: Sum) -> set[Atom]:
+    """Return the atoms and names of an expression."""
+    found: set[Atom] = set()
+    for term in sum_.terms:
+        for base, _ in term.factors:
+            found |= atoms_of(base) if isinstance(base, Sum) else {base}
+    return found
+
+
 _ROOT_VALUES: Final = {atom: math.sqrt(number) for atom, number in ROOTS.items()}
 
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from dh2sim.symbolic.angles import Angle
-from dh2sim.symbolic.expression import Named, Nesting, Sum, name_sums
+from dh2sim.symbolic.angles import Angle, trig_of
+from dh2sim.symbolic.expression import Named, Nesting, Sum, atoms_of, name_sums
 from dh2sim.symbolic.polynomial import Atom, Matrix
-from dh2sim.symbolic.table import SymbolicTable
+from dh2sim.symbolic.table import Letter, SymbolicTable
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +66,24 @@ class Form:
     def sums(self) -> list[Sum]:
         """All entries of all equations."""
         return [entry for equation in self.equations for entry in equation.flat]
+
+    @property
+    def atoms(self) -> set[Atom]:
+        """The atoms of all expressions, names of sums left out."""
+        sums = [*self.sums, *self.named.values(), *(condition.expression for condition in self.conditions)]
+        return {atom for sum_ in sums for atom in atoms_of(sum_) if atom not in self.named}
+
+
+def moving_angles(atoms: set[Atom]) -> list[Angle]:
+    """Return the angles of cosines and sines that depend on the configuration, in order."""
+    angles = {trig.angle for trig in map(trig_of, atoms) if trig is not None and not trig.angle.is_constant}
+    return sorted(angles, key=lambda a: (a.coordinates, a.names, a.degrees))
+
+
+def used_letters(table: SymbolicTable, atoms: set[Atom]) -> list[Letter]:
+    """Return the letters that atoms have, in the order of the table."""
+    used = atoms | {name for trig in map(trig_of, atoms) if trig is not None for name, _ in trig.angle.names}
+    return [letter for name, letter in table.letters.items() if name in used]
 
 
 def equation(name: str, matrix: Matrix, nesting: Nesting, **details: Any) -> Equation:

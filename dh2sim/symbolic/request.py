@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 from dh2sim.messages import member
 from dh2sim.robot.spec import RobotSpec
+from dh2sim.symbolic.data import form_data
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.form import Equation, Form
 from dh2sim.symbolic.kinematics import jacobian_form, matrices_form, pose_form
+from dh2sim.symbolic.latex import latex_document, latex_fragment, markdown
 from dh2sim.symbolic.table import Fold, symbolic_table
 from dh2sim.symbolic.text import form_text
 
@@ -36,6 +39,25 @@ class SymbolicForm:
     def __str__(self) -> str:
         """Return the form as text, at most 80 characters wide where that is possible."""
         return form_text(self.form)
+
+    def latex(self) -> str:
+        """Return a LaTeX document that compiles as it stands; wide matrices are listed entry by entry."""
+        return latex_document(self.form, self._title)
+
+    def markdown(self) -> str:
+        """Return Markdown with formulas."""
+        return markdown(self.form, self._title)
+
+    def data(self) -> dict[str, Any]:
+        """Return the form as data ready for JSON, as ``docs/symbolic.md`` describes it."""
+        return form_data(self.form)
+
+    def _repr_latex_(self) -> str:
+        return latex_fragment(self.form)
+
+    @property
+    def _title(self) -> str:
+        return f"{self.form.table.spec.name}: {self.form.what}"
 
 
 def symbolic_form(

@@ -10,7 +10,7 @@ from typing import Final
 
 from dh2sim.symbolic.angles import Angle, slide_row, trig_of
 from dh2sim.symbolic.expression import Sum
-from dh2sim.symbolic.form import Condition, Equation, Form
+from dh2sim.symbolic.form import Condition, Equation, Form, moving_angles, used_letters
 from dh2sim.symbolic.notation import decimal, written
 from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
 from dh2sim.symbolic.table import Letter, SymbolicTable
@@ -58,8 +58,8 @@ class TextNotation:
 
     def coordinate(self, row: int, *, turns: bool) -> str:
         """Return what the coordinate of a row is called."""
-        if turns:
-            return f"{self._joint}_{row}"
+        if turns and self._joint == "theta":
+            return f"theta_{row}"
         name = f"d{row}" if self._joint == "theta" else f"q{row}"
         for candidate in (name, f"q{row}", f"q_{row}"):
             if candidate not in self._taken:
@@ -108,9 +108,8 @@ def form_text(form: Form, width: int = WIDTH) -> str:
 
 def legend_lines(form: Form, notation: TextNotation, width: int = WIDTH) -> Iterator[str]:
     """Yield lines that say what cosines, coordinates and letters mean."""
-    atoms = {base for sum_ in [*form.sums, *form.named.values()] for base in _bases(sum_) if not base.startswith("#")}
-    angles = {trig.angle for trig in map(trig_of, atoms) if trig is not None}
-    moving = sorted((a for a in angles if not a.is_constant), key=lambda a: (a.coordinates, a.names, a.degrees))
+    atoms = form.atoms
+    moving = moving_angles(atoms)
     items = []
     if moving:
         plain = [a for a in moving if notation.is_plain(a)]
@@ -123,12 +122,6 @@ def legend_lines(form: Form, notation: TextNotation, width: int = WIDTH) -> Iter
     yield from _listed(items, width)
 
 
-def used_letters(table: SymbolicTable, atoms: set[Atom]) -> list[Letter]:
-    """Return the letters that atoms have, in the order of the table."""
-    used = atoms | {name for trig in map(trig_of, atoms) if trig is not None for name, _ in trig.angle.names}
-    return [letter for name, letter in table.letters.items() if name in used]
-
-
 def letter_text(letter: Letter, table: SymbolicTable) -> str:
     """Return what a letter stands for: ``a2 = 0.4318 m``."""
     definition = f" = {letter.definition}" if letter.definition else ""
@@ -136,15 +129,6 @@ def letter_text(letter: Letter, table: SymbolicTable) -> str:
         return f"{letter.name}{definition} = {math.degrees(letter.value):.10g}°"
     unit = f" {table.unit.value}" if letter.kind == "length" else ""
     return f"{letter.name}{definition} = {letter.value:.12g}{unit}"
-
-
-def _bases(sum_: Sum) -> Iterator[Atom]:
-    for term in sum_.terms:
-        for base, _ in term.factors:
-            if isinstance(base, Sum):
-                yield from _bases(base)
-            else:
-                yield base
 
 
 def _condition_lines(conditions: Sequence[Condition], notation: TextNotation, width: int) -> Iterator[str]:

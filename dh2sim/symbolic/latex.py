@@ -1,0 +1,263 @@
+"""Forms as LaTeX: a document that compiles as it stands, or formulas for a page that can show them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from dh2sim.symbolic.angles import Angle, slide_row, trig_of
+from dh2sim.symbolic.form import Condition, Equation, Form, moving_angles, used_letters
+from dh2sim.symbolic.notation import decimal, written
+from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
+from dh2sim.symbolic.table import Letter, SymbolicTable
+
+PAGE: Final = 44.0
+"""Width of a line of formulas in em: A4 with margins of 2 cm at 10 pt leaves 48."""
+_GREEK: Final = frozenset(
+    "alpha beta gamma delta epsilon eta theta kappa lambda mu phi psi rho tau".split()  # noqa: SIM905
+)
+
+
+class LatexNotation:
+    """Writes cosines as c with an index, and names of sums as sigma with a number, as MATLAB has them."""
+
+    times = r"\,"
+
+    def __init__(self, table: SymbolicTable, joint_names: str = "theta") -> None:
+        """``joint_names`` is 'theta', with sliding coordinates d_i, or 'q'."""
+        self._joint = joint_names
+        self._taken = set(table.letters)
+        self._separator = "," if len(table.spec.rows) > 9 else ""
+
+    def atom(self, atom: Atom) -> str:
+        """Return an atom as it is written."""
+        if atom.startswith("#"):
+            return rf"\sigma_{{{atom[1:]}}}"
+        row = slide_row(atom)
+        if row is not None:
+            return self.coordinate(row, turns=False)
+        if atom.startswith("sqrt("):
+            return rf"\sqrt{{{atom[5:-1]}}}"
+        trig = trig_of(atom)
+        return latex_name(atom) if trig is None else self.trig(trig.function, trig.angle)
+
+    def trig(self, function: str, angle: Angle) -> str:
+        """Return c_{12} for plain sums of coordinates, a cosine in full for other angles."""
+        plain = not angle.names and not angle.degrees and all(n == 1 for _, n in angle.coordinates)
+        if plain and angle.coordinates:
+            rows = self._separator.join(str(row) for row, _ in angle.coordinates)
+            if f"{function[0]}{rows}" not in self._taken:
+                return f"{function[0]}_{{{rows}}}"
+        return rf"\{function}({self.angle(angle)})"
+
+    def coordinate(self, row: int, *, turns: bool) -> str:
+        """Return what the coordinate of a row is called."""
+        if turns and self._joint == "theta":
+            return rf"\theta_{{{row}}}"
+        letter = "d" if self._joint == "theta" and f"d{row}" not in self._taken else "q"
+        return f"{letter}_{{{row}}}"
+
+    def angle(self, angle: Angle) -> str:
+        """Return an angle in full, without spaces."""
+        parts = [(self.coordinate(row, turns=True), n) for row, n in angle.coordinates]
+        parts += [(latex_name(name), n) for name, n in angle.names]
+        text = ""
+        for name, n in parts:
+            body = name if abs(n) == 1 else rf"{self.number(magnitude(n))}\,{name}"
+            text += ("-" if n < 0 else "+" if text else "") + body
+        if angle.degrees:
+            text += f"{'+' if text else ''}{self.number(angle.degrees)}^\\circ"
+        return text
+
+    def number(self, number: Rational) -> str:
+        """Return a decimal fraction, or a quotient."""
+        return decimal(number) or rf"\tfrac{{{number.numerator}}}{{{number.denominator}}}"
+
+    def power(self, base: str, exponent: int) -> str:
+        """Return a power."""
+        return f"{base}^{{{exponent}}}" if "^" not in base else f"({base})^{{{exponent}}}"
+
+    def parenthesized(self, text: str) -> str:
+        """Return a sum as a factor."""
+        return f"({text})"
+
+
+def latex_name(name: str) -> str:
+    """Return a letter with its number as an index: a2, alpha_2, base_x."""
+    found = re.fullmatch(r"([A-Za-z]+)_?([A-Za-z0-9_]*?)_*", name)
+    if found is None:
+        escaped = name.replace("_", r"\_")
+        return rf"\mathrm{{{escaped}}}"
+    word, index = found[1], found[2].replace("_", r"\_")
+    head = rf"\{word}" if word in _GREEK else word if len(word) == 1 else rf"\mathrm{{{word}}}"
+    if not index:
+        return head
+    return f"{head}_{{{index}}}" if index.isdigit() else rf"{head}_{{\mathrm{{{index}}}}}"
+
+
+def latex_document(form: Form, title: str) -> str:
+    """Return a whole LaTeX document, which needs amsmath and geometry."""
+    lines = [
+        r"\documentclass[10pt,a4paper]{article}",
+        r"\usepackage[utf8]{inputenc}",
+        r"\usepackage{amsmath}",
+        r"\usepackage[margin=2cm]{geometry}",
+        r"\allowdisplaybreaks",
+        r"\setlength{\parindent}{0pt}",
+        r"\begin{document}",
+        rf"\section*{{{_escaped(title)}}}",
+    ]
+    for heading, formulas in latex_parts(form):
+        if heading:
+            lines += ["", _escaped(heading)]
+        lines += [r"\begin{align*}", *formulas, r"\end{align*}"]
+    lines += [line for note in form.notes for line in ("", _escaped(note))]
+    return "\n".join([*lines, r"\end{document}"]) + "\n"
+
+
+def latex_parts(form: Form) -> Iterator[tuple[str, list[str]]]:
+    """Yield headings and lines for an ``align*`` or ``aligned`` environment."""
+    notation = LatexNotation(form.table, form.joint_names)
+    for equation in form.equations:
+        yield equation.meaning, list(_equation_lines(equation, notation))
+    if form.conditions:
+        yield "Singular where", _rows([_condition(condition, notation) for condition in form.conditions])
+    if form.named:
+        lines = [_broken(notation.atom(name), written(sum_, notation)) for name, sum_ in form.named.items()]
+        yield "with", _rows(lines)
+    legend = list(_legend(form, notation))
+    if legend:
+        yield "where", _rows(legend)
+
+
+def _equation_lines(equation: Equation, notation: LatexNotation) -> Iterator[str]:
+    cells = [[written(entry, notation) for entry in row] for row in equation.entries]
+    name = _equation_name(equation.name)
+    if not equation.entry_names:
+        yield _broken(name, cells[0][0])
+        return
+    columns = list(zip(*cells, strict=True))
+    if sum(max(map(_width, column)) + 1.0 for column in columns) + _width(name) + 3.0 <= PAGE:
+        yield f"{name} &= \\begin{{bmatrix}}"
+        yield from _rows([" & ".join(row) for row in cells])
+        yield r"\end{bmatrix}"
+        return
+    zeros = sum(cell == "0" for row in cells for cell in row) > 4
+    lines = [
+        _broken(_entry_name(entry), cell)
+        for names, row in zip(equation.entry_names, cells, strict=True)
+        for entry, cell in zip(names, row, strict=True)
+        if entry and not (zeros and cell == "0")
+    ]
+    if zeros:
+        lines.append(r"& \text{and all other entries are } 0")
+    yield from _rows(lines)
+
+
+def _rows(lines: Sequence[str]) -> list[str]:
+    return [rf"{line} \\" for line in lines[:-1]] + list(lines[-1:])
+
+
+def _broken(name: str, text: str) -> str:
+    """Return an equation, broken between terms where it is wider than the page."""
+    room = PAGE - _width(name) - 2.0
+    lines: list[str] = []
+    for piece in re.split(r" (?=[+-] )", text):
+        if lines and _width(f"{lines[-1]} {piece}") <= room - (2.0 if len(lines) > 1 else 0.0):
+            lines[-1] += f" {piece}"
+        else:
+            lines.append(piece)
+    return f"{name} &= " + " \\\\\n  &\\qquad {} ".join(lines)
+
+
+_PIECES: Final = re.compile(r"\\(?:tfrac|sqrt|mathrm)|\\[a-z]+|\\,|_\{[^{}]*\}|\^\{[^{}]*\}|[+-]|[{}& ]|.")
+
+
+def _width(text: str) -> float:
+    """Return about how wide a formula is, em."""
+    width = 0.0
+    for piece in _PIECES.findall(text):
+        if piece in ("\\tfrac", "\\sqrt", "\\mathrm") or piece in "{}& ":
+            continue
+        if piece == "\\,":
+            width += 0.17
+        elif piece in ("\\cos", "\\sin"):
+            width += 1.5
+        elif piece.startswith(("_", "^")):
+            width += 0.38 * (len(piece) - 3)
+        elif piece in "+-":
+            width += 1.25
+        else:
+            width += 0.55
+    return width
+
+
+def _equation_name(name: str) -> str:
+    """Return the name of a matrix with its indices: of T_0_6 the first one raised in front."""
+    if name.startswith("det J"):
+        return r"\det J" + (rf"_{{{name[6:-1].replace(', ', ',')}}}" if name != "det J" else "")
+    head, *indices = name.split("_")
+    words = [index if index.isdigit() else rf"\mathrm{{{index}}}" for index in indices]
+    if len(words) == 2:
+        return rf"{{}}^{{{words[0]}}}{head}_{{{words[1]}}}"
+    return f"{head}_{{{words[0]}}}" if words else head
+
+
+def _entry_name(name: str) -> str:
+    return rf"{name[0]}_{{{name[1:]}}}"
+
+
+def _condition(condition: Condition, notation: LatexNotation) -> str:
+    text = f"{written(condition.expression, notation)} &= 0"
+    if condition.name:
+        text += rf" \quad\text{{({condition.name})}}"
+    if condition.angle is not None and condition.degrees:
+        values = r"\text{ or }".join(f"{value:.6g}^\\circ" for value in condition.degrees)
+        text += rf" \quad {notation.angle(condition.angle)} = {values}"
+    return text
+
+
+def _legend(form: Form, notation: LatexNotation) -> Iterator[str]:
+    short = [a for a in moving_angles(form.atoms) if notation.trig("cos", a).startswith("c_")]
+    if short:
+        example = max(short, key=lambda a: len(a.coordinates))
+        c, s, text = notation.trig("cos", example), notation.trig("sin", example), notation.angle(example)
+        yield rf"{c} &= \cos({text}), \quad {s} = \sin({text})"
+    for letter in used_letters(form.table, form.atoms):
+        yield _letter(letter, form.table)
+
+
+def _letter(letter: Letter, table: SymbolicTable) -> str:
+    if letter.kind == "angle":
+        return rf"{latex_name(letter.name)} &= {math.degrees(letter.value):.10g}^\circ"
+    unit = rf"\,\mathrm{{{table.unit.value}}}" if letter.kind == "length" else ""
+    return f"{latex_name(letter.name)} &= {letter.value:.12g}{unit}"
+
+
+def _escaped(text: str) -> str:
+    """Return words with the characters that LaTeX reads as commands escaped."""
+    text = re.sub(r"([&%$#_{}])", r"\\\1", text.replace("\\", r"\textbackslash "))
+    return text.replace("^", r"\^{}").replace("~", r"\~{}").replace("θ", r"$\theta$").replace("°", r"$^\circ$")
+
+
+def latex_fragment(form: Form) -> str:
+    """Return formulas between dollar signs, for a notebook."""
+    parts = ["\n".join([r"\begin{aligned}", *formulas, r"\end{aligned}"]) for _, formulas in latex_parts(form)]
+    return "\n".join(f"$${part}$$" for part in parts)
+
+
+def markdown(form: Form, title: str) -> str:
+    """Return Markdown with formulas that GitHub and notebooks show."""
+    lines = [f"## {title}"]
+    for heading, formulas in latex_parts(form):
+        if heading:
+            lines += ["", f"{_markdown_escaped(heading)}:"]
+        lines += ["", "$$", r"\begin{aligned}", *formulas, r"\end{aligned}", "$$"]
+    lines += [line for note in form.notes for line in ("", _markdown_escaped(note))]
+    return "\n".join(lines) + "\n"
+
+
+def _markdown_escaped(text: str) -> str:
+    return re.sub(r"([\\`*_{}\[\]<>#|])", r"\\\1", text)

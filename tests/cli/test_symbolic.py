@@ -1,0 +1,70 @@
+"""dh2sim symbolic: its formats, its options, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.program import dh2sim
+
+
+def test_prints_the_pose_of_the_tool_by_default() -> None:
+    run = dh2sim("symbolic", "planar_2r")
+    assert (run.status, run.err) == (0, "")
+    assert run.out == (
+        "planar_2r: T_0_2, pose of tool0 in base_link\n"
+        "  [ c12   -s12   0   a1*c1 + a2*c12 ]\n"
+        "  [ s12   c12    0   a1*s1 + a2*s12 ]\n"
+        "  [ 0     0      1   0              ]\n"
+        "  [ 0     0      0   1              ]\n"
+        "\n"
+        "c12 = cos(theta_1 + theta_2), s12 = sin(theta_1 + theta_2), a1 = 1 m,\n"
+        "a2 = 0.7 m\n"
+    )
+
+
+def test_frames_and_styles_are_options() -> None:
+    run = dh2sim("symbolic", "puma560", "--from", "dh_4", "--to", "dh_6")
+    assert "T_4_6, pose of dh_6 in dh_4" in run.out
+    assert "c5*c6" in run.out
+    tool = dh2sim("symbolic", "stanford", "--style", "tool", "--no-names").out
+    assert "r33 = c2*c5 - s2*c4*s5" in tool
+    assert "d6*(c1*s2*c5 + s5*(c1*c2*c4 - s1*s4)) - d2*s1 + d3*c1*s2" in tool
+
+
+def test_json_goes_to_a_file_whole(tmp_path: Path) -> None:
+    out = tmp_path / "form.json"
+    run = dh2sim("symbolic", "scara", "--what", "jacobian", "--as", "json", "-o", out)
+    assert (run.status, run.err) == (0, "")
+    assert run.out == f"{out}: scara: jacobian as json\n"
+    assert json.loads(out.read_text())["equations"][1]["entries"] == [["a1*a2*s2"]]
+    again = dh2sim("symbolic", "scara", "-o", out)
+    assert again.status == 2
+    assert "exists already" in again.err
+    assert dh2sim("symbolic", "scara", "-o", out, "--force").status == 0
+
+
+@pytest.mark.parametrize("format_", ["latex", "markdown", "json", "text"])
+def test_every_format_prints_something(format_: str) -> None:
+    run = dh2sim("symbolic", "rpr", "--as", format_)
+    assert (run.status, run.err) == (0, "")
+    assert "L2" in run.out or "L_{2}" in run.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--what", "pse"], "'pse' is not one of pose, matrices, jacobian. Did you mean 'pose'?"),
+        (["--style", "bas"], "'bas' is not one of base, tool, expanded. Did you mean 'base'?"),
+        (["--as", "tex"], "'tex' is not one of text, latex, markdown, json"),
+        (["--fold", "some"], "'some' is not one of parallel, all, none"),
+        (["--to", "dh_7"], "scara: unknown frame 'dh_7'."),
+    ],
+)
+def test_what_is_not_allowed_is_said_with_what_is(arguments: list[str], message: str) -> None:
+    run = dh2sim("symbolic", "scara", *arguments)
+    assert run.status == 2
+    assert message in run.err
+    assert "Traceback" not in run.err

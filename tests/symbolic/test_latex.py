@@ -1,0 +1,111 @@
+"""Forms as LaTeX and Markdown."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from dh2sim.robot.read import parse_robot
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.symbolic.latex import latex_name
+from dh2sim.symbolic.request import symbolic_form
+from tests.sample_robots import NAMES
+from tests.sample_robots import robot as spec_of
+
+PDFLATEX = shutil.which("pdflatex")
+
+AWKWARD = parse_robot(
+    """
+name: odd-_arm
+convention: modified
+parameters: {long_name_2: 0.3, alpha: 0.2, _: 0.1, e1e: 0.4, c1: 0.5}
+joints:
+  - {name: a_b, type: revolute, a: long_name_2, alpha: alpha, theta: 0.1}
+  - {type: prismatic, d: _ / 3, a: e1e, alpha: 0.5235987755982988}
+  - {type: revolute, a: c1, alpha: -alpha, theta: 2 * alpha}
+"""
+)
+
+
+def compiled(text: str, folder: Path) -> str:
+    """Compile a document and return TeX's log."""
+    assert PDFLATEX is not None
+    (folder / "form.tex").write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        [PDFLATEX, "-interaction=nonstopmode", "-halt-on-error", "form.tex"],
+        cwd=folder,
+        capture_output=True,
+        check=False,
+        timeout=120,
+    )
+    log = (folder / "form.log").read_text(encoding="latin-1")
+    assert done.returncode == 0, log[-2000:]
+    return log
+
+
+def one_document(specs: list[RobotSpec], what: str) -> str:
+    """Put the bodies of several documents into one: TeX takes longer to start than to set them."""
+    texts = [symbolic_form(spec, what).latex() for spec in specs]
+    head = texts[0].split(r"\begin{document}")[0]
+    bodies = [text.split(r"\begin{document}")[1].split(r"\end{document}")[0] for text in texts]
+    return "\n".join([head, r"\begin{document}", *bodies, r"\end{document}"])
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(PDFLATEX is None, reason="pdflatex is not installed")
+@pytest.mark.parametrize("what", ["pose", "matrices", "jacobian"])
+def test_latex_compiles_as_it_stands_and_fits_the_page(what: str, tmp_path: Path) -> None:
+    log = compiled(one_document([*map(spec_of, NAMES), AWKWARD], what), tmp_path)
+    assert "Overfull" not in log
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(PDFLATEX is None, reason="pdflatex is not installed")
+@pytest.mark.parametrize("style", ["tool", "expanded"])
+def test_wide_matrices_are_broken_so_that_they_fit_the_page(style: str, tmp_path: Path) -> None:
+    text = symbolic_form(spec_of("kinova_gen3"), style=style, names=style == "tool").latex()
+    assert "Overfull" not in compiled(text, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "latex"),
+    [
+        ("a2", "a_{2}"),
+        ("L2", "L_{2}"),
+        ("alpha_2", r"\alpha_{2}"),
+        ("bend2", r"\mathrm{bend}_{2}"),
+        ("base_x", r"\mathrm{base}_{\mathrm{x}}"),
+        ("long_name_2", r"\mathrm{long}_{\mathrm{name\_2}}"),
+        ("_", r"\mathrm{\_}"),
+    ],
+)
+def test_a_letter_has_its_number_as_an_index(name: str, latex: str) -> None:
+    assert latex_name(name) == latex
+
+
+def test_a_matrix_that_fits_is_a_matrix_and_one_that_does_not_is_a_list() -> None:
+    assert r"{}^{0}T_{2} &= \begin{bmatrix}" in symbolic_form(spec_of("planar_2r")).latex()
+    assert r"r_{11} &= " in symbolic_form(spec_of("puma560"), names=False).latex()
+
+
+def test_the_determinant_and_its_zeros_are_there() -> None:
+    text = symbolic_form(spec_of("puma560"), "jacobian").latex()
+    assert (
+        r"\det J &= -a_{2}\,s_{5}\,(a_{3}\,s_{3} + d_{4}\,c_{3})\,(a_{2}\,c_{2} + a_{3}\,c_{23} - d_{4}\,s_{23})"
+        in text
+    )
+    assert r"\text{(wrist)} \quad \theta_{5} = 0^\circ\text{ or }180^\circ" in text
+
+
+def test_markdown_has_formulas_between_dollar_signs() -> None:
+    text = symbolic_form(spec_of("planar_2r")).markdown()
+    assert text.startswith("## planar_2r: pose\n")
+    assert text.count("$$") == 4
+    assert r"a_{1}\,c_{1} + a_{2}\,c_{12}" in text
+
+
+def test_a_notebook_shows_formulas() -> None:
+    assert symbolic_form(spec_of("planar_2r"))._repr_latex_().startswith("$$\\begin{aligned}")
