@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from dh2sim.codegen.languages import Language
     from dh2sim.export import ExportReport, Format
     from dh2sim.importing.sources import ImportOptions
+    from dh2sim.inverse.goals import Free
     from dh2sim.kinematics.chain import KinematicChain, SpecLike
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.model.slips import Slip
@@ -453,6 +454,41 @@ class Robot:
         from dh2sim.kinematics.singularity import manipulability
 
         return manipulability(self.jacobian(q, frame))
+
+    def ik(
+        self,
+        T: ArrayLike,
+        q0: ArrayLike | None = None,
+        limits: bool = True,
+        lock: Mapping[str, ArrayLike] | None = None,
+        free: Free | None = None,
+        *,
+        numeric: bool = False,
+    ) -> Any:
+        """Return all configurations that reach a pose, each verified against the table.
+
+        Args:
+            T: Poses of tool0 in base_link, shape (4, 4) or (N, 4, 4).
+            q0: The solutions nearest to this joint vector, rad and m, shape (n,), or to the configuration of this
+                name, come first; by default ``home``.
+            limits: Whether to keep position limits; then every whole turn that fits is a solution of its own.
+            lock: Values of joints that are not to move, by name, rad or m; of shape (N,) to lock each pose's own.
+            free: 'rotation' for goals that are positions, 'roll' for those that may turn about z of tool0.
+            numeric: Whether to search one solution alone, from ``q0``: to track a moving pose, or for one out of
+                reach, whose ``nearest`` configuration is returned.
+
+        Returns:
+            The :class:`Solutions` of one pose, or a list of those of N poses: ``q`` (k, n), ``residual``,
+            ``sigma_min``, ``within_limits``, ``branch``; ``curves`` where solutions are not isolated; ``reason`` and
+            ``nearest`` where there are none.
+
+        Raises:
+            ConfigurationError: A pose is no rigid transform, ``q0`` has the wrong shape, or a joint is unknown.
+        """
+        from dh2sim.inverse.solver import inverse_kinematics
+
+        near = None if q0 is None else self._vectors(q0)
+        return inverse_kinematics(self, T, near, limits, lock, free, numeric)
 
     def _vectors(self, q: ArrayLike) -> ArrayLike:
         if not isinstance(q, str):

@@ -107,10 +107,10 @@ def ik(
     else:
         from dh2sim.cli.solutions import print_solutions
 
-        for line in explanation:
-            print(line)
+        if explanation:
+            print("\n".join([*explanation, ""]))
         print_solutions(asked.spec, asked.robot, solutions, frame=asked.frame, given=asked.given, behind=asked.behind)
-    return DONE if len(solutions) or solutions.curves else FELL_SHORT
+    return DONE if solutions.within_limits.any() or (no_limits and len(solutions)) else FELL_SHORT
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,16 +295,32 @@ def _locked(
     return lock
 
 
-def _solved(asked: _Asked, *, limits: bool, numeric: bool) -> Solutions:  # noqa: ARG001
-    from dh2sim.inverse.nearest import numeric_solutions
+def _solved(asked: _Asked, *, limits: bool, numeric: bool) -> Solutions:
+    from dataclasses import replace
 
-    return numeric_solutions(
-        asked.spec, asked.T[None], q0=asked.near, limits=limits, lock=asked.lock, free=asked.free
-    )[0]
+    import numpy as np
+
+    from dh2sim.inverse.solver import InverseSolver
+
+    solver = InverseSolver(asked.spec)
+    solutions: Solutions = solver.solve(asked.T, asked.near, limits, asked.lock, asked.free, numeric)
+    if not limits or numeric or solutions.curves:
+        return solutions
+    # what limits rule out is printed, too
+    anywhere: Solutions = solver.solve(asked.T, asked.near, False, asked.lock, asked.free)
+    outside = ~anywhere.within_limits
+    both: dict[str, Any] = {
+        name: np.concatenate([getattr(solutions, name), getattr(anywhere, name)[outside]])
+        for name in ("q", "residual", "sigma_min", "within_limits", "same")
+    }
+    branches = [name for name, out in zip(anywhere.branch, outside, strict=True) if out]
+    return replace(solutions, **both, branch=(*solutions.branch, *branches))
 
 
-def _explained(asked: _Asked) -> list[str]:  # noqa: ARG001
-    return []
+def _explained(asked: _Asked) -> list[str]:
+    from dh2sim.inverse.textbook import explain
+
+    return list(explain(asked.spec, asked.T).lines)
 
 
 def _as_json(asked: _Asked, solutions: Solutions, explanation: Sequence[str]) -> dict[str, Any]:
@@ -335,7 +351,7 @@ def _as_json(asked: _Asked, solutions: Solutions, explanation: Sequence[str]) ->
         "curves": curves,
         "notes": list(solutions.notes),
     }
-    if not found:
+    if solutions.reason:
         nearest = solutions.nearest
         content["reason"] = solutions.reason
         content["nearest"] = None if nearest is None else nearest.tolist() + behind

@@ -43,13 +43,14 @@ def solution_lines(
 
     what = "the pose" if frame == "tool0" else f"the pose with {frame}"
     count = len(solutions)
-    if count == 0 and not solutions.curves:
+    inside = int(solutions.within_limits.sum())
+    if solutions.reason:
         lines = _filled(f"{robot.name}: no joint vector reaches {what}: {solutions.reason}")
-        if solutions.nearest is not None:
-            lines += ["", "The nearest that was found:", *_table(spec, solutions.nearest[None], [""])]
-        return lines + _notes(solutions.notes)
-    vectors = "1 joint vector reaches" if count == 1 else f"{count} joint vectors reach"
-    lines = [f"{robot.name}: {vectors} {what}"]
+    else:
+        vectors = "1 joint vector reaches" if count == 1 else f"{count} joint vectors reach"
+        lines = [f"{robot.name}: {vectors} {what}" + (f", {inside} within limits" if inside < count else "")]
+    if solutions.nearest is not None and not count:
+        lines += ["", "The nearest that was found:", *_table(spec, solutions.nearest[None], [""])]
     if count:
         beyond = beyond_limits(spec.moving_rows, solutions.q[:MOST])
         remarks = []
@@ -145,16 +146,17 @@ def _value(spec: RobotSpec, value: float, *, turns: bool) -> str:
 
 
 def _curve_text(spec: RobotSpec, curve: Curve) -> str:
-    """Return what a family of solutions is, and the ranges of the joints that move along it."""
-    ranges = []
-    for row, values in zip(spec.moving_rows, curve.q.T, strict=True):
-        low, high = float(values.min()), float(values.max())
-        if high - low > 1e-6:
-            unit = (spec.units.angle if row.type.turns else spec.units.length).value
-            texts = (_value(spec, value, turns=row.type.turns) for value in (low, high))
-            ranges.append(f"{row.name} {' to '.join(texts)} {unit}")
+    """Return what a family of solutions is, and the range of the joint that moves most along it."""
+    import numpy as np
+
     ends = "closed" if curve.closed else "open"
-    return f"{curve.kind}, {ends}, {len(curve)} points: {', '.join(ranges)}"
+    most = int(np.ptp(curve.q, axis=0).argmax())
+    row = spec.moving_rows[most]
+    unit = (spec.units.angle if row.type.turns else spec.units.length).value
+    low, high = (
+        _value(spec, float(end), turns=row.type.turns) for end in (curve.q[:, most].min(), curve.q[:, most].max())
+    )
+    return f"{curve.kind}, {ends}, {row.name} from {low} to {high} {unit}"
 
 
 def _notes(notes: Sequence[str]) -> list[str]:

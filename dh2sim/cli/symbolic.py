@@ -11,7 +11,6 @@ import typer
 
 from dh2sim.cli.common import RobotArgument, choice, load_all
 from dh2sim.cli.output import hand_over, require_free
-from dh2sim.cli.symbolic_code import LANGUAGES, is_about_code, print_code
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.request import What, symbolic_form
 from dh2sim.symbolic.table import Fold
@@ -28,7 +27,7 @@ class Format(StrEnum):
 
 def symbolic(
     robot: RobotArgument,
-    what: Annotated[str, typer.Option(metavar="WHAT", help=f"{', '.join(What)}, inverse-dynamics.")] = "pose",
+    what: Annotated[str, typer.Option(metavar="WHAT", help=f"{', '.join(What)}.")] = "pose",
     source: Annotated[
         str, typer.Option("--from", metavar="FRAME", help="Frame that the pose is given in.")
     ] = "base_link",
@@ -51,7 +50,7 @@ def symbolic(
     ] = "parallel",
     no_fold: Annotated[bool, typer.Option("--no-fold", help="The same as --fold none.")] = False,
     q: Annotated[bool, typer.Option("--q", help="Call all joint coordinates q_i.")] = False,
-    as_: Annotated[str, typer.Option("--as", metavar="FORMAT", help=f"{', '.join((*Format, *LANGUAGES))}.")] = "text",
+    as_: Annotated[str, typer.Option("--as", metavar="FORMAT", help=f"{', '.join(Format)}.")] = "text",
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write to a file.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
 ) -> None:
@@ -65,22 +64,7 @@ def symbolic(
       dh2sim symbolic stanford --style tool
       dh2sim symbolic puma560 --from dh_3 --to dh_6
       dh2sim symbolic scara --what matrices
-      dh2sim symbolic ur5e --what pose,jacobian,inverse-dynamics --as c -o ur5e.c
     """
-    if is_about_code(what, as_):
-        others = {
-            "--from": source != "base_link",
-            "--to": target != "tool0",
-            "--style": style != "base",
-            "--lengths": lengths is not None,
-            "--no-names": not names,
-            "--numbers": numbers,
-            "--letters": letters,
-            "--fold": fold != "parallel" or no_fold,
-            "--q": q,
-        }
-        print_code(robot, what, as_, out, force=force, others=others)
-        return
     wanted = choice(what, What, "--what")
     format_ = choice(as_, Format, "--as")
     nested = choice(style, Style, "--style")

@@ -3,81 +3,66 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from dh2sim.inverse.goals import Free
 from dh2sim.inverse.numeric import NumericSolver, goal_angles, goal_distances
-from dh2sim.inverse.reach import amount_text, beyond_limits, limits_reason, position_limits, why_unreachable
+from dh2sim.inverse.reach import amount_text, beyond_limits
 from dh2sim.inverse.solutions import Solutions
-from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
-NOT_COMPLETE = "found numerically: there may be other solutions"
+NOT_COMPLETE: Final = "Found numerically: there may be other solutions."
 
 
 def numeric_solutions(
-    spec: RobotSpec,
-    T: Array,
-    *,
-    q0: Array | None = None,
-    limits: bool = True,
-    lock: Mapping[str, float] | None = None,
-    free: Free | None = None,
+    spec: RobotSpec, solver: NumericSolver, T: Array, q0: Array, *, free: Free | None, size: float, rank: int
 ) -> list[Solutions]:
-    """Return for each goal the solution that descents from several starts find first, nearest to ``q0``.
+    """Return for each goal the solution that descents from several starts find first.
 
     Args:
         spec: The robot.
+        solver: Of its chain.
         T: Goals for tool0 in base_link, shape (N, 4, 4), their rotations orthonormal.
         q0: Where the first descent starts, rad and m, shape (n,).
-        limits: Whether to keep the position limits.
-        lock: Coordinates of joints that are not to move, rad and m.
         free: What the goals leave open.
+        size: Unit of length of residuals and singular values, m.
+        rank: Of the goal's Jacobian at a general configuration.
 
     Returns:
-        One each; where nothing reaches a goal, it has no solution, a ``reason``, and the ``nearest`` configuration.
+        One each; where nothing reaches a goal, it has no solution, but the ``nearest`` configuration.
     """
-    chain, rows = build_chain(spec), spec.moving_rows
-    lower, upper = (np.array(bound) for bound in position_limits(rows))
-    if not limits:
-        lower[:], upper[:] = -math.inf, math.inf
-    for i, row in enumerate(rows):
-        if row.name in (lock or {}):
-            lower[i] = upper[i] = (lock or {})[row.name]
-    solver = NumericSolver(chain, lower, upper)
     found = solver.search(T, q0, free=free)
-    residuals = goal_residuals(spec, found.q, T, free=free, size=solver.size)
-    sigmas = goal_sigma_min(spec, found.q, free=free, size=solver.size)
-    inside = (beyond_limits(rows, found.q) == 0.0).all(axis=1)
-    answers = []
-    for k, reached in enumerate(found.reached):
-        if reached:
-            one = slice(k, k + 1)
-            answers.append(
-                Solutions(
-                    q=read_only(found.q[one]),
-                    residual=read_only(residuals[one]),
-                    sigma_min=read_only(sigmas[one]),
-                    within_limits=inside[one],
-                    same=np.zeros(1, dtype=np.intp),
-                    branch=("",),
-                    complete=False,
-                    notes=(NOT_COMPLETE,),
-                )
-            )
-        else:
-            reason = _reason(spec, T[k], found.q[k], lock, free)
-            answers.append(no_solutions(chain.n, reason, found.q[k], complete=False))
-    return answers
+    residuals = goal_residuals(spec, found.q, T, free=free, size=size)
+    sigmas = goal_sigma_min(spec, found.q, free=free, size=size, rank=rank)
+    inside = (beyond_limits(spec.moving_rows, found.q) == 0.0).all(axis=1)
+    return [
+        replace(
+            no_solutions(len(spec.moving_rows), found.q[k]),
+            **{
+                "q": read_only(found.q[k : k + 1]),
+                "residual": read_only(residuals[k : k + 1]),
+                "sigma_min": read_only(sigmas[k : k + 1]),
+                "within_limits": inside[k : k + 1],
+                "same": np.zeros(1, dtype=np.intp),
+                "branch": ("",),
+                "nearest": None,
+                "notes": (NOT_COMPLETE,),
+            }
+            if reached
+            else {},
+        )
+        for k, reached in enumerate(found.reached)
+    ]
 
 
-def no_solutions(n: int, reason: str, nearest: Array | None, *, complete: bool) -> Solutions:
-    """Return the result for a pose that no configuration of n joints reaches."""
+def no_solutions(n: int, nearest: Array | None = None) -> Solutions:
+    """Return the result for a pose for which no configuration of n joints was found."""
     none = read_only(np.zeros(0))
     return Solutions(
         q=read_only(np.zeros((0, n))),
@@ -86,24 +71,9 @@ def no_solutions(n: int, reason: str, nearest: Array | None, *, complete: bool) 
         within_limits=np.zeros(0, dtype=np.bool_),
         same=np.zeros(0, dtype=np.intp),
         branch=(),
-        complete=complete,
-        reason=reason,
-        nearest=nearest,
+        complete=False,
+        nearest=None if nearest is None else read_only(nearest),
     )
-
-
-def _reason(spec: RobotSpec, T: Array, nearest: Array, lock: Mapping[str, float] | None, free: Free | None) -> str:
-    if lock:
-        return f"not found with {', '.join(lock)} locked; the nearest is {miss_text(spec, nearest, T, free)}"
-    shortfall = why_unreachable(spec, T, q0=nearest, free=free)
-    if shortfall is not None:
-        return shortfall.reason
-    chain = build_chain(spec)
-    unbounded = np.full(chain.n, math.inf)
-    beyond = NumericSolver(chain, -unbounded, unbounded).search(T[None], nearest, free=free).q
-    if beyond_limits(spec.moving_rows, beyond).any():
-        return limits_reason(spec, beyond)
-    return f"not found; the nearest is {miss_text(spec, nearest, T, free)}"
 
 
 def miss_text(spec: RobotSpec, q: Array, T: Array, free: Free | None) -> str:
@@ -132,10 +102,11 @@ def goal_residuals(spec: RobotSpec, q: Array, T: Array, *, free: Free | None, si
     return np.asarray(np.maximum(goal_distances(found, T) / size, goal_angles(found, T, free)))
 
 
-def goal_sigma_min(spec: RobotSpec, q: Array, *, free: Free | None, size: float) -> Array:
+def goal_sigma_min(spec: RobotSpec, q: Array, *, free: Free | None, size: float, rank: int) -> Array:
     """Return the least singular values of a goal's Jacobian, lengths in units of ``size``, shape (N,).
 
     Its rows are the velocity of tool0's origin and, as far as the goal asks for it, its angular velocity in tool0.
+    ``rank`` is that of a general configuration: further singular values are always zero.
     """
     J = np.array(geometric_jacobian(spec, q))
     J[:, :3] /= size
@@ -145,4 +116,4 @@ def goal_sigma_min(spec: RobotSpec, q: Array, *, free: Free | None, size: float)
     elif free == "roll":
         axes = np.swapaxes(forward_kinematics(spec, q)[:, :3, :2], 1, 2)
         J = np.concatenate([J[:, :3], axes @ J[:, 3:]], axis=1)
-    return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1])
+    return np.asarray(np.linalg.svd(J, compute_uv=False)[:, rank - 1])

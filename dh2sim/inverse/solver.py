@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Final
@@ -12,12 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError
+from dh2sim.inverse.branches import branch_names
 from dh2sim.inverse.elimination import Found, Method, choose_method
 from dh2sim.inverse.goals import Free, read_goals, require_free
-from dh2sim.inverse.loop import Arm, build_arm, joint_rank
-from dh2sim.inverse.nearest import goal_residuals, goal_sigma_min
-from dh2sim.inverse.numeric import arm_size
-from dh2sim.inverse.reach import position_limits
+from dh2sim.inverse.loop import Arm, Flags, Indices, build_arm, joint_rank
+from dh2sim.inverse.nearest import goal_residuals, goal_sigma_min, miss_text, no_solutions, numeric_solutions
+from dh2sim.inverse.numeric import NumericSolver, arm_size
+from dh2sim.inverse.reach import limits_reason, position_limits, why_unreachable
+from dh2sim.inverse.redundancy import SAMPLES, curves_and_nearest, joints_to_lock, self_motions
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.turns import Turns
 from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, spec_of
@@ -27,6 +30,8 @@ from dh2sim.typing import Array, read_only
 
 VERIFIED: Final = 1e-10
 """Residual up to which a configuration is a solution."""
+_EQUAL: Final = 1e-6
+"""Distance of configurations below which they are the same."""
 _GOAL_JOINTS: Final[Mapping[str | None, int]] = {None: 0, "roll": 1, "rotation": 3}
 
 
@@ -63,7 +68,7 @@ class InverseSolver:
     def __getstate__(self) -> dict[str, Any]:
         """Return what a pickle holds: the table, and what is built."""
         spec = self._spec
-        parts = {"name": spec.name, "base": spec.base, "tool": spec.tool, "rows": spec.rows}
+        parts = {"name": spec.name, "base": spec.base, "tool": spec.tool, "rows": spec.rows, "units": spec.units}
         return {"parts": {**parts, "configurations": dict(spec.configurations)}, "built": dict(self._built)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -78,8 +83,13 @@ class InverseSolver:
         limits: bool = True,
         lock: Mapping[str, ArrayLike] | None = None,
         free: Free | None = None,
+        numeric: bool = False,
     ) -> Any:
         """Return all configurations that reach a pose, or each of many poses.
+
+        An arm with one joint to spare has curves of them, its self-motions: what of them is inside the limits is
+        returned, and as ``q`` the configuration of each that is nearest to ``q0``. With more to spare, joints are
+        locked first, from the tool inwards, where a solution near ``q0`` has them.
 
         Args:
             T: Poses of tool0 in base_link, shape (4, 4) or (N, 4, 4).
@@ -89,27 +99,147 @@ class InverseSolver:
                 inside their limits if they cannot be both.
             lock: Values of joints that are not to move, by name, rad or m; of shape (N,) to lock each pose's own.
             free: 'rotation' for goals that are positions, 'roll' for those that may turn about z of tool0.
+            numeric: Whether to descend from ``q0``, and then from other starts, to one solution only: quick enough to
+                track a moving pose, and as good for one out of reach, to which ``nearest`` is the way.
 
         Returns:
-            The :class:`Solutions` of one pose, or a list of those of N poses.
+            The :class:`Solutions` of one pose, or a list of those of N poses. Branches are named, and how far a pose
+            is out of reach is found out, for one pose alone.
 
         Raises:
-            ConfigurationError: A pose is no rigid transform, ``q0`` has the wrong shape, a joint to lock is unknown,
-                or the arm has more joints than the goal needs.
+            ConfigurationError: A pose is no rigid transform, ``q0`` has the wrong shape, or a joint to lock is
+                unknown.
         """
         goals = read_goals(T)
         poses = goals.reshape(-1, 4, 4)
         near = self._home if q0 is None else joint_vector(self._chain, q0)
         locked = self._locked(lock or {}, len(poses))
         require_free(free)
-        method = self._method(free, tuple(sorted(locked)))
-        arm = method.arm
-        scaled = {
-            joint: q if arm.turns[joint] else (q + arm.offsets[joint]) / arm.length for joint, q in locked.items()
-        }
-        found = method.solve(arm.scaled_poses(poses), scaled)
-        results = self._results(method, found, poses, near, free, limits=limits)
-        return results[0] if goals.ndim == 2 else results
+        surplus = 0 if numeric else self._surplus(free, tuple(sorted(locked)))
+        if numeric:
+            results = self._numeric(poses, near, locked, free, limits=limits)
+        elif surplus:
+            each = [{j: values[i % len(values)] for j, values in locked.items()} for i in range(len(poses))]
+            results = [
+                self._redundant(pose, near, lock_, free, surplus, limits=limits)
+                for pose, lock_ in zip(poses, each, strict=True)
+            ]
+        else:
+            method = self._method(free, tuple(sorted(locked)))
+            found = method.solve(method.arm.scaled_poses(poses), _scaled_locks(method.arm, locked))
+            results = self._results(method, found, poses, near, free, limits=limits)
+        if goals.ndim == 3:
+            return results
+        [alone] = results
+        if not len(alone) and not alone.reason:
+            alone = self._unreached(alone, poses[0], near, locked, free, limits=limits)
+        return replace(alone, branch=branch_names(self._chain, alone.q)) if len(alone) else alone
+
+    def _numeric(
+        self, T: Array, q0: Array, locked: Mapping[int, Array], free: Free | None, *, limits: bool
+    ) -> list[Solutions]:
+        if any(len(values) > 1 for values in locked.values()):
+            each = [{joint: values[i % len(values)][None] for joint, values in locked.items()} for i in range(len(T))]
+            return [
+                self._numeric(pose[None], q0, lock, free, limits=limits)[0]
+                for pose, lock in zip(T, each, strict=True)
+            ]
+        solver = self._numeric_solver(locked, limits=limits)
+        return numeric_solutions(self._spec, solver, T, q0, free=free, size=self.size, rank=self._rank(free))
+
+    def _unreached(
+        self,
+        none: Solutions,
+        T: Array,
+        q0: Array,
+        locked: Mapping[int, Array],
+        free: Free | None,
+        *,
+        limits: bool,
+    ) -> Solutions:
+        """Return why a pose is not reached; or what a last, numeric search finds."""
+        [last] = self._numeric(T[None], q0, locked, free, limits=False)
+        nearest = none.nearest if none.nearest is not None else last.nearest
+        if len(last):
+            if not limits or last.within_limits[0]:
+                return last
+            return replace(none, reason=limits_reason(self._spec, last.q), nearest=nearest)
+        shortfall = None if locked else why_unreachable(self._spec, T, q0=q0, free=free)
+        if shortfall is not None:
+            return replace(none, reason=shortfall.reason, nearest=shortfall.q if none.nearest is None else nearest)
+        names = ", ".join(self.names[joint] for joint in locked)
+        where = f" with {names} locked" if names else ""
+        assert nearest is not None
+        reason = f"not reached{where}; the nearest is {miss_text(self._spec, nearest, T, free)}"
+        return replace(none, reason=reason, nearest=nearest)
+
+    def _numeric_solver(self, locked: Mapping[int, Array], *, limits: bool) -> NumericSolver:
+        key = ("numeric", limits)
+        if key in self._built and not locked:
+            solver = self._built[key]
+            assert isinstance(solver, NumericSolver)
+            return solver
+        lower, upper = self._bounds(limits=limits)
+        for joint, values in locked.items():
+            lower[joint] = upper[joint] = values[0]
+        solver = NumericSolver(self._chain, lower, upper)
+        if not locked:
+            self._built[key] = solver
+        return solver
+
+    def _bounds(self, *, limits: bool) -> tuple[Array, Array]:
+        lower, upper = (np.array(bound) for bound in position_limits(self._spec.moving_rows))
+        return (lower, upper) if limits else (np.full(len(lower), -math.inf), np.full(len(upper), math.inf))
+
+    def _redundant(
+        self, T: Array, q0: Array, locked: Mapping[int, Any], free: Free | None, surplus: int, *, limits: bool
+    ) -> Solutions:
+        """Return the solutions of a pose for which the arm has joints to spare."""
+        given = {joint: np.atleast_1d(value) for joint, value in locked.items()}
+        arm, moving, ranges = self._arm(free), self._moving(free, tuple(given)), self._trial_ranges(self._arm(free))
+        if surplus > 1:
+            [near] = self._numeric(T[None], q0, given, free, limits=limits)
+            if not len(near):
+                return near
+            held = {joint: near.q[0, joint : joint + 1] for joint in joints_to_lock(arm, moving, ranges, surplus)}
+            values = {**given, **held}
+            method = self._method(free, tuple(sorted(values)))
+            found = method.solve(arm.scaled_poses(T[None]), _scaled_locks(arm, values))
+            [result] = self._results(method, found, T[None], q0, free, limits=limits)
+            names = listed(self.names[joint] for joint in sorted(held))
+            note = f"{surplus} joints to spare: {names} are held where a solution near the start has them."
+            return replace(result, notes=(*result.notes, note))
+        fixed, shares = _scaled_locks(arm, given), [1.0]
+        sampled: list[str] = []
+
+        def solve_locked(poses: Array, lock: Mapping[int, Array]) -> Array:
+            method = self._method(free, tuple(sorted((*fixed, *lock))))
+            shares.append(method.found_share)
+            sampled.extend(self.names[joint] for joint in lock)
+            return method.solve(poses, {**fixed, **lock}).q
+
+        near_scaled = arm.scaled(np.append(q0, np.zeros(arm.goal_joints)))
+        for joint, value in fixed.items():
+            near_scaled[joint] = value[0]
+        paths = self_motions(arm, arm.scaled_poses(T), moving, ranges, near_scaled, solve_locked)
+        curves, q, same = curves_and_nearest(arm, paths, *self._bounds(limits=limits), q0)
+        goals = np.broadcast_to(T, (len(q), 4, 4))
+        none = replace(no_solutions(len(self.names)), complete=min(shares) == 1.0)
+        if paths and not curves:
+            ends = np.concatenate([arm.unscaled(path.q)[:, : len(q0)] for path in paths])
+            return replace(none, reason=limits_reason(self._spec, self._turns.placed(ends, q0)))
+        return replace(
+            none,
+            q=read_only(q),
+            residual=read_only(goal_residuals(self._spec, q, goals, free=free, size=self.size)),
+            sigma_min=read_only(goal_sigma_min(self._spec, q, free=free, size=self.size, rank=self._rank(free))),
+            within_limits=self._turns.inside(q),
+            same=np.array(same, dtype=np.intp),
+            branch=("",) * len(q),
+            found_share=min(shares),
+            curves=tuple(curves),
+            notes=(f"Self-motions were looked for at {SAMPLES} values each of {listed(sampled, ' and ')}.",),
+        )
 
     def _results(
         self, method: Method, found: Found, poses: Array, q0: Array, free: Free | None, *, limits: bool
@@ -119,8 +249,10 @@ class InverseSolver:
         q = method.arm.unscaled(found.q)[:, :n]
         residual = goal_residuals(self._spec, q, poses[found.pose], free=free, size=self.size)
         true = residual <= VERIFIED
+        if method.arm.goal_joints:
+            true &= _first_of_equal(found.pose, q, self._turns)
         found, q, residual = found.of(true), q[true], residual[true]
-        sigma = goal_sigma_min(self._spec, q, free=free, size=self.size)
+        sigma, all_q = goal_sigma_min(self._spec, q, free=free, size=self.size, rank=self._rank(free)), q
         if limits:
             which, q = self._turns.allowed(q, q0)
         else:
@@ -130,6 +262,9 @@ class InverseSolver:
         pose, sigma, residual, which, q = pose[order], sigma[order], residual[order], which[order], q[order]
         inside = self._turns.inside(q)
         ends = np.searchsorted(pose, np.arange(len(poses) + 1))
+        reasons = [""] * len(poses)
+        for k in np.setdiff1d(found.pose, pose):
+            reasons[k] = limits_reason(self._spec, self._turns.placed(all_q[found.pose == k], q0))
         first = np.searchsorted(found.pose, np.arange(len(poses)))
         complete = method.found_share == 1.0
         return [
@@ -142,6 +277,7 @@ class InverseSolver:
                 branch=("",) * int(end - start),
                 complete=complete,
                 found_share=method.found_share,
+                reason=reasons[i],
             )
             for i, (start, end) in enumerate(pairwise(ends))
         ]
@@ -153,17 +289,28 @@ class InverseSolver:
         assert isinstance(arm, Arm)
         return arm
 
+    def _moving(self, free: Free | None, locked: tuple[int, ...]) -> Flags:
+        moving = np.ones(self._arm(free).n, dtype=np.bool_)
+        moving[list(locked)] = False
+        return moving
+
+    def _rank(self, free: Free | None) -> int:
+        """Return in how many of the goal's directions the joints move tool0 at a general configuration."""
+        joints = self._arm(free).n
+        return joints - self._surplus(free, ()) - self._arm(free).goal_joints
+
+    def _surplus(self, free: Free | None, locked: tuple[int, ...]) -> int:
+        """Return how many joints more than the goal needs an arm has."""
+        if ("surplus", free, locked) not in self._built:
+            arm, moving = self._arm(free), self._moving(free, locked)
+            rank = joint_rank(arm, moving, self._trial_ranges(arm))
+            self._built["surplus", free, locked] = int(moving.sum()) - rank
+        return int(self._built["surplus", free, locked])
+
     def _method(self, free: Free | None, locked: tuple[int, ...]) -> Method:
         if (free, locked) not in self._built:
             arm = self._arm(free)
-            moving = np.ones(arm.n, dtype=np.bool_)
-            moving[list(locked)] = False
-            ranges = self._trial_ranges(arm)
-            surplus = int(moving.sum()) - joint_rank(arm, moving, ranges)
-            if surplus:
-                more = "1 joint more" if surplus == 1 else f"{surplus} joints more"
-                raise ConfigurationError(f"the arm has {more} than the goal needs: lock some of {listed(self.names)}")
-            self._built[free, locked] = choose_method(arm, moving, ranges)
+            self._built[free, locked] = choose_method(arm, self._moving(free, locked), self._trial_ranges(arm))
         method = self._built[free, locked]
         assert isinstance(method, Method)
         return method
@@ -201,9 +348,24 @@ def inverse_kinematics(
     limits: bool = True,
     lock: Mapping[str, ArrayLike] | None = None,
     free: Free | None = None,
+    numeric: bool = False,
 ) -> Any:
     """Return all configurations of a robot that reach a pose, or each of many poses: see ``InverseSolver.solve``."""
-    return InverseSolver(robot).solve(T, q0, limits, lock, free)
+    return InverseSolver(robot).solve(T, q0, limits, lock, free, numeric)
+
+
+def _first_of_equal(pose: Indices, q: Array, turns: Turns) -> Flags:
+    """Return which configurations of a pose are the first of those that only joints of the goal tell apart."""
+    first = np.ones(len(q), dtype=np.bool_)
+    for k in range(1, len(q)):
+        before = np.flatnonzero((pose[:k] == pose[k]) & first[:k])
+        first[k] = not (turns.distance(turns.nearest(q[before], q[k]), q[k]) < _EQUAL).any()
+    return first
+
+
+def _scaled_locks(arm: Arm, locked: Mapping[int, Array]) -> dict[int, Array]:
+    """Return locked coordinates in the arm's units."""
+    return {j: q if arm.turns[j] else (q + arm.offsets[j]) / arm.length for j, q in locked.items()}
 
 
 @lru_cache(maxsize=64)
@@ -241,6 +403,7 @@ def _bare(spec: RobotSpec) -> RobotSpec:
     home = {name: q for name, q in spec.configurations.items() if name == "home"}
     return RobotSpec(
         name=spec.name,
+        units=spec.units,
         base=BaseSpec(pose=spec.base.pose),
         tool=ToolSpec.at(spec.tool),
         rows=tuple(bare(row) for row in spec.rows),

@@ -149,9 +149,61 @@ def test_without_a_solution_the_reason_is_printed_and_the_exit_status_is_1(argum
     assert re.match(rf"{arguments[0]}: no joint vector reaches the pose: {reason}", text)
     as_json = dh2sim("ik", *arguments, "--json")
     answer = json.loads(as_json.out)
-    assert (as_json.status, answer["solutions"]) == (1, [])
+    assert as_json.status == 1
+    assert not any(solution["within_limits"] for solution in answer["solutions"])
     assert re.fullmatch(reason, answer["reason"])
-    assert len(answer["nearest"]) == len(robot(arguments[0]).moving_rows)
+    if not answer["solutions"]:
+        assert len(answer["nearest"]) == len(robot(arguments[0]).moving_rows)
+
+
+def test_what_exceeds_limits_is_printed_behind_what_keeps_them() -> None:
+    answer = found("puma560", "--at", "10", "-20", "30", "40", "50", "60")
+    inside = [solution["within_limits"] for solution in answer["solutions"]]
+    assert inside == sorted(inside, reverse=True)
+    assert len({solution["branch"] for solution in answer["solutions"]}) == 8
+    text = dh2sim("ik", "puma560", "--at", "10", "-20", "30", "40", "50", "60").out
+    assert "puma560: 9 joint vectors reach the pose, 4 within limits\n" in text
+    assert "outside limits: joint_4 by 30 degrees" in " ".join(text.split())
+    assert "left, above, no flip · sigma_min 0.266 · residual" in text
+
+
+def test_numeric_finds_one_solution_or_the_nearest_configuration() -> None:
+    answer = found("puma560", "--at", "home", "--numeric")
+    assert (len(answer["solutions"]), answer["complete"]) == (1, False)
+    assert_reached(answer, "puma560")
+    run = dh2sim("ik", "puma560", "--xyz", "2", "0", "0", "--numeric", "--json")
+    nearest = json.loads(run.out)["nearest"]
+    assert run.status == 1
+    # stretched towards the goal as far as the arm reaches
+    T = table_tool_pose(robot("puma560"), np.array(nearest))
+    assert T[0, 3] == pytest.approx(np.linalg.norm(T[:3, 3]), rel=1e-2)
+
+
+@pytest.mark.slow
+def test_the_self_motions_of_seven_joints_are_curves_that_hold_the_pose() -> None:
+    answer = found("franka_panda", "--at", "home")
+    assert_reached(answer, "franka_panda")
+    assert len(answer["curves"]) == len(answer["solutions"]) > 1
+    for curve in answer["curves"]:
+        T = table_tool_pose(robot("franka_panda"), np.array(curve["q"]))
+        assert np.abs(T - np.array(answer["target"])).max() <= 1e-10
+    text = dh2sim("ik", "franka_panda", "--at", "home").out
+    assert "curve 1: self-motion, open, joint_1 from " in text
+
+
+def test_a_joint_to_spare_leaves_a_curve() -> None:
+    arguments = ("arm_5r", "--at", "home", "--free", "roll")
+    [first, *_] = found(*arguments)["curves"]
+    assert (first["kind"], first["closed"]) == ("self-motion", False)
+    axes = table_tool_pose(robot("arm_5r"), np.array(first["q"]))[:, :3, 2:]
+    assert np.abs(axes - axes[0]).max() <= 1e-10
+    assert "curve 1: self-motion, open, joint_5 from -17" in dh2sim("ik", *arguments).out
+
+
+def test_the_textbooks_steps_are_printed_with_explain() -> None:
+    text = dh2sim("ik", "planar_2r", "--xyz", "0.6", "0.4", "0", "--explain").out
+    assert "by the law of cosines" in text
+    assert found("planar_2r", "--xyz", "0.6", "0.4", "0", "--explain")["explanation"]
 
 
 def test_no_limits_are_kept_with_no_limits() -> None:
@@ -160,8 +212,8 @@ def test_no_limits_are_kept_with_no_limits() -> None:
 
 
 def test_output_fits_a_terminal_of_80_columns_with_seven_joints_too() -> None:
-    for name in ("puma560", "franka_panda", "kinova_gen3", "ssrms"):
-        run = dh2sim("ik", name, "--at", "home")
+    for arguments in (["puma560"], ["franka_panda", "--lock", "joint_7=0.6"], ["ssrms", "--lock", "joint_7=9"]):
+        run = dh2sim("ik", *arguments, "--at", "home")
         assert run.status == 0
         assert max(map(len, run.out.splitlines())) <= 80
 
