@@ -6,13 +6,16 @@ Plain double arithmetic in a fixed order, so that every machine writes the same 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import reference_joint_poses
 from dh2sim.model.mass import MassProperties, in_frame, shift_inertia
-from dh2sim.model.shapes import cross, neat
+from dh2sim.model.shapes import neat
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, JointType
 from dh2sim.typing import Array
 
@@ -32,25 +35,20 @@ def gravity_loads(
         m values, N·m or N: minus the power of the weights per unit of joint velocity (principle of virtual work).
     """
     poses = reference_joint_poses(chain, q)
-    placed = _outboard(poses, bodies)
-    loads = []
-    for i, joint in enumerate(chain.joints):
-        if not joint.type.moves:
-            continue
-        axis = [joint.sign * float(poses[i][k, 2]) for k in range(3)]
-        terms = []
-        for body in placed[i:]:
-            if body is None:
-                continue
-            weight = [body.mass * float(g) for g in gravity]
-            if joint.type.turns:
-                arm = [float(body.com[k]) - float(poses[i][k, 3]) for k in range(3)]
-                moved = cross(axis, arm)
-            else:
-                moved = axis
-            terms.append(-_dot(weight, moved))
-        loads.append(math.fsum(terms) + 0.0)
-    return tuple(loads)
+    moving = [i for i, joint in enumerate(chain.joints) if joint.type.moves]
+    placed = [(i, body) for i, body in enumerate(_outboard(poses, bodies)) if body is not None]
+    if not placed or not moving:
+        return (0.0,) * len(moving)
+    # by joint and body; element by element, which rounds as plain arithmetic does
+    com, mass = np.array([body.com for _, body in placed]), np.array([body.mass for _, body in placed])
+    turns = np.array([[chain.joints[i].type.turns] for i in moving])
+    x, y, z = (np.array([[chain.joints[i].sign * float(poses[i][k, 2])] for i in moving]) for k in range(3))
+    u, v, w = (com[:, k] - np.array([[poses[i][k, 3]] for i in moving]) for k in range(3))
+    moved = [np.where(turns, *pair) for pair in ((y * w - z * v, x), (z * u - x * w, y), (x * v - y * u, z))]
+    weight = [mass * float(g) for g in gravity]
+    terms = (-(weight[0] * moved[0] + weight[1] * moved[1] + weight[2] * moved[2])).tolist()
+    first = [bisect_left([k for k, _ in placed], i) for i in moving]
+    return tuple(math.fsum(row[start:]) + 0.0 for row, start in zip(terms, first, strict=True))
 
 
 def seen_inertias(chain: KinematicChain, bodies: Sequence[MassProperties | None], q: Array) -> tuple[float, ...]:

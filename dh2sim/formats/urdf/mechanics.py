@@ -20,6 +20,8 @@ from dh2sim.typing import Array
 
 UP = (0.0, 0.0, -9.81)
 """m/s²: gravity in the root of a URDF."""
+MAX_ENTRIES = 500_000
+"""Pairs of joint and link that are computed at once, over all configurations."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,46 +50,57 @@ def urdf_mechanics(robot: Element, arm: Sequence[str], *, gravity: Sequence[floa
         gravity: m/s² in the root.
     """
     links = list(_links(robot, list(arm)))
-    g = np.array(gravity)
-    n = len(arm)
+    chunk = max(1, MAX_ENTRIES // max(1, len(arm) * len(links)))
 
     def terms(q: Array) -> tuple[Array, Array]:
-        mass, load = np.zeros((len(q), n, n)), np.zeros((len(q), n))
-        for k, row in enumerate(q):
-            poses: dict[str, tuple[Array, tuple[int, ...]]] = {}
-            movers: dict[int, tuple[Array, Array, bool]] = {}
-            for link in links:
-                T_parent, above = poses.get(link.parent, (identity(), ()))
-                T, moving = T_parent @ link.T_parent_joint, above
-                if link.joint is not None:
-                    movers[link.joint] = (T[:3, :3] @ link.axis, T[:3, 3], link.turns)
-                    moving = (*above, link.joint)
-                    T = T @ _moved(link, float(row[link.joint]))
-                poses[link.name] = (T, moving)
-                if link.mass <= 0.0 or not moving:
-                    continue
-                linear, angular = np.zeros((3, n)), np.zeros((3, n))
-                com = T[:3, 3] + T[:3, :3] @ link.com
-                for j in moving:
-                    axis, origin, turns = movers[j]
-                    linear[:, j] = np.cross(axis, com - origin) if turns else axis
-                    angular[:, j] = axis if turns else 0.0
-                tensor = T[:3, :3] @ link.inertia @ T[:3, :3].T
-                mass[k] += link.mass * linear.T @ linear + angular.T @ tensor @ angular
-                load[k] -= link.mass * linear.T @ g
-        return mass, load
+        parts = [_terms(links, q[k : k + chunk], np.array(gravity)) for k in range(0, len(q), chunk)]
+        return np.concatenate([mass for mass, _ in parts]), np.concatenate([load for _, load in parts])
 
     return terms
 
 
-def _moved(link: _Link, value: float) -> Array:
-    T = np.eye(4)
+def _terms(links: Sequence[_Link], q: Array, gravity: Array) -> tuple[Array, Array]:
+    """Return the sums over all links: of the inertias that joints move, and of the weights that they carry."""
+    count, n = q.shape
+    axes, origins, turns = np.zeros((n, count, 3)), np.zeros((n, count, 3)), np.zeros((n, 1, 1), dtype=bool)
+    linear, angular = np.zeros((count, n, len(links), 3)), np.zeros((count, n, len(links), 3))
+    tensors = np.zeros((count, len(links), 3, 3))
+    root = np.broadcast_to(identity(), (count, 4, 4))
+    poses: dict[str, tuple[Array, tuple[int, ...]]] = {}
+    for k, link in enumerate(links):
+        T_parent, moving = poses.get(link.parent, (root, ()))
+        T = T_parent @ link.T_parent_joint
+        if (j := link.joint) is not None:
+            axes[j], origins[j], turns[j] = T[:, :3, :3] @ link.axis, T[:, :3, 3], link.turns
+            moving = (*moving, j)
+            T = T @ _moved(link, q[:, j])
+        poses[link.name] = (T, moving)
+        if link.mass <= 0.0 or not moving:
+            continue
+        own, R = list(moving), T[:, :3, :3]
+        com = T[:, :3, 3] + R @ link.com
+        axis, turn = axes[own], turns[own]
+        linear[:, own, k] = np.where(turn, np.cross(axis, com - origins[own]), axis).swapaxes(0, 1)
+        angular[:, own, k] = np.where(turn, axis, 0.0).swapaxes(0, 1)
+        tensors[:, k] = R @ link.inertia @ R.swapaxes(1, 2)
+    momentum = linear * np.array([[link.mass] for link in links])
+    turned = np.einsum("klab,knlb->knla", tensors, angular)
+    whole = (count, n, -1)
+    mass = momentum.reshape(whole) @ linear.reshape(whole).swapaxes(1, 2)
+    mass += turned.reshape(whole) @ angular.reshape(whole).swapaxes(1, 2)
+    return mass, -(momentum.sum(axis=2) @ gravity)
+
+
+def _moved(link: _Link, values: Array) -> Array:
+    """Return the motions of a joint by some coordinates, shape (N, 4, 4)."""
+    T = np.zeros((len(values), 4, 4)) + np.eye(4)
     if not link.turns:
-        T[:3, 3] = value * link.axis
+        T[:, :3, 3] = values[:, None] * link.axis
         return T
     x, y, z = link.axis
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # Rodrigues' formula
-    T[:3, :3] += math.sin(value) * K + (1.0 - math.cos(value)) * (K @ K)
+    s, v = np.sin(values)[:, None, None], 1.0 - np.cos(values)[:, None, None]
+    T[:, :3, :3] += s * K + v * (K @ K)
     return T
 
 
