@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from dh2sim.robot.magnitudes import MAGNITUDES, shown_size
+from dh2sim.robot.magnitudes import MAGNITUDES, MOST_ROWS, shown_size
 from dh2sim.robot.schema import json_schema
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "robot-file.md"
@@ -46,6 +46,8 @@ Magnitudes have bounds, so that all that is read can be exported, and read by si
 @MAGNITUDES@
 
 What must be positive, or is a mass or a gain that is not 0, is at least the least. Numbers below 1e-60 count as 0.
+A table has at most @MOST_ROWS@ rows: MuJoCo reads no longer chain of bodies. A file has at most 1 MB, and 50 000
+values.
 
 ## Units
 
@@ -131,7 +133,9 @@ TITLES = {
 def page() -> str:
     """Return the page."""
     schema = json_schema()
-    introduction = INTRODUCTION.replace("@MAGNITUDES@", "\n".join(_magnitudes()))
+    introduction = INTRODUCTION.replace("@MAGNITUDES@", "\n".join(_magnitudes())).replace(
+        "@MOST_ROWS@", str(MOST_ROWS)
+    )
     return introduction + "\n".join(["", *_section("Top level", schema, schema), *_sections(schema)])
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final, Generic, TypeVar
 
 from dh2sim.messages import Notes, did_you_mean, listed, shown
+from dh2sim.robot.magnitudes import MOST_ROWS
 
 _LEAST_BEFORE_A_HAND: Final = 3
 """Moving joints of an arm that may end where it forks into fingers."""
@@ -91,7 +92,7 @@ class LinkTree(Generic[Node]):
             called: How messages call the tip, where it is a frame on the link.
 
         Raises:
-            NoArmError: The tip is not below the base, or no joint moves between them.
+            NoArmError: The tip is not below the base, or no joint moves between them, or more than a table can have.
         """
         called = called or self.label(tip)
         way = self.way(base, tip)
@@ -100,6 +101,8 @@ class LinkTree(Generic[Node]):
             raise NoArmError(f"the tip {called} is not below the base {self.label(base)}{hint}", tip)
         if not self.moves(way):
             raise NoArmError(f"no joint moves between the base {self.label(base)} and the tip {called}", tip)
+        if (count := sum(self.moving[node] for node in way)) > MOST_ROWS:
+            raise NoArmError(f"the arm has {count} joints; at most {MOST_ROWS} are read", tip)
         return way
 
     def end(self, base: Node, notes: Notes) -> Node:

@@ -22,6 +22,7 @@ from dh2sim.errors import ImportedFileError
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import compose, pose_from_rpy
 from dh2sim.messages import Loc, did_you_mean, listed, shown
+from dh2sim.robot.magnitudes import MOST_ROWS
 from dh2sim.robot.spec import JointType, Pose
 from dh2sim.robot.yaml_tree import Entry, Node, Report, decode
 from dh2sim.robot.yaml_tree import compose as compose_yaml
@@ -153,6 +154,8 @@ def _origins(text: str, report: Report) -> JointOrigins | None:
         return _of_kinematics(node, loc, report)
     if any(name in top for name in UR_JOINTS):
         return _of_kinematics(root, (), report)
+    if _too_many(root, (), len(top), report):
+        return None
     poses = {}
     for key, entry in top.items():
         inner = entry.value.at("kinematic")
@@ -176,6 +179,8 @@ def _of_kinematics(node: Node, loc: Loc, report: Report) -> JointOrigins | None:
             if name not in entries:
                 report.add(node.line, node.column, loc, f"missing key '{name}'")
     order = known or list(entries)
+    if _too_many(node, loc, len(order), report):
+        return None
     poses = [_pose(entries[name].value, (*loc, name), report) for name in order]
     if not order:
         report.add(node.line, node.column, loc, "there is no joint")
@@ -186,6 +191,12 @@ def _of_kinematics(node: Node, loc: Loc, report: Report) -> JointOrigins | None:
         poses=tuple(pose for pose in poses if pose is not None),
         identifier="" if identifier is None else str(identifier.value.value),
     )
+
+
+def _too_many(node: Node, loc: Loc, count: int, report: Report) -> bool:
+    if count > MOST_ROWS:
+        report.add(node.line, node.column, loc, f"there are {count} joints; at most {MOST_ROWS} are read")
+    return count > MOST_ROWS
 
 
 def _numbered(top: dict[str, Entry], poses: dict[str, Pose | None], report: Report) -> JointOrigins | None:

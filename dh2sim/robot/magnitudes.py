@@ -67,6 +67,9 @@ MAGNITUDES: Final = (
     SCALE,
 )
 """All that have bounds."""
+MOST_ROWS: Final = 494
+"""Of a table. MuJoCo's XML reader nests at most 496 bodies; base_link is one of them, and a tool or a last frame may
+be another."""
 LARGEST: Final = max(of.most for of in MAGNITUDES)
 """Greatest number of any kind."""
 

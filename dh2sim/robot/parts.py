@@ -19,7 +19,7 @@ import numpy as np
 
 from dh2sim.messages import Loc, closest, did_you_mean, listed, shown
 from dh2sim.robot.fields import WRONG, Choice, Kind, Number, Scope, Tree, UnitsLike
-from dh2sim.robot.magnitudes import INERTIA, shown_size
+from dh2sim.robot.magnitudes import INERTIA, MOST_ROWS, shown_size
 from dh2sim.typing import Array, read_only
 
 _TRIANGLE_TOLERANCE: Final = 1e-9
@@ -107,7 +107,7 @@ _NO_PART: Final = Part()
 
 @dataclass(eq=False, repr=False)
 class Parts(Kind):
-    """A list of parts, at least one."""
+    """A list of parts, at least one and at most ``MOST_ROWS``."""
 
     item: Part = _NO_PART
 
@@ -117,6 +117,8 @@ class Parts(Kind):
             return scope.wrong(loc, f"expected a list, found {shown(value)}")
         if not value:
             return scope.wrong(loc, "the list is empty; at least one entry is needed")
+        if len(value) > MOST_ROWS:
+            return scope.wrong(loc, f"the list has {len(value)} entries; at most {MOST_ROWS} are allowed")
         return [self.item.check(item, (*loc, index), scope) for index, item in enumerate(value)]
 
     def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:

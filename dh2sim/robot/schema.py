@@ -22,7 +22,7 @@ from dh2sim.robot.fields import (
     Numbers,
     Parameters,
 )
-from dh2sim.robot.magnitudes import ANGLE, LENGTH, Magnitude
+from dh2sim.robot.magnitudes import ANGLE, LENGTH, MOST_ROWS, Magnitude
 from dh2sim.robot.parts import Inertia, InertiaNumbers, Part, Parts, fields_of
 from dh2sim.robot.spec import ROBOT, AngleUnit, LengthUnit
 
@@ -79,7 +79,7 @@ def _value(kind: Kind, definitions: dict[str, Any]) -> dict[str, Any]:
         case Inertia():
             return _value(Part("", InertiaNumbers), definitions)
         case Parts():
-            return {"type": "array", "items": _value(kind.item, definitions), "minItems": 1}
+            return {"type": "array", "items": _value(kind.item, definitions), "minItems": 1, "maxItems": MOST_ROWS}
         case Choice():
             letters = [spelling for short in kind.short for spelling in (short.upper(), short)]
             definitions[kind.of.__name__] = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from dh2sim.importing import serial
 from dh2sim.importing.serial import assemble
 from dh2sim.importing.sources import ImportOptions, import_data, import_robot, import_table
 from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.magnitudes import MOST_ROWS
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
 from tests.kinematics.test_compaction import UR5
 from tests.refusals import refusal
@@ -325,3 +327,36 @@ def test_a_calibrated_table_says_that_it_can_be_compact() -> None:
 def test_a_urdf_is_known_behind_marks_blanks_and_comments(before: str, encoding: str) -> None:
     text = before + ARM.partition("\n")[2]
     assert import_data(text.encode(encoding), "arm.txt", ImportOptions()).spec.name == "two_arm"
+
+
+def _too_long(kind: str) -> str:
+    n = MOST_ROWS + 1
+    match kind:
+        case "urdf":
+            joint = '<joint name="j{0}" type="continuous"><parent link="l{0}"/><child link="l{1}"/></joint>'
+            links = "".join(f'<link name="l{i}"/>' for i in range(n + 1))
+            return f'<robot name="r">{links}{"".join(joint.format(i, i + 1) for i in range(n))}</robot>'
+        case "md":
+            return "| a [m] | alpha [deg] | d [m] | theta [deg] |\n|---|---|---|---|\n" + "| 1 | 2 | 3 | q |\n" * n
+        case _:
+            pose = "{x: 0, y: 0, z: 0.1, roll: 0, pitch: 0, yaw: 0}"
+            return "kinematics:\n" + "".join(f"  joint_{i}: {pose}\n" for i in range(n))
+
+
+@pytest.mark.parametrize(
+    ("kind", "reported"),
+    [
+        ("urdf", "1:{at}: the arm has {n} joints; at most {most} are read"),
+        ("md", "1:3: the table has more than {most} rows"),
+        ("yaml", "2:3: kinematics: there are {n} joints; at most {most} are read"),
+    ],
+)
+def test_a_robot_of_too_many_joints_is_refused_before_it_is_made(tmp_path: Path, kind: str, reported: str) -> None:
+    path = tmp_path / f"long.{kind}"
+    text = _too_long(kind)
+    path.write_text(text)
+    at = text.find(f'<link name="l{MOST_ROWS + 1}"') + 1
+    message = reported.format(at=at, n=MOST_ROWS + 1, most=MOST_ROWS)
+    started = time.process_time()
+    assert refusal(ImportedFileError, import_robot, path) == f"{path}:{message}"
+    assert time.process_time() - started < 2.0

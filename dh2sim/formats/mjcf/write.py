@@ -5,8 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 
-from dh2sim.errors import ModelError
-from dh2sim.formats.mjcf.sites import add_site, needs_body, placed
+from dh2sim.formats.mjcf.sites import add_site, placed
 from dh2sim.formats.mjcf.tree import DYNAMICS
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.transforms import compose, identity
@@ -65,10 +64,6 @@ def add_keyframes(mujoco: ET.Element, model: RobotModel, *, floating_base: bool 
             key.set("ctrl", numbers(controls))
 
 
-MAX_BODIES = 496
-"""MuJoCo's XML reader refuses a deeper nesting of bodies; base_link is one of them."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MjcfOptions:
     """Options of the simulation in an MJCF."""
@@ -98,18 +93,8 @@ def to_mjcf(model: ModelLike, options: MjcfOptions = EXPORTED) -> str:
 
     Returns:
         The text of the file. Meshes are looked for in ``meshes`` beside it.
-
-    Raises:
-        ModelError: the robot has more bodies than MuJoCo can read back.
     """
     model = model_of(model)
-    nested = 1 + len(model.links)
-    nested += model.tool is not None or any(needs_body(T, model.links[-1].inertial) for _, T in _last_frames(model))
-    if nested > MAX_BODIES:
-        raise ModelError(
-            f"{model.name}: {len(model.links)} rows make {nested} nested bodies with base_link; MuJoCo "
-            f"reads at most {MAX_BODIES}. Split the chain, or export it as URDF only"
-        )
     mujoco = ET.Element("mujoco", model=model.name)
     child(mujoco, "compiler", angle="radian", autolimits="true", meshdir="meshes")
     option = child(

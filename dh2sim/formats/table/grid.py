@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
 from dh2sim.errors import ImportedFileError, Problem
+from dh2sim.robot.magnitudes import MOST_ROWS
 
-MAX_ROWS: Final = 1000
+MAX_ROWS: Final = MOST_ROWS
 MAX_COLUMNS: Final = 50
 
 PREFIX: Final = re.compile(r"\s*(?:[%#>*]+|//+)?\s*")

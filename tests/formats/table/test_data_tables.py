@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from dh2sim.robot.magnitudes import MOST_ROWS
 from dh2sim.robot.spec import Convention
 from tests.formats.table.samples import STANDARD, complaints, imported, modified, numbers, tool_poses, types
 
@@ -120,5 +121,5 @@ def test_three_lists_that_have_other_names_are_no_table() -> None:
 
 
 def test_a_file_of_too_many_records_is_refused() -> None:
-    text = "- a: 0\n  alpha: 0\n  d: 0\n  theta: 0\n" * 1001
-    assert complaints(text, "t.yaml", **STANDARD) == ["t.yaml:1:6: the table has more than 1000 rows"]
+    text = "- a: 0\n  alpha: 0\n  d: 0\n  theta: 0\n" * (MOST_ROWS + 1)
+    assert complaints(text, "t.yaml", **STANDARD) == [f"t.yaml:1:6: the table has more than {MOST_ROWS} rows"]

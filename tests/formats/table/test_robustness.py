@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from dh2sim.errors import Dh2simError, ImportedFileError
 from dh2sim.formats.table.read import TableImport, read_table
+from dh2sim.robot.magnitudes import MOST_ROWS
 from tests.formats.table.samples import STANDARD, complaints, imported, numbers
 from tests.formats.table.test_data_tables import KUKA as DICTIONARY
 from tests.formats.table.test_markup_tables import ARRAY, BOOKTABS, CSV_TABLE, HTML, LIST, SIDE, SIMPLE, TABULAR
@@ -180,8 +181,8 @@ def test_tables_of_a_wrong_shape_are_refused() -> None:
         "t.csv:1:1: the table has headings and no rows",
         't.csv:2:1: a double quote is never closed on this line; write two of them, "", for one inside a cell',
     ]
-    many = "theta,d,a,alpha\n" + "q1,0,0,0\n" * 1001
-    assert complaints(many, "t.csv") == ["t.csv:1:1: the table has more than 1000 rows"]
+    many = "theta,d,a,alpha\n" + "q1,0,0,0\n" * (MOST_ROWS + 1)
+    assert complaints(many, "t.csv") == [f"t.csv:1:1: the table has more than {MOST_ROWS} rows"]
 
 
 def test_text_after_a_table_between_separators_is_noted() -> None:
