@@ -154,10 +154,10 @@ def test_a_large_wrong_table_is_refused_quickly(text: str) -> None:
 def test_a_large_right_table_is_read_soon() -> None:
     start = time.perf_counter()
     found = imported(
-        HEAD + "|-|-|-|-|\n" + "".join(f"| q{i} + pi/2 | 0.1 | 0.2 | pi/2 |\n" for i in range(1000)), **STANDARD
+        HEAD + "|-|-|-|-|\n" + "".join(f"| q{i} + pi/2 | 0.1 | 0.2 | pi/2 |\n" for i in range(MOST_ROWS)), **STANDARD
     )
     assert time.perf_counter() - start < 10
-    assert len(found.spec.rows) == 1000
+    assert len(found.spec.rows) == MOST_ROWS
 
 
 def test_a_file_that_is_no_text_or_too_large_is_refused() -> None:
