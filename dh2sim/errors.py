@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Self
 
 
 class Dh2simError(Exception):
@@ -62,6 +63,22 @@ class UnknownFrameError(Dh2simError):
 
 class ConfigurationError(Dh2simError, ValueError):
     """A joint vector has the wrong shape or holds something that is not a finite number."""
+
+
+class NotFiniteError(Dh2simError, ValueError):
+    """A number to be written is NaN or infinite: a defect of dh2sim, which nothing that it accepts should reach."""
+
+    def __init__(self, where: str, value: str) -> None:
+        """Name the place of the number in what is written."""
+        self.where, self.value = where, value
+        super().__init__(
+            f"{where}: {value} is not a finite number, and is not written. This is a defect of dh2sim: please report "
+            "it with the robot file"
+        )
+
+    def inside(self, part: str) -> Self:
+        """Return the same error with a place that begins with the part that it is in."""
+        return type(self)(f"{part}.{self.where}" if self.where else part, self.value)
 
 
 class MeshError(Dh2simError):

@@ -22,6 +22,7 @@ from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
 from dh2sim.model.robot_model import FilledIn, RobotModel
+from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Dynamics
 
 
@@ -236,6 +237,8 @@ class ExportReport:
     """Masses and inertias that were estimated from the shapes."""
     assumptions: tuple[FilledIn, ...]
     """Limits that were assumed."""
+    warnings: tuple[str, ...] = ()
+    """What MuJoCo finds questionable in the files, a sentence each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,7 +282,7 @@ def export_robot(
     """
     files = render(model, formats, dh_frames=dh_frames)
     target = out / model.name
-    with atomic_files(out, model.name, wait=wait, waiting=waiting) as staging:
+    with atomic_files(out, model.name, wait=wait, waiting=waiting) as staging, mujoco_warnings() as warned:
         for relative, data in files.items():
             (staging / relative).parent.mkdir(parents=True, exist_ok=True)
             (staging / relative).write_bytes(data)
@@ -295,6 +298,7 @@ def export_robot(
         losses=tuple(losses(model, formats)),
         estimates=model.estimates,
         assumptions=model.assumptions,
+        warnings=warning_sentences(warned, [joint.name for joint in model.moving_joints]),
     )
 
 

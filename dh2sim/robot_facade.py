@@ -6,6 +6,7 @@ Every method calls functions that are public themselves, and imports what it nee
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property, wraps
@@ -16,8 +17,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, TypeAlias, Unpack,
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.errors import ConfigurationError, Dh2simError, OutputError, Problem, RobotError
+from dh2sim.errors import ConfigurationError, Dh2simError, EngineError, OutputError, Problem, RobotError
 from dh2sim.messages import did_you_mean, listed, member, shown
+from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
 from dh2sim.robot.spec import (
     ActuatorSpec,
     AngleUnit,
@@ -522,11 +524,21 @@ class Robot:
 
         Raises:
             Dh2simError: MuJoCo cannot hold the robot.
+
+        Warns:
+            RuntimeWarning: MuJoCo finds something questionable in it.
         """
         import mujoco
 
         meshes = {link.mesh.file_name: link.mesh.data for link in self.model.all_links if link.mesh is not None}
-        return mujoco.MjModel.from_xml_string(self.mjcf(), meshes)
+        with mujoco_warnings() as warned:
+            try:
+                compiled = mujoco.MjModel.from_xml_string(self.mjcf(), meshes)
+            except ValueError as error:
+                raise EngineError(f"{self.name}: MuJoCo refuses the model: {' '.join(str(error).split())}") from error
+        for sentence in warning_sentences(warned, [joint.name for joint in self.model.moving_joints]):
+            warnings.warn(f"{self.name}: {sentence}", RuntimeWarning, stacklevel=2)
+        return compiled
 
     def export(
         self,

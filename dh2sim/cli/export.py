@@ -137,6 +137,7 @@ def _print_report(report: ExportReport, out: Path, model: RobotModel) -> None:
     _list("not carried over", map(str, report.losses))
     _list("estimated from the shapes", (f"{entry}." for entry in model.estimates))
     _list("assumed", (f"{entry}." for entry in model.assumptions))
+    _list("MuJoCo", report.warnings)
 
 
 def _list(title: str, lines: Iterable[str]) -> None:

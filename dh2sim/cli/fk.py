@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +16,7 @@ from dh2sim.cli.joint_vector import (
     format_numbers,
     read_joint_vector,
 )
+from dh2sim.cli.output import json_text
 from dh2sim.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -242,7 +242,7 @@ def _print_matrix(T: Array) -> None:
 
 
 def _print_json(content: dict[str, Any]) -> None:
-    print(json.dumps(content))
+    print(json_text(content, indent=None))
 
 
 def _require_finite(spec: RobotSpec, values: Array, what: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 import re
 import shlex
 import sys
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dh2sim.cli.common import RobotArgument, choice, complete_robot, load_all, other_format, tolerance_of
-from dh2sim.cli.output import hand_over, require_free
+from dh2sim.cli.output import hand_over, json_text, require_free
 from dh2sim.errors import Dh2simError, ImportedFileError, MissingExtraError
 
 if TYPE_CHECKING:
@@ -369,4 +368,4 @@ def hand_over_json(
     made["residual"] = residual
     made["notes"] = list(notes)
     made |= {"text": text} if out is None else {"file": str(out)}
-    print(json.dumps(made, indent=2, ensure_ascii=False))
+    print(json_text(made, ensure_ascii=False))

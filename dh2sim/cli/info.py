@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import textwrap
 from collections.abc import Callable, Iterable
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from dh2sim.cli.common import RobotArgument, StrictOption, build_all
-from dh2sim.cli.output import table_lines
+from dh2sim.cli.output import json_text, table_lines
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
@@ -44,7 +43,7 @@ def info(
     """
     [model] = build_all([robot], strict=strict)
     if as_json:
-        print(json.dumps(as_dict(model), indent=2))
+        print(json_text(as_dict(model)))
     else:
         _print(model, srdf=srdf)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -9,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dh2sim.errors import OutputError
+from dh2sim.errors import NotFiniteError, OutputError
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
@@ -52,6 +54,31 @@ def table_lines(rows: Sequence[Sequence[str]], *, left: int, head: int = 1) -> l
         for row in rows
     ]
     return [*lines[:head], "─" * max(map(len, lines)), *lines[head:]]
+
+
+def json_text(value: object, *, indent: int | None = 2, ensure_ascii: bool = True) -> str:
+    """Return a value as JSON, which has no NaN and no infinity.
+
+    Raises:
+        NotFiniteError: A number in it is either.
+    """
+    try:
+        return json.dumps(value, indent=indent, ensure_ascii=ensure_ascii, allow_nan=False)
+    except ValueError:
+        place, number = next(_not_finite(value, "JSON"))
+        raise NotFiniteError(place, repr(number)) from None
+
+
+def _not_finite(value: object, place: str) -> Iterator[tuple[str, float]]:
+    match value:
+        case float() if not math.isfinite(value):
+            yield place, value
+        case dict():
+            for key, inner in value.items():
+                yield from _not_finite(inner, f"{place}.{key}")
+        case list() | tuple():
+            for index, inner in enumerate(value):
+                yield from _not_finite(inner, f"{place}[{index}]")
 
 
 @contextmanager

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import textwrap
 from dataclasses import asdict
 from typing import Annotated
 
 import typer
+
+from dh2sim.cli.output import json_text
 
 
 def list_robots(
@@ -29,7 +30,7 @@ def list_robots(
 
     robots = list(summaries())
     if as_json:
-        print(json.dumps([asdict(robot) for robot in robots], indent=2))
+        print(json_text([asdict(robot) for robot in robots]))
         return
     for group in dict.fromkeys(robot.group for robot in robots):
         members = [robot for robot in robots if robot.group == group]
@@ -53,4 +54,4 @@ def schema() -> None:
     """
     from dh2sim.robot.schema import json_schema
 
-    print(json.dumps(json_schema(), indent=2))
+    print(json_text(json_schema()))

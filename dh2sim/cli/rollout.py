@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import signal
 import sys
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dh2sim.cli.common import INTERRUPTED, RobotArgument, build_all
-from dh2sim.cli.output import make_console, progress_bar, size_text
+from dh2sim.cli.output import json_text, make_console, progress_bar, size_text
 from dh2sim.cli.runs import clipped_controls, contacts
 
 if TYPE_CHECKING:
@@ -138,7 +137,7 @@ def rollout(
         with redirect_stdout(sys.stderr) if as_json else nullcontext():
             _print_summary(job, summary, progress, out)
     if as_json:
-        print(json.dumps(summary.to_json(), indent=2))
+        print(json_text(summary.to_json()))
     if progress.finished:
         return 0
     print(

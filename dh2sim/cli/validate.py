@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import sys
 import textwrap
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dh2sim.cli.common import FELL_SHORT, RobotsArgument, StrictOption, build_all, complain, tolerance_of
-from dh2sim.cli.output import make_console, print_whole, progress_bar
+from dh2sim.cli.output import json_text, make_console, print_whole, progress_bar
 from dh2sim.errors import Dh2simError, OutputError
 from dh2sim.extras import require_extra
 from dh2sim.messages import printable
@@ -103,7 +100,7 @@ def validate(
     from dh2sim.validate.run import engine_samples, validate_robot
 
     poses = sum(engine_samples(samples, len(model.joints)) for model in models)
-    with _warnings_reported(), progress_bar("comparing", "poses", poses) as advance:
+    with progress_bar("comparing", "poses", poses) as advance:
         reports = []
         for model in models:
             found = validate_robot(
@@ -118,7 +115,7 @@ def validate(
             )
             reports.append(_simulated(model, found, seed) if dynamics else found)
         report = ValidationReport(robots=tuple(reports))
-    text = json.dumps(report.to_json(), indent=2)
+    text = json_text(report.to_json())
     if json_file == "-":
         print(text)
     else:
@@ -154,19 +151,6 @@ def _write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise OutputError(f"cannot write '{path}': {error.strerror or error}") from error
-
-
-@contextmanager
-def _warnings_reported() -> Iterator[None]:
-    """Print MuJoCo's warnings, which it would append to a file in the current folder."""
-    import mujoco
-
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: print(f"dh2sim: MuJoCo warns: {text}", file=sys.stderr))
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def _print(report: ValidationReport) -> None:
@@ -233,6 +217,8 @@ def _remarks(robot: RobotReport) -> Iterator[tuple[str, str]]:
             yield f"{check.engine}: {check.reason}", "yellow"
         if check.left_out is not None:
             yield f"{check.engine}, {check.quantity.value}: {check.left_out}", "yellow"
+    for warning in robot.warnings:
+        yield f"mujoco: {warning}", "yellow"
 
 
 def _compared(check: Check) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from dh2sim.errors import PictureError, RunError
 from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.mujoco_warnings import mujoco_warnings
 from dh2sim.simulate.recorded_model import recorded_model
 from dh2sim.typing import Array, read_only
 
@@ -119,7 +120,8 @@ def motion_of_robot(robot: RobotModel, configuration: str | None = None) -> Moti
     meshes = {link.mesh.file_name: link.mesh.data for link in robot.all_links if link.mesh is not None}
     assets = {f"{robot.name}.xml": to_mjcf(robot).encode(), **meshes}
     try:
-        model = mujoco.MjModel.from_xml_string(to_scene(robot), assets)
+        with mujoco_warnings():
+            model = mujoco.MjModel.from_xml_string(to_scene(robot), assets)
     except ValueError as error:
         raise PictureError(f"{robot.name}: MuJoCo refuses the model: {' '.join(str(error).split())}") from error
     return Motion(model=model, qpos=read_only(np.asarray(q)[None, :]), time=read_only([0.0]))

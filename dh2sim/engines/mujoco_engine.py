@@ -139,14 +139,23 @@ class MujocoEngine:
         for k in range(len(q)):
             data.qpos[self._dofs] = q[k]
             data.qvel[:] = 0.0
-            mujoco.mj_forward(model, data)
-            load[k] = data.qfrc_bias[self._dofs]
+            # not mj_forward, which factors the matrix
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_makeM(model, data)
             mujoco.mj_fullM(model, data, full)
             mass[k] = full[order]
+            load[k] = self._bias(data)
             data.qvel[self._dofs] = velocity[k]
-            mujoco.mj_forward(model, data)
-            bias[k] = data.qfrc_bias[self._dofs]
+            bias[k] = self._bias(data)
         return DynamicTerms(mass_matrix=mass, bias=bias, gravity=load)
+
+    def _bias(self, data: mujoco.MjData) -> Array:
+        """Return Coriolis, centrifugal and gravity terms in a state whose positions are done, shape (n,)."""
+        forces = np.zeros(self._model.nv)
+        mujoco.mj_comVel(self._model, data)
+        mujoco.mj_rne(self._model, data, 0, forces)
+        return np.asarray(forces[self._dofs])
 
 
 def keep_centers_of_mass(model: mujoco.MjModel) -> None:

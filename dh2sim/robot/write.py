@@ -21,7 +21,7 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from dh2sim.errors import ModelError
+from dh2sim.errors import ModelError, NotFiniteError
 from dh2sim.robot.checks import default_name
 from dh2sim.robot.fields import Choice, Color, Dimension, Flag, Kind, MeshFile, Number, Numbers
 from dh2sim.robot.parts import Inertia, Internal, Part, fields_of
@@ -45,7 +45,13 @@ _NEIGHBOURS = 4
 
 
 def number(value: float) -> str:
-    """Return the shortest text of a double, such as ``-90``, ``0.4318`` or ``1e-9``; zero has no sign."""
+    """Return the shortest text of a double, such as ``-90``, ``0.4318`` or ``1e-9``; zero has no sign.
+
+    Raises:
+        NotFiniteError: It is NaN or infinite.
+    """
+    if not math.isfinite(value):
+        raise NotFiniteError("", repr(float(value)))
     digits, _, exponent = repr(float(value) + 0.0).partition("e")
     digits = digits.removesuffix(".0")
     return f"{digits}e{int(exponent)}" if exponent else digits
@@ -328,7 +334,10 @@ class PartWriter:
             if isinstance(kind, Part) and kind.inline:
                 tree |= self.part(value, turns=turns)
             elif not isinstance(kind, Internal) and value is not None and not _is_default(value, each, kind):
-                tree[each.name] = self._value(kind, value, turns=turns)
+                try:
+                    tree[each.name] = self._value(kind, value, turns=turns)
+                except NotFiniteError as error:
+                    raise error.inside(each.name) from None
         return {key: value for key, value in tree.items() if value}
 
     def _value(self, kind: Kind, value: Any, *, turns: bool) -> Tree:

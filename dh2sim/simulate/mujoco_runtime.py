@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -14,12 +14,14 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
+from dh2sim.mujoco_warnings import mujoco_warnings
+
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 """MuJoCo has computed all that follows from positions and velocities."""
 
 _lock = threading.Lock()
 _users = 0
-_saved: tuple[int | None, Callable[[str], None] | None] = (None, None)
+_saved: int | None = None
 
 
 @contextmanager
@@ -34,30 +36,24 @@ def quiet_engine() -> Iterator[None]:
     timer = _timer()
     with _lock:
         if _users == 0:
-            _saved = (None if timer is None else timer.value, mujoco.get_mju_user_warning())
+            _saved = None if timer is None else timer.value
             if timer is not None:
                 timer.value = None
-            mujoco.set_mju_user_warning(_ignore)
         _users += 1
     try:
-        yield
+        with mujoco_warnings():
+            yield
     finally:
         with _lock:
             _users -= 1
-            if _users == 0:
-                if timer is not None:
-                    timer.value = _saved[0]
-                mujoco.set_mju_user_warning(_saved[1])
+            if _users == 0 and timer is not None:
+                timer.value = _saved
 
 
 def forward(batch: Batch, ids: NDArray[np.intp] | None = None) -> None:
     """Compute what MuJoCo derives from positions and velocities; simulations that fail keep their old values."""
     with suppress(SimulationError):
         batch.forward(ids, stage=VELOCITY_STAGE)
-
-
-def _ignore(_text: str) -> None:
-    pass
 
 
 def _timer() -> ctypes.c_void_p | None:

@@ -12,6 +12,7 @@ import numpy as np
 from dh2sim.errors import EngineError
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import unloaded_gains
+from dh2sim.mujoco_warnings import mujoco_warnings
 from dh2sim.typing import Array, read_only
 
 FREE_TURN: Final = math.pi
@@ -71,7 +72,8 @@ def compile_plant(mjcf: str, robot: RobotModel) -> Plant:
         EngineError: MuJoCo refuses it.
     """
     try:
-        compiled = mujoco.MjModel.from_xml_string(mjcf)
+        with mujoco_warnings():  # a rollout says itself what becomes of it
+            compiled = mujoco.MjModel.from_xml_string(mjcf)
     except ValueError as error:
         raise EngineError(
             f"MuJoCo refuses the robot as it would be simulated: {' '.join(str(error).split())}"

@@ -123,6 +123,8 @@ class RobotReport:
     checks: tuple[Check, ...]
     slips: tuple[Slip, ...] = ()
     """What looks like a slip in the robot; it fails nothing."""
+    warnings: tuple[str, ...] = ()
+    """What MuJoCo finds questionable in the files, a sentence each; it fails nothing."""
 
     @property
     def ok(self) -> bool:
@@ -138,6 +140,7 @@ class RobotReport:
             "reach": self.reach,
             "engines": [check.to_json() for check in self.checks],
             "notes": [slip.to_json() for slip in self.slips],
+            "warnings": list(self.warnings),
         }
 
 

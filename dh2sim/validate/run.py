@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,6 +23,7 @@ from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.slips import find_slips
+from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
 from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
 from dh2sim.validate.dynamics import check_dynamics, check_inertias
@@ -94,12 +96,16 @@ def validate_robot(
         raise Dh2simError(f"samples must be a whole number of at least 1, got {samples!r}")
     model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
     arm = None if source is None else SourceArm.read(source, source_options or ImportOptions(), model)
-    if folder is not None:
-        finish_interrupted(folder.parent, folder.name)
-        return _validate(model, folder, samples, seed, tolerance, arm, advance)
-    with TemporaryDirectory(prefix="dh2sim-") as temporary:
-        export_robot(model, Path(temporary), verified=False)
-        return _validate(model, Path(temporary) / model.name, samples, seed, tolerance, arm, advance)
+    with mujoco_warnings() as warned:
+        if folder is not None:
+            finish_interrupted(folder.parent, folder.name)
+            report = _validate(model, folder, samples, seed, tolerance, arm, advance)
+        else:
+            with TemporaryDirectory(prefix="dh2sim-") as temporary:
+                export_robot(model, Path(temporary), verified=False)
+                made = Path(temporary) / model.name
+                report = _validate(model, made, samples, seed, tolerance, arm, advance)
+    return replace(report, warnings=warning_sentences(warned, [joint.name for joint in model.moving_joints]))
 
 
 def _validate(

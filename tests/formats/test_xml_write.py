@@ -9,11 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dh2sim.errors import NotFiniteError
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.formats.xml_write import number, numbers
 from dh2sim.model.build import build_model
+from dh2sim.model.mass import MassProperties
 from dh2sim.robot.spec import Limits, LinkSpec, RobotSpec, Row, SourceFile
 from dh2sim.typing import read_only
 from tests.formats.readers import in_check_urdf, in_mujoco, parsed
@@ -128,3 +130,21 @@ def test_limits_that_are_assumed_of_all_joints_are_said_in_one_line() -> None:
     (assumed,) = model("planar_2r").assumptions
     assert assumed.sentence == "Assumed, not given: velocity, effort limits of all joints."
     assert (assumed.what, assumed.where) == (("velocity", "effort"), ("joint_1", "joint_2"))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_number_that_is_not_finite_is_never_written(value: float) -> None:
+    """Whatever a defect makes of a model, its place is named and nothing is written."""
+    built = model("planar_2r")
+    second = dataclasses.replace(built.joints[1], actuator=dataclasses.replace(built.joints[1].actuator, kp=value))
+    with pytest.raises(NotFiniteError) as refusal:
+        to_mjcf(dataclasses.replace(built, joints=(built.joints[0], second)))
+    assert str(refusal.value) == (
+        f"mujoco.actuator.position[joint_2_position].kp: {value} is not a finite number, and is not written. This is "
+        "a defect of dh2sim: please report it with the robot file"
+    )
+    heavy = dataclasses.replace(
+        built.links[0], inertial=MassProperties(mass=1.0, com=np.array([0, 0, value]), inertia=np.eye(3))
+    )
+    with pytest.raises(NotFiniteError, match=r"^robot\.link\[link_1\]\.inertial\.origin\.xyz: 0\.0 0\.0 "):
+        to_urdf(dataclasses.replace(built, links=(heavy, built.links[1])))

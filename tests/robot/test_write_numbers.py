@@ -10,10 +10,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dh2sim.errors import ModelError
+from dh2sim.errors import ModelError, NotFiniteError
 from dh2sim.robot.fields import Dimension
-from dh2sim.robot.spec import AngleUnit, LengthUnit, Units
-from dh2sim.robot.write import UnitWriter, number
+from dh2sim.robot.spec import AngleUnit, Convention, JointType, LengthUnit, Row, Units
+from dh2sim.robot.write import PartWriter, UnitWriter, number
 from dh2sim.robot.yaml_tree import resolve_plain
 
 DEGREES = UnitWriter(units=Units(angle=AngleUnit.DEG))
@@ -150,3 +150,11 @@ def test_numbers_too_large_for_the_unit_are_refused() -> None:
     with pytest.raises(ModelError) as length:
         _length_writer(LengthUnit.MM).length(-1e306)
     assert str(length.value) == "-1e+306 m is too large to be written in mm"
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_number_that_is_not_finite_is_never_written(value: float) -> None:
+    with pytest.raises(NotFiniteError, match=rf"^d: {value} is not a finite number"):
+        PartWriter(UnitWriter(), None).part(
+            Row(name="a", type=JointType.FIXED, convention=Convention.STANDARD, d=value)
+        )

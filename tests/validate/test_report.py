@@ -24,7 +24,7 @@ def test_the_report_has_the_shape_of_the_contract(tmp_path: Path) -> None:
     report = validated(write(tmp_path, ODD))
     assert set(report) == {"ok", "robots"}
     [robot] = report["robots"]
-    assert set(robot) == {"name", "ok", "samples", "reach", "engines", "notes"}
+    assert set(robot) == {"name", "ok", "samples", "reach", "engines", "notes", "warnings"}
     assert (report["ok"], robot["name"], robot["ok"], robot["samples"]) == (True, "odd", True, 20)
     poses = [entry for entry in robot["engines"] if entry["quantity"] == "pose" and entry["ok"] is not None]
     assert [set(entry) - {"reference", "samples"} for entry in poses] == [POSE] * (6 if PYBULLET else 5)

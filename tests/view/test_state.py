@@ -255,8 +255,10 @@ def test_a_very_long_cell_is_refused_and_cut_short() -> None:
 
 
 def test_an_edit_that_makes_a_robot_too_large_to_be_drawn_is_refused() -> None:
-    state = after(STANFORD, events.EditCell(row=0, column="a", text="2e6"))
-    assert state.table.errors[0].message == "the robot's frames reach 2e+06 m; at most 1e+06 m can be shown"
+    state = after(
+        STANFORD, events.EditCell(row=0, column="a", text="8e5"), events.EditCell(row=1, column="a", text="8e5")
+    )
+    assert state.table.errors[0].message == "the robot's frames reach 1.6e+06 m; at most 1e+06 m can be shown"
 
 
 def test_reading_a_row_in_another_convention_makes_another_robot_of_the_same_numbers() -> None:

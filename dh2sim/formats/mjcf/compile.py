@@ -13,6 +13,7 @@ from dh2sim.errors import ImportedFileError, ModelError, Problem
 from dh2sim.formats.mjcf.includes import MjcfFiles
 from dh2sim.limited_process import WorkerError, ask_worker, start_worker
 from dh2sim.messages import Notes
+from dh2sim.mujoco_warnings import warning_sentences
 
 if TYPE_CHECKING:
     import mujoco
@@ -84,8 +85,8 @@ def compile_mjcf(files: MjcfFiles, notes: Notes) -> Compiled:
         facts, model = _compiled(path=str(files.path), folders=[str(folder) for folder in files.folders])
     except WorkerError as error:
         raise files.error(f"MuJoCo cannot compile the file: {error}") from None
-    for text in dict.fromkeys(facts["warnings"]):
-        notes.add(f"MuJoCo warns: {' '.join(text.split()).rstrip('.')}.")
+    for sentence in warning_sentences(facts["warnings"]):
+        notes.add(sentence)
     if model is None:
         raise _refused(files, facts["refused"])
     if (reason := facts["meshes_refused"]) is not None:

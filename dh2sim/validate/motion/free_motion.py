@@ -14,6 +14,7 @@ from dh2sim.formats.mjcf.write import EXPORTED, MjcfOptions, to_mjcf
 from dh2sim.model.collision_exclusions import ExcludedPair, Reason
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
+from dh2sim.mujoco_warnings import mujoco_warnings
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.typing import Array
 from dh2sim.validate.motion.mechanics import BaseMotion
@@ -89,7 +90,8 @@ def compile_model(model: RobotModel, options: MjcfOptions = EXPORTED, *, surroun
     scene = f'<mujoco><include file="robot.xml"/><worldbody>{surroundings}</worldbody></mujoco>'
     text = to_mjcf(without_meshes(model), options)
     try:
-        compiled = mujoco.MjModel.from_xml_string(scene, {"robot.xml": text.encode()})
+        with mujoco_warnings():  # of bodies; what becomes of a motion is checked
+            compiled = mujoco.MjModel.from_xml_string(scene, {"robot.xml": text.encode()})
     except ValueError as error:
         raise EngineError(f"MuJoCo refuses the model: {' '.join(str(error).split())}") from error
     keep_centers_of_mass(compiled)

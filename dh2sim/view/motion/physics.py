@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from dh2sim.kinematics.chain import joint_vector
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators
+from dh2sim.mujoco_warnings import mujoco_warnings
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.mujoco_runtime import quiet_engine
 from dh2sim.typing import Array, read_only
@@ -94,7 +95,8 @@ def compile_on_floor(model: RobotModel, start: ArrayLike) -> mujoco.MjModel:
     data, world = mujoco.MjData(compiled), 0
     places = [compiled.joint(joint.name).qposadr[0] for joint in model.moving_joints]
     data.qpos[places] = joint_vector(model.chain, start)
-    mujoco.mj_fwdPosition(compiled, data)
+    with mujoco_warnings():
+        mujoco.mj_fwdPosition(compiled, data)
     pairs = compiled.geom_bodyid[data.contact.geom]
     in_floor = pairs[(pairs == world).any(axis=1)].max(axis=1, initial=world)
     compiled.geom_contype[np.isin(compiled.geom_bodyid, in_floor)] &= ~_STOPPED_BY_FLOOR
@@ -290,8 +292,9 @@ class Physics:
 
     def _derived(self, qpos: Array, qvel: Array) -> mujoco.MjData:
         self._scratch.qpos[:], self._scratch.qvel[:] = qpos, qvel
-        mujoco.mj_fwdPosition(self._model, self._scratch)
-        mujoco.mj_fwdVelocity(self._model, self._scratch)
+        with mujoco_warnings():  # of a singular inertia; a simulation that it makes unstable stops
+            mujoco.mj_fwdPosition(self._model, self._scratch)
+            mujoco.mj_fwdVelocity(self._model, self._scratch)
         return self._scratch
 
     def _holding_controls(self) -> Array:
