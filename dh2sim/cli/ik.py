@@ -155,6 +155,7 @@ def _read(spec: RobotSpec, options: _Options) -> _Asked:
     import numpy as np
 
     from dh2sim.cli.goal import joints_before, read_pose_file
+    from dh2sim.inverse.goals import FARTHEST
     from dh2sim.kinematics.forward import forward_kinematics
 
     problems: list[tuple[str, str]] = []
@@ -193,14 +194,14 @@ def _read(spec: RobotSpec, options: _Options) -> _Asked:
     elif at is not None:
         with np.errstate(all="ignore"):
             T = forward_kinematics(shortened, at[:count])
-        if not np.isfinite(T).all():
-            problems.append(("at", "reaches a pose that is too large for a floating-point number"))
     elif options.xyz is not None:
         T = _typed(spec, options, problems)
         if not orientations:
             free = free or "rotation"
             if options.free == "roll":
                 problems.append(("free", "roll needs an orientation: --rpy or --quaternion"))
+    if not bool(np.abs(T[:3, 3]).max() <= FARTHEST):
+        problems.append((ways[0].removeprefix("--"), f"is a pose farther away than {FARTHEST:g} m"))
     lock = _locked(spec, shortened, options, problems)
     if problems and wrong_file:
         complain(wrong_file)

@@ -13,6 +13,8 @@ from dh2sim.typing import Array
 
 Free: TypeAlias = Literal["rotation", "roll"]
 """What a goal leaves open: the whole orientation, or the roll about tool0's z."""
+FARTHEST: Final = 1e12
+"""m: positions farther away are beyond any robot, and their squares beyond doubles in the end."""
 TOLERANCE: Final = 1e-3
 """Largest error of a rotation matrix: single precision and typed numbers are accepted."""
 
@@ -40,6 +42,8 @@ def read_goals(T: ArrayLike) -> Array:
         *which, row, column = (int(i) for i in np.argwhere(~np.isfinite(poses))[0])
         element = f"{_name(which)}'s element in row {row + 1}, column {column + 1}"
         raise ConfigurationError(f"{element} is {poses[*which, row, column]}: it must be finite")
+    if np.abs(poses[..., :3, 3]).max(initial=0.0) > FARTHEST:
+        raise ConfigurationError(f"positions of goals must be within {FARTHEST:g} m")
     R = poses[..., :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
         skewed = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-2, -1))

@@ -316,6 +316,7 @@ def test_a_pose_file_may_be_indented_with_tabs(tmp_path: Path) -> None:
                 "--lock joint_2 is given twice",
             ],
         ),
+        (["--xyz", "1", "2", "1e300"], ["--xyz is a pose farther away than 1e+12 m"]),
         (["--at", "home", "--free", "pitch"], ["--free must be one of rotation, roll, got 'pitch'"]),
         (
             ["--at", "home", "--frame", "dh_7"],
@@ -327,7 +328,7 @@ def test_a_pose_file_may_be_indented_with_tabs(tmp_path: Path) -> None:
         ),
     ],
     ids=[
-        "none", "two", "rpy", "quaternion", "expressions", "count", "locks", "free", "frame", "behind",
+        "none", "two", "rpy", "quaternion", "expressions", "count", "locks", "far", "free", "frame", "behind",
     ],
 )  # fmt: skip
 def test_wrong_options_are_all_reported(arguments: list[str], messages: list[str]) -> None:
