@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Final, TypeAlias
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.inverse.textbook_axes import arm_axes
-from dh2sim.inverse.textbook_forms import TextbookArm, WholePlanarArm, textbook_form
+from dh2sim.inverse.textbook_forms import TextbookForm, textbook_form
 from dh2sim.kinematics.chain import ChainLike, chain_of, joint_vectors
 from dh2sim.typing import Array
-
-TextbookForm: TypeAlias = TextbookArm | WholePlanarArm
 
 ABOUT: Final = 0.02
 """Angles, rad, and lengths as a share of the arm's size, by which an arm may miss the class that names it."""

@@ -63,6 +63,47 @@ class ArmPart(Protocol):
         ...
 
 
+def placed_point(
+    sheet: Worksheet, axes: ArmAxes, W0: Array, T: Array, T_base_link_arm: Array | None, title: str
+) -> Array:
+    """Write where the point that an arm places must be for a pose, and return it.
+
+    Args:
+        sheet: The worksheet.
+        axes: The robot's axes.
+        W0: The point at zero in base_link, m, shape (3,).
+        T: The goal of tool0 in base_link, shape (4, 4).
+        T_base_link_arm: Frame 0 of the derivation, shape (4, 4), if it has one.
+        title: Of the step.
+
+    Returns:
+        In base_link, m, shape (3,).
+    """
+    c = axes.T_home[:3, :3].T @ (W0 - axes.tip)
+    c = np.where(np.abs(c) <= 1e-12 * axes.size, 0.0, c)
+    W = T[:3, :3] @ c + T[:3, 3]
+    moved = T_base_link_arm is not None and not np.allclose(T_base_link_arm, np.eye(4), rtol=0.0, atol=1e-12)
+    if norm(c) == 0.0:
+        formula, remark = "p_w = p", "It is where tool0 is."
+    elif norm(c[:2]) == 0.0:
+        n = len(axes.joints)
+        formula = f"p_w = p {'-' if c[2] < 0.0 else '+'} d{n} z{n}"
+        remark = f"z{n} is the third column of the goal; d{n} = {sheet.measure(abs(float(c[2])))}."
+    else:
+        formula = "p_w = p + R c"
+        remark = f"It is at c = ({', '.join(sheet.length(float(x)) for x in c)}) in tool0; R is the goal's rotation."
+    where = "frame 0 of the derivation" if moved else "base_link"
+    sheet.step(title, formula, remark=f"{remark} x, y, z are those of p_w in {where}.")
+    for letter, value, part in zip("xyz", W.tolist(), T[:3, 3].tolist(), strict=True):
+        text = sheet.length(part) + term(sheet.length(value - part)) if norm(c) else ""
+        sheet.line(f"p_w{letter}" if moved else letter, value, METRE, text)
+    if moved and T_base_link_arm is not None:
+        local = T_base_link_arm[:3, :3].T @ (W - T_base_link_arm[:3, 3])
+        for letter, value in zip("xyz", local.tolist(), strict=True):
+            sheet.line(letter, value, METRE, "")
+    return np.asarray(W)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FromAngle:
     """How a joint's coordinate follows from an angle that is measured on the mechanism."""
@@ -102,14 +143,14 @@ class FromAngle:
 
     def write(self, sheet: Worksheet, angle: float, numbers: str, signs: Signs) -> float:
         """Write the angle and the coordinate, and return the coordinate, rad."""
+        sheet.turned(self.symbol, angle, numbers, signs)
         angle = wrapped(angle)
-        coordinate = wrapped(self.sense * (angle - self.at_zero))
-        sheet.line(self.symbol, angle, RAD, numbers, signs)
+        coordinate = self.sense * (angle - self.at_zero)
         if not self.plain:
             first, second = (angle, self.at_zero) if self.sense == 1 else (self.at_zero, angle)
             shown = sheet.angle(first) + term(sheet.angle(-second)) if self.at_zero != 0.0 else ""
-            sheet.line(f"q{self.joint}", coordinate, RAD, shown, signs)
-        return coordinate
+            sheet.turned(f"q{self.joint}", coordinate, shown, signs)
+        return wrapped(coordinate)
 
 
 def from_angle(joint: int, letter: str, at_zero: float, sense: float = 1.0) -> FromAngle:
@@ -360,7 +401,7 @@ def elbow_name(bend: float, names: tuple[str, str]) -> Iterator[str]:
         yield names[0] if math.sin(bend) > 0.0 else names[1]
 
 
-def _shoulder(axes: ArmAxes, W0: Array) -> tuple[Shoulder, Array, Array, Array]:
+def shoulder_of(axes: ArmAxes, W0: Array) -> tuple[Shoulder, Array, Array, Array]:
     """Return the shoulder of an arm whose axes 1 and 2 are at right angles; f, y and z in base_link at zero."""
     T = axes.base_frame(0)
     x, y, z = T[:3, 0], T[:3, 1], T[:3, 2]
@@ -377,7 +418,7 @@ def _shoulder(axes: ArmAxes, W0: Array) -> tuple[Shoulder, Array, Array, Array]:
         Shoulder(
             T_base_link_arm=T,
             azimuth=from_angle(1, "φ", math.atan2(float(f @ y), float(f @ x))),
-            offset=_length(axes, offset),
+            offset=length_of(axes, offset),
             size=axes.size,
             tolerance=axes.tolerance * axes.size,
             front=before,
@@ -388,7 +429,7 @@ def _shoulder(axes: ArmAxes, W0: Array) -> tuple[Shoulder, Array, Array, Array]:
     )
 
 
-def _length(axes: ArmAxes, value: float) -> float:
+def length_of(axes: ArmAxes, value: float) -> float:
     """Return a length, m; zero where only rounding is left."""
     return 0.0 if abs(value) <= 1e-12 * axes.size else value
 
@@ -397,7 +438,7 @@ def elbow_arm(axes: ArmAxes, W0: Array) -> ElbowArm | None:
     """Return joints 1 to 3 as an elbow arm that places a point, at zero in base_link; None if they are not."""
     if axes.kinds[:3] != "RRR" or not axes.perpendicular(0, 1) or not axes.parallel(1, 2):
         return None
-    shoulder, f, e, z = _shoulder(axes, W0)
+    shoulder, f, e, z = shoulder_of(axes, W0)
     origin = shoulder.T_base_link_arm[:3, 3]
     upper = axes.joints[2].point - axes.joints[1].point
     fore = W0 - axes.joints[2].point
@@ -409,8 +450,8 @@ def elbow_arm(axes: ArmAxes, W0: Array) -> ElbowArm | None:
     bend = math.atan2(float(fore @ z), float(fore @ f)) - rise
     return ElbowArm(
         shoulder=shoulder,
-        a1=_length(axes, float((axes.joints[1].point - origin) @ f)),
-        d1=_length(axes, float((axes.joints[1].point - origin) @ z)),
+        a1=length_of(axes, float((axes.joints[1].point - origin) @ f)),
+        d1=length_of(axes, float((axes.joints[1].point - origin) @ z)),
         l2=l2,
         l3=l3,
         # turning about e takes f downwards
@@ -521,17 +562,17 @@ def spherical_arm(axes: ArmAxes, W0: Array) -> SphericalArm | None:
     """Return joints 1 to 3 as a spherical arm that places a point, at zero in base_link; None if they are not."""
     if axes.kinds[:3] != "RRP" or not axes.perpendicular(0, 1) or not axes.perpendicular(1, 2):
         return None
-    shoulder, f, e, z = _shoulder(axes, W0)
+    shoulder, f, e, z = shoulder_of(axes, W0)
     P2, s = axes.joints[1].point, axes.joints[2].direction
     origin = shoulder.T_base_link_arm[:3, 3]
     slope = math.atan2(float(s @ f), float(s @ z))
     beside = f * math.cos(slope) - z * math.sin(slope)
     return SphericalArm(
         shoulder=shoulder,
-        a1=_length(axes, float((P2 - origin) @ f)),
-        d1=_length(axes, float((P2 - origin) @ z)),
-        b=_length(axes, float((W0 - P2) @ beside)),
-        c=_length(axes, float((W0 - P2) @ s)),
+        a1=length_of(axes, float((P2 - origin) @ f)),
+        d1=length_of(axes, float((P2 - origin) @ z)),
+        b=length_of(axes, float((W0 - P2) @ beside)),
+        c=length_of(axes, float((W0 - P2) @ s)),
         slope=from_angle(2, "ψ", slope, float(axes.joints[1].direction @ e)),
         forearm=s * axes.size,
     )
@@ -606,15 +647,15 @@ def cylindrical_arm(axes: ArmAxes, W0: Array) -> CylindricalArm | None:
         shoulder=Shoulder(
             T_base_link_arm=T,
             azimuth=from_angle(turn + 1, "φ", math.atan2(float(f @ T[:3, 1]), float(f @ T[:3, 0]))),
-            offset=_length(axes, float(relative @ e)),
+            offset=length_of(axes, float(relative @ e)),
             size=axes.size,
             tolerance=axes.tolerance * axes.size,
         ),
         turn=turn,
         lift=1 - turn,
         upwards=1 if float(axes.joints[1 - turn].direction @ z) > 0.0 else -1,
-        height=_length(axes, float(relative @ z)),
-        c=_length(axes, float(relative @ f)),
+        height=length_of(axes, float(relative @ z)),
+        c=length_of(axes, float(relative @ f)),
         forearm=f * axes.size,
     )
 

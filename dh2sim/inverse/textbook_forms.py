@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
-from dh2sim.inverse.textbook_arms import ArmPart, PartialBranch, arm_part
-from dh2sim.inverse.textbook_axes import ArmAxes, norm
+from dh2sim.inverse.textbook_arms import ArmPart, PartialBranch, arm_part, placed_point
+from dh2sim.inverse.textbook_axes import ArmAxes
+from dh2sim.inverse.textbook_offset_wrist import OffsetWristArm, offset_wrist_arm
 from dh2sim.inverse.textbook_planar import PlanarArm, planar_arm
-from dh2sim.inverse.textbook_steps import METRE, Worksheet, term
+from dh2sim.inverse.textbook_steps import Worksheet
 from dh2sim.inverse.textbook_wrists import Wrist, wrist
 from dh2sim.typing import Array
 
@@ -35,50 +37,13 @@ class TextbookArm:
         branches = [PartialBranch(signs=(), q=())]
         if self.arm is not None:
             self.arm.describe(sheet)
-            self._write_centre(sheet, T)
-            branches = self.arm.solve(sheet, self._centre(T))
+            shoulder = getattr(self.arm, "shoulder", None)
+            frame = shoulder.T_base_link_arm if shoulder else getattr(self.arm, "T_base_link_arm", None)
+            title = "The wrist centre" if self.wrist is not None else "The point to be reached"
+            branches = self.arm.solve(sheet, placed_point(sheet, self.axes, self.W0, T, frame, title))
         if self.wrist is not None and branches:
             branches = self.wrist.solve(sheet, branches, T[:3, :3])
         return branches
-
-    def _centre(self, T: Array) -> Array:
-        return np.asarray(T[:3, :3] @ self._in_tool + T[:3, 3])
-
-    @property
-    def _in_tool(self) -> Array:
-        c = self.axes.T_home[:3, :3].T @ (self.W0 - self.axes.tip)
-        return np.where(np.abs(c) <= 1e-12 * self.axes.size, 0.0, c)
-
-    def _write_centre(self, sheet: Worksheet, T: Array) -> None:
-        """Write where the wrist's centre must be."""
-        c = self._in_tool
-        along = norm(c[:2]) == 0.0
-        if norm(c) == 0.0:
-            formula, remark = "p_w = p", "tool0 is at the point that the arm places."
-        elif along:
-            n = len(self.axes.joints)
-            formula = f"p_w = p - d{n} z{n}" if c[2] < 0.0 else f"p_w = p + d{n} z{n}"
-            remark = f"z{n} is the third column of the goal; d{n} = {sheet.measure(abs(float(c[2])))}."
-        else:
-            formula = "p_w = p + R c"
-            remark = f"The wrist centre is at c = ({', '.join(sheet.length(float(x)) for x in c)}) in tool0."
-        T_frame = getattr(self.arm, "T_base_link_arm", None)
-        shoulder = getattr(self.arm, "shoulder", None)
-        T_frame = shoulder.T_base_link_arm if shoulder is not None else T_frame
-        W = self._centre(T)
-        moved = T_frame is not None and not np.allclose(T_frame, np.eye(4), rtol=0.0, atol=1e-12)
-        more = " x, y, z are those of p_w in frame 0." if moved else " x, y, z are those of p_w."
-        sheet.step(
-            "The wrist centre" if self.wrist is not None else "The point to be reached", formula, remark=remark + more
-        )
-        offset = T[:3, :3] @ c
-        for letter, value, part, extra in zip("xyz", W, T[:3, 3], offset, strict=True):
-            text = sheet.length(float(part)) + term(sheet.length(float(extra))) if norm(c) else ""
-            sheet.line(f"p_w{letter}" if moved else letter, float(value), METRE, text)
-        if moved and T_frame is not None:
-            local = T_frame[:3, :3].T @ (W - T_frame[:3, 3])
-            for letter, value in zip("xyz", local.tolist(), strict=True):
-                sheet.line(letter, value, METRE, "")
 
     def names(self, q: Array) -> tuple[str, ...]:
         """Return the names of a configuration's branch."""
@@ -110,7 +75,10 @@ class WholePlanarArm:
         return self.planar.names(q, np.zeros(3))
 
 
-def textbook_form(axes: ArmAxes) -> TextbookArm | WholePlanarArm | str:
+TextbookForm: TypeAlias = TextbookArm | WholePlanarArm | OffsetWristArm
+
+
+def textbook_form(axes: ArmAxes) -> TextbookForm | str:
     """Return the closed form that an arm has, or why the textbooks have none for it, as a sentence."""
     n = len(axes.joints)
     if n < 2 or n > 6:
@@ -131,6 +99,8 @@ def textbook_form(axes: ArmAxes) -> TextbookArm | WholePlanarArm | str:
         W0 = axes.foot(3, axes.tip)
     else:
         W0 = axes.meeting_point(range(3, n))
+    if W0 is None and (offset := offset_wrist_arm(axes)) is not None:
+        return offset
     if W0 is None:
         last = ", ".join(str(i) for i in range(4, n)) + f" and {n}"
         return f"Axes {last} do not meet in one point, so that position and orientation do not come apart."

@@ -19,6 +19,7 @@ from dh2sim.inverse.textbook_arms import (
     first_link_angle,
     from_angle,
     law_of_cosines,
+    placed_point,
 )
 from dh2sim.inverse.textbook_axes import ArmAxes, norm, wrapped
 from dh2sim.inverse.textbook_steps import METRE, RAD, Signs, Worksheet, term
@@ -31,7 +32,7 @@ class PlanarArm:
 
     T_base_link_arm: Array = field(repr=False)
     """Frame 0 of the derivation: z along the first turning axis; shape (4, 4)."""
-    T_home: Array = field(repr=False)
+    axes: ArmAxes = field(repr=False)
     turns: tuple[int, ...]
     """Joints that turn, counted from 0."""
     senses: tuple[int, ...]
@@ -43,7 +44,7 @@ class PlanarArm:
     l1: float
     l2: float
     point: Array
-    """What the two links place, in tool0, m, shape (3,): tool0 itself, or on the third axis."""
+    """What the two links place, at zero in base_link, m, shape (3,): tool0 itself, or on the third axis."""
     height: float
     """Of that point at zero, m."""
     azimuth: FromAngle
@@ -115,20 +116,13 @@ class PlanarArm:
 
     def solve_pose(self, sheet: Worksheet, T: Array) -> list[PartialBranch]:
         """Write the steps to a pose of tool0 in base_link, shape (4, 4), of an arm that is nothing more than this."""
-        W = T[:3, :3] @ self.point + T[:3, 3]
-        x, y, z = self.T_base_link_arm[:3, :3].T @ (W - self.T_base_link_arm[:3, 3])
         third = self.turns[2] if len(self.turns) == 3 else None
-        sheet.step(
-            "The point that the two links place",
-            "p = position of tool0" if third is None else f"p = position of tool0 + R c,  on axis {third + 1}",
-            remark="x, y, z are those of p in frame 0.",
-        )
-        for letter, value in (("x", x), ("y", y), ("z", z)):
-            sheet.line(letter, float(value), METRE, "")
+        title = "The point that the two links place" + ("" if third is None else f", on axis {third + 1}")
+        W = placed_point(sheet, self.axes, self.point, T, self.T_base_link_arm, title)
         found = self.solve(sheet, W)
         if third is None:
             return found
-        R = self.T_base_link_arm[:3, :3].T @ T[:3, :3] @ self.T_home[:3, :3].T @ self.T_base_link_arm[:3, :3]
+        R = self.T_base_link_arm[:3, :3].T @ T[:3, :3] @ self.axes.T_home[:3, :3].T @ self.T_base_link_arm[:3, :3]
         turned = math.atan2(R[1, 0], R[0, 0])
         a, b, c = (f"q{joint + 1}" for joint in self.turns)
         first, second, last = self.senses
@@ -143,9 +137,10 @@ class PlanarArm:
         for branch in found:
             q = dict(zip(order, branch.q, strict=True))
             parts = (first * q[self.turns[0]], second * q[self.turns[1]])
-            q[third] = wrapped(last * (turned - parts[0] - parts[1]))
+            angle = last * (turned - parts[0] - parts[1])
+            q[third] = wrapped(angle)
             text = sheet.angle(turned) + "".join(term(sheet.angle(-part)) for part in parts)
-            sheet.line(c, q[third], RAD, text if last > 0 else f"-({text})", branch.signs)
+            sheet.turned(c, angle, text if last > 0 else f"-({text})", branch.signs)
             whole.append(PartialBranch(signs=branch.signs, q=tuple(q[joint] for joint in sorted(q))))
         return whole
 
@@ -188,14 +183,14 @@ def planar_arm(axes: ArmAxes, count: int, W0: Array | None = None) -> PlanarArm 
     height = float((end - T[:3, 3]) @ z)
     return PlanarArm(
         T_base_link_arm=T,
-        T_home=axes.T_home,
+        axes=axes,
         turns=tuple(turns),
         senses=senses,
         slide=slides[0] if slides else None,
         upwards=1 if not slides or float(axes.joints[slides[0]].direction @ z) > 0.0 else -1,
         l1=norm(upper),
         l2=norm(fore),
-        point=np.asarray(axes.T_home[:3, :3].T @ (end - axes.tip)),
+        point=end,
         height=0.0 if abs(height) <= 1e-12 * axes.size else height,
         azimuth=from_angle(turns[0] + 1, "φ1", rise),
         bend=from_angle(turns[1] + 1, "γ", bend, senses[1]),

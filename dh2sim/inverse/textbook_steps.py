@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from dh2sim.inverse.textbook_axes import wrapped
 from dh2sim.robot.spec import AngleUnit, Units
 from dh2sim.typing import Array
 
@@ -116,6 +117,12 @@ class Worksheet:
         suffix = f" {self._unit}" if unit == METRE else ""
         numbers = f"{formula} = {shown}{suffix}" if formula and formula != shown else f"{shown}{suffix}"
         self._steps[-1].lines.append(Line(symbol=symbol, value=value, unit=unit, numbers=numbers, signs=signs))
+
+    def turned(self, symbol: str, angle: float, formula: str, signs: Signs = ()) -> None:
+        """Write a line whose value is an angle, rad, brought into (-pi, pi] by whole turns."""
+        value = wrapped(angle)
+        turns = 2.0 * math.pi * round((value - angle) / (2.0 * math.pi))
+        self.line(symbol, value, RAD, formula + term(self.angle(turns)) if formula and turns else formula, signs)
 
     def letter(self, symbol: str, value: float, unit: str, meaning: str = "") -> None:
         """Write what a letter of the formulas stands for: a length, m, or an angle, rad, of the mechanism."""

@@ -52,6 +52,18 @@ def _spherical(x: Lengths, *, offsets: bool) -> list[Row]:
     ]
 
 
+def _offset_wrist(x: Lengths, *, offsets: bool) -> list[Row]:
+    a1, a4 = (x(), x()) if offsets else (0.0, 0.0)
+    return [
+        row("j1", a=a1, alpha=_RIGHT, d=x()),
+        row("j2", a=x(), d=x()),
+        row("j3", a=x()),
+        row("j4", a=a4, alpha=_RIGHT, d=x()),
+        row("j5", alpha=-_RIGHT, d=x()),
+        row("j6", d=x()),
+    ]
+
+
 def _planar(count: int, x: Lengths) -> list[Row]:
     return [row(f"j{i + 1}", a=x(), d=x(), alpha=math.pi if i == 1 else 0.0) for i in range(count)]
 
@@ -82,6 +94,8 @@ _CLASSES: Final[dict[str, tuple[int, Callable[[Lengths], list[Row]]]]] = {
     "planar 2R": (1, lambda x: _planar(2, x)),
     "planar 3R": (2, lambda x: _planar(3, x)),
     "spherical wrist": (2, lambda x: _wrist(x())),
+    "offset wrist": (8, lambda x: _offset_wrist(x, offsets=False)),
+    "offset wrist with more offsets": (8, lambda x: _offset_wrist(x, offsets=True)),
     "elbow alone": (1, lambda x: [row("j1", alpha=-_RIGHT, d=x()), row("j2", a=x(), d=x()), row("j3", a=x())]),
     "spherical alone": (1, lambda x: [row("j1", alpha=-_RIGHT, d=x()), row("j2", alpha=_RIGHT, d=x()), _slide("j3")]),
     "cylindrical alone": (1, lambda x: [row("j1", d=x()), _slide("j2", -_RIGHT), _slide("j3", d=x())]),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from dh2sim.errors import ConfigurationError
+from dh2sim.inverse.solver import inverse_kinematics
 from dh2sim.inverse.textbook import Explanation, explain
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
@@ -62,7 +63,7 @@ def test_an_arm_in_any_disguise_is_recognised_and_its_own_configuration_is_among
 @pytest.mark.parametrize("name", CLASSES)
 def test_branches_differ_from_each_other_in_signs_names_and_coordinates(name: str) -> None:
     most = 0
-    for seed in range(6):
+    for seed in range(20):
         spec = disguised(textbook_table(name, seed), seed + 100)
         branches = explain(spec, table_tool_pose(spec, random_configuration(spec, seed))).branches
         most = max(most, len(branches))
@@ -235,6 +236,18 @@ def test_text_fits_into_80_columns(name: str) -> None:
     spec = replace(spec, base=textbook_table(name, 4).base)
     explanation = explain(spec, table_tool_pose(spec, random_configuration(spec, 4)))
     assert max(len(line) for line in explanation.lines) <= 80
+
+
+@pytest.mark.parametrize("name", ["puma", "elbow with offsets", "stanford", "cylindrical", "offset wrist"])
+def test_the_closed_form_has_the_branches_that_the_complete_solver_finds(name: str) -> None:
+    for seed in range(3):
+        spec = disguised(textbook_table(name, seed), seed + 20)
+        T = table_tool_pose(spec, random_configuration(spec, seed))
+        by_hand = [branch.q for branch in explain(spec, T).branches]
+        solved = inverse_kinematics(spec, T, limits=False)
+        assert len(solved) == len(by_hand)
+        for q in solved:
+            assert min(angle_between(spec, q, other) for other in by_hand) < 1e-8
 
 
 def test_the_text_has_formulas_in_letters_then_with_numbers_and_a_table_of_branches() -> None:
