@@ -2,7 +2,8 @@
 
 What does not change when a joint moves may as well belong to the link before. Of a link that turns, that is its
 mass, its first moment along the axis and a moment of inertia across it, as of a thin rod along the axis; of a link
-that slides, its inertia, for it turns as the link before does.
+that slides, its inertia, for it turns as the link before does, and if it can turn about the slide's direction alone,
+its first moment.
 
 M. Gautier, W. Khalil, Direct calculation of minimum set of inertial parameters of serial robots, IEEE Transactions on
 Robotics and Automation 6(3), 1990.
@@ -16,7 +17,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from dh2sim.codegen.mechanism import Mechanism, MovingJoint
+from dh2sim.codegen.mechanism import Mechanism, MovingJoint, Turn
 from dh2sim.codegen.newton_euler import InertialParameters
 from dh2sim.codegen.trace import Number, Trace
 from dh2sim.kinematics.transforms import compose, identity, joint_part, rotate_tensor
@@ -27,6 +28,8 @@ from dh2sim.model.robot_model import RobotModel
 _ROUNDING: Final = 4e-15
 """Share of the greatest parameter of its kind and link, below which a parameter is rounding."""
 
+_PARALLEL: Final = 1e-12
+"""Sine of the angle between axes that are parallel but for rounding."""
 _Tensor: TypeAlias = list[list[float]]
 
 
@@ -51,17 +54,37 @@ def base_parameters(model: RobotModel, mechanism: Mechanism, trace: Trace) -> li
         For each moving joint, in its frame.
     """
     links = _links(model, mechanism)
+    rotations = [_rotation(_value(trace, joint.twist), joint.angle) for joint in mechanism.joints]
+    spins = _spin_axes(mechanism, rotations)
     found: list[InertialParameters] = []
     for i in reversed(range(len(links))):
         joint, link = mechanism.joints[i], links[i]
         largest = _largest([link.moment]), _largest(link.inertia)
-        regrouped = _taken(joint, link)
+        regrouped = _taken(joint, link, spins[i])
         if i > 0:
-            offset = [trace.value(value) for value in joint.offset]
-            twist = trace.value(joint.twist.cosine), trace.value(joint.twist.sine)
-            _add(links[i - 1], _moved(regrouped, _rotation(twist, joint.angle), offset))
+            _add(links[i - 1], _moved(regrouped, rotations[i], [trace.value(value) for value in joint.offset]))
         found.insert(0, _named(trace, joint.row, link, *largest))
     return found
+
+
+def _value(trace: Trace, turn: Turn) -> tuple[float, float]:
+    return trace.value(turn.cosine), trace.value(turn.sine)
+
+
+def _spin_axes(mechanism: Mechanism, rotations: Sequence[_Tensor]) -> list[list[float] | None]:
+    """Return, for each joint, the one direction in its frame that its link can turn about; None if there are more.
+
+    The vector is zero where the link cannot turn at all.
+    """
+    axes: list[list[float] | None] = []
+    axis: list[float] | None = [0.0, 0.0, 0.0]
+    for joint, R in zip(mechanism.joints, rotations, strict=True):
+        if axis is not None:
+            axis = [R[0][k] * axis[0] + R[1][k] * axis[1] + R[2][k] * axis[2] for k in range(3)]
+            if joint.turns:
+                axis = [0.0, 0.0, 1.0] if max(abs(axis[0]), abs(axis[1])) <= _PARALLEL else None
+        axes.append(axis)
+    return axes
 
 
 def _links(model: RobotModel, mechanism: Mechanism) -> list[_Link]:
@@ -86,16 +109,32 @@ def _about_origin(body: MassProperties) -> _Link:
     return _Link(body.mass, [body.mass * value for value in com], inertia)
 
 
-def _taken(joint: MovingJoint, link: _Link) -> _Link:
-    """Take from a link, and return, what may belong to the link before."""
+def _taken(joint: MovingJoint, link: _Link, spin: Sequence[float] | None) -> _Link:
+    """Take from a link, and return, what may belong to the link before; what has no effect is taken and lost.
+
+    Args:
+        joint: The joint that moves the link.
+        link: The link.
+        spin: The one direction that it can turn about, if there is no other: its first moment along that has no
+            effect; and across, sliding along that direction does not change it.
+    """
     if joint.turns:
         across = link.inertia[1][1]
         rod = _Link(link.mass, [0.0, 0.0, link.moment[2]], [[across, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, 0.0]])
         link.mass, link.moment[2], link.inertia[1][1] = 0.0, 0.0, 0.0
         link.inertia[0][0] -= across
         return rod
-    inertia, link.inertia = link.inertia, [[0.0] * 3 for _ in range(3)]
-    return _Link(0.0, [0.0] * 3, inertia)
+    taken = _Link(0.0, [0.0] * 3, link.inertia)
+    link.inertia = [[0.0] * 3 for _ in range(3)]
+    if spin is not None and any(spin):
+        k = max(range(3), key=lambda axis: abs(spin[axis]))
+        share = link.moment[k] / spin[k]
+        across_spin = [0.0 if i == k else link.moment[i] - share * spin[i] for i in range(3)]
+        if max(abs(spin[0]), abs(spin[1])) <= _PARALLEL:
+            taken.moment, link.moment = across_spin, [0.0] * 3
+        else:
+            link.moment = across_spin
+    return taken
 
 
 def _rotation(twist: tuple[float, float], angle: float) -> _Tensor:

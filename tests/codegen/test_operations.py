@@ -1,0 +1,51 @@
+"""What code costs, in multiplications and additions: whatever changes that should be seen to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dh2sim.codegen.generate import summarize
+from dh2sim.robot.spec import LinkSpec, RobotSpec
+from dh2sim.typing import read_only
+from tests.codegen.test_base_parameters import with_general_links
+from tests.sample_robots import robot
+
+
+def cost(spec: RobotSpec, what: str) -> tuple[int, int]:
+    [operations] = summarize(spec, what).operations.values()
+    return operations.multiplications, operations.additions
+
+
+@pytest.mark.parametrize(
+    ("name", "pose", "jacobian"),
+    [
+        ("puma560", (40, 20), (34, 14)),
+        ("puma560_standard", (40, 20), (34, 14)),
+        ("stanford", (42, 20), (45, 18)),
+        ("ur5e", (36, 21), (34, 15)),
+        ("scara", (4, 5), (4, 3)),
+        ("franka_panda", (68, 36), (91, 44)),
+    ],
+)
+def test_kinematics_take_few_operations(name: str, pose: tuple[int, int], jacobian: tuple[int, int]) -> None:
+    assert cost(robot(name), "pose") == pose
+    assert cost(robot(name), "jacobian") == jacobian
+
+
+def with_links_of_the_usual_kind(spec: RobotSpec) -> RobotSpec:
+    """A PUMA 560 with inertias along the frames' axes, and the centres of mass of links 4 to 6 on their joints' axes."""
+    coms = ([0, 0, 0], [0.07, 0.006, -0.016], [0, -0.07, 0.014], [0, 0, -0.02], [0, 0, 0], [0, 0, 0.03])
+    links = [
+        LinkSpec(mass=10.0 - i, com=read_only(com), inertia=read_only(np.diag([0.2, 0.3, 0.4]) / (i + 1)))
+        for i, com in enumerate(coms)
+    ]
+    return replace(spec, rows=tuple(replace(row, link=link) for row, link in zip(spec.rows, links, strict=True)))
+
+
+def test_inverse_dynamics_take_few_operations() -> None:
+    general, usual = with_general_links(robot("puma560")), with_links_of_the_usual_kind(robot("puma560"))
+    assert cost(general, "inverse-dynamics") == (257, 240)
+    assert cost(usual, "inverse-dynamics") == (187, 153)
