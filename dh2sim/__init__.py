@@ -32,6 +32,7 @@ _HOMES = {
     "SerialJoint": "kinematics.serial_chain",
     "ShapeSpec": "robot.spec",
     "Solutions": "inverse.solutions",
+    "SymbolicForm": "symbolic.request",
     "ToolSpec": "robot.spec",
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
@@ -46,6 +47,7 @@ _HOMES = {
     "parse_robot": "robot.read",
     "recover_table": "kinematics.frame_assignment.recover",
     "robot_file_text": "robot.write",
+    "symbolic_form": "symbolic.request",
     "to_mjcf": "formats.mjcf.write",
     "to_scene": "formats.mjcf.scene",
     "to_urdf": "formats.urdf.write",
@@ -96,6 +98,8 @@ if TYPE_CHECKING:
     from dh2sim.robot_facade import Prismatic as Prismatic
     from dh2sim.robot_facade import Revolute as Revolute
     from dh2sim.robot_facade import Robot as Robot
+    from dh2sim.symbolic.request import SymbolicForm as SymbolicForm
+    from dh2sim.symbolic.request import symbolic_form as symbolic_form
 
     __version__: str
 else:

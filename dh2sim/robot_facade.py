@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.model.slips import Slip
     from dh2sim.simulate.options import RolloutKeywords
+    from dh2sim.symbolic.request import SymbolicForm, SymbolicKeywords, What
     from dh2sim.validate.report import RobotReport
     from dh2sim.view.server import Viewer
 
@@ -438,6 +439,22 @@ class Robot:
         from dh2sim.kinematics.forward import geometric_jacobian
 
         return geometric_jacobian(self.chain, self._vectors(q), frame=frame)
+
+    def symbolic(self, what: What | str = "pose", **options: Unpack[SymbolicKeywords]) -> SymbolicForm:
+        """Return the robot's kinematics or dynamics in symbols, compared with numbers; ``print`` shows it.
+
+        Args:
+            what: 'pose', 'matrices', 'jacobian' or 'dynamics'.
+            **options: As for :func:`dh2sim.symbolic_form`: ``source``, ``target``, ``style``, ``lengths``, ``names``,
+                ``numbers``, ``letters``, ``fold``, ``joint_names``.
+
+        Raises:
+            Dh2simError: An argument has a value that is not allowed, or the robot is too large for what is asked.
+        """
+        from dh2sim.symbolic.request import symbolic_form
+
+        in_numbers = what == "dynamics" and not options.get("letters")
+        return symbolic_form(self.spec, what, bodies=self.model.bodies if in_numbers else None, **options)
 
     def singular_values(self, q: ArrayLike, frame: str = "tool0") -> Array:
         """Return the singular values of the geometric Jacobian, largest first, shape (..., min(6, n)).

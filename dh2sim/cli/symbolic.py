@@ -11,6 +11,9 @@ import typer
 
 from dh2sim.cli.common import RobotArgument, choice, load_all
 from dh2sim.cli.output import hand_over, require_free
+from dh2sim.cli.symbolic_code import LANGUAGES, is_about_code, print_code
+from dh2sim.errors import Dh2simError
+from dh2sim.symbolic.dynamics import MOST_JOINTS
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.request import What, symbolic_form
 from dh2sim.symbolic.table import Fold
@@ -27,7 +30,7 @@ class Format(StrEnum):
 
 def symbolic(
     robot: RobotArgument,
-    what: Annotated[str, typer.Option(metavar="WHAT", help=f"{', '.join(What)}.")] = "pose",
+    what: Annotated[str, typer.Option(metavar="WHAT", help=f"{', '.join(What)}, inverse-dynamics.")] = "pose",
     source: Annotated[
         str, typer.Option("--from", metavar="FRAME", help="Frame that the pose is given in.")
     ] = "base_link",
@@ -43,18 +46,20 @@ def symbolic(
     ] = None,
     names: Annotated[bool, typer.Option("--names/--no-names", help="Name sums that recur #1, #2, …")] = True,
     numbers: Annotated[bool, typer.Option("--numbers", help="Numbers instead of the file's parameters.")] = False,
-    letters: Annotated[bool, typer.Option("--letters", help="Letters a1, d1, … for lengths, too.")] = False,
+    letters: Annotated[
+        bool, typer.Option("--letters", help="Letters for lengths, masses and inertias, too.")
+    ] = False,
     fold: Annotated[
         str,
         typer.Option(metavar="AXES", help="Add up angles across 'parallel' axes, 'all' (antiparallel too), 'none'."),
     ] = "parallel",
     no_fold: Annotated[bool, typer.Option("--no-fold", help="The same as --fold none.")] = False,
     q: Annotated[bool, typer.Option("--q", help="Call all joint coordinates q_i.")] = False,
-    as_: Annotated[str, typer.Option("--as", metavar="FORMAT", help=f"{', '.join(Format)}.")] = "text",
+    as_: Annotated[str, typer.Option("--as", metavar="FORMAT", help=f"{', '.join((*Format, *LANGUAGES))}.")] = "text",
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write to a file.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
 ) -> None:
-    """Print a robot's kinematics in symbols, as a textbook does.
+    """Print a robot's kinematics or dynamics in symbols, as a textbook does.
 
     Parameters of the robot file stay letters; every expression is compared with the table before it is printed.
 
@@ -63,8 +68,24 @@ def symbolic(
       dh2sim symbolic puma560
       dh2sim symbolic stanford --style tool
       dh2sim symbolic puma560 --from dh_3 --to dh_6
-      dh2sim symbolic scara --what matrices
+      dh2sim symbolic scara --what jacobian --as latex -o scara.tex
+      dh2sim symbolic planar_2r --what dynamics --letters
+      dh2sim symbolic ur5e --what pose,jacobian,inverse-dynamics --as c -o ur5e.c
     """
+    if is_about_code(what, as_):
+        others = {
+            "--from": source != "base_link",
+            "--to": target != "tool0",
+            "--style": style != "base",
+            "--lengths": lengths is not None,
+            "--no-names": not names,
+            "--numbers": numbers,
+            "--letters": letters,
+            "--fold": fold != "parallel" or no_fold,
+            "--q": q,
+        }
+        print_code(robot, what, as_, out, force=force, others=others)
+        return
     wanted = choice(what, What, "--what")
     format_ = choice(as_, Format, "--as")
     nested = choice(style, Style, "--style")
@@ -75,6 +96,16 @@ def symbolic(
     assert axes is not None
     require_free(out, force=force)
     [spec] = load_all([robot])
+    bodies = None
+    if wanted is What.DYNAMICS and len(spec.moving_rows) > MOST_JOINTS:
+        raise Dh2simError(
+            f"{spec.name}: has {len(spec.moving_rows)} joints that move; equations of motion are printed for up to "
+            f"{MOST_JOINTS}. For any arm: --what inverse-dynamics --as c"
+        )
+    if wanted is What.DYNAMICS and not letters:
+        from dh2sim.model.build import build_model
+
+        bodies = build_model(spec).bodies
     form = symbolic_form(
         spec,
         wanted,
@@ -87,6 +118,7 @@ def symbolic(
         letters=letters,
         fold=axes,
         joint_names="q" if q else "theta",
+        bodies=bodies,
     )
     match format_:
         case Format.LATEX:

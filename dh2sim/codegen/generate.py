@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable
-from dataclasses import replace
-from enum import StrEnum
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from dh2sim.codegen.base_parameters import base_parameters
@@ -16,8 +15,8 @@ from dh2sim.codegen.languages import Language, program_text
 from dh2sim.codegen.lengths import length_constants
 from dh2sim.codegen.mechanism import Mechanism, build_mechanism
 from dh2sim.codegen.newton_euler import inverse_dynamics
-from dh2sim.codegen.program import Function, Program
-from dh2sim.codegen.trace import Number, Trace
+from dh2sim.codegen.program import Function, Listing, Program, What
+from dh2sim.codegen.trace import Number, Operations, Trace
 from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.chain import spec_of
 from dh2sim.messages import member
@@ -26,14 +25,6 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import RobotSpec
 
 _WIDTH: Final = 100
-
-
-class What(StrEnum):
-    """What there is code for."""
-
-    POSE = "pose"
-    JACOBIAN = "jacobian"
-    INVERSE_DYNAMICS = "inverse-dynamics"
 
 
 def generate(
@@ -64,13 +55,38 @@ def generate(
         Dh2simError: An argument has a value that is not allowed.
     """
     language = member(Language, language, "language")
+    program, spec, model = _asked_for(robot, what, name)
+    return program_text(replace(program, header=(*program.header, *_measured(program, spec, model))), language)
+
+
+def _asked_for(
+    robot: ModelLike, what: What | str | Iterable[What | str], name: str | None
+) -> tuple[Program, RobotSpec, RobotModel | None]:
     wanted = {member(What, each, "code") for each in ([what] if isinstance(what, str) else what)}
     if not wanted:
         raise Dh2simError(f"choose at least one of {', '.join(What)}")
     model = model_of(robot) if What.INVERSE_DYNAMICS in wanted else None
     spec = spec_of(robot) if model is None else model.spec
-    program = _program(spec, model, [each for each in What if each in wanted], name or spec.name)
-    return program_text(replace(program, header=(*program.header, *_measured(program, spec, model))), language)
+    return _program(spec, model, [each for each in What if each in wanted], name or spec.name), spec, model
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CodeSummary:
+    """What code computes with, and what a call costs."""
+
+    operations: Mapping[str, Operations]
+    """By the name of the function."""
+    constants: tuple[tuple[str, float, str], ...]
+    """Names, values in SI units, and notes; the base inertial parameters among them."""
+
+
+def summarize(robot: ModelLike, what: What | str | Iterable[What | str] = (What.INVERSE_DYNAMICS,)) -> CodeSummary:
+    """Return what ``generate`` would write, in numbers; arguments and errors are those of it."""
+    program, _, _ = _asked_for(robot, what, None)
+    return CodeSummary(
+        operations={function.name: program.operations(function) for function in program.functions},
+        constants=tuple((name, float(value), note) for name, value, note in Listing(program, ()).constants),
+    )
 
 
 def _program(spec: RobotSpec, model: RobotModel | None, wanted: list[What], name: str) -> Program:

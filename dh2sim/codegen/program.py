@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Final, NamedTuple
 
 from dh2sim.codegen.trace import (
@@ -32,6 +33,14 @@ from dh2sim.codegen.trace import (
 _LONGEST_NAME: Final = 40
 _MOST_OPERANDS: Final = 5
 """Names and numbers in an expression, beyond which a part of it gets a name."""
+
+
+class What(StrEnum):
+    """What there is code for."""
+
+    POSE = "pose"
+    JACOBIAN = "jacobian"
+    INVERSE_DYNAMICS = "inverse-dynamics"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

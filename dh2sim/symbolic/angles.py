@@ -144,7 +144,18 @@ def slide(row: int) -> Atom:
 @lru_cache(maxsize=4096)
 def slide_row(atom: Atom) -> int | None:
     """Return the row whose coordinate a sliding atom is; None for any other atom."""
-    return int(atom[1:-2]) if atom.endswith("()") else None
+    return int(atom[1:-2]) if atom.endswith("()") and atom[0] == "q" else None
+
+
+def rate(row: int) -> Atom:
+    """Return the atom of the velocity of the coordinate of a row."""
+    return f"v{row}()"
+
+
+@lru_cache(maxsize=4096)
+def rate_row(atom: Atom) -> int | None:
+    """Return the row whose velocity an atom is; None for any other atom."""
+    return int(atom[1:-2]) if atom.endswith("()") and atom[0] == "v" else None
 
 
 def derivative_by(row: int, atom: Atom) -> Polynomial:

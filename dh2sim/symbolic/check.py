@@ -26,7 +26,10 @@ TOLERANCE: Final = 1e-13
 class SampledConfigurations:
     """Random configurations of a robot, and what atoms and frames are there."""
 
-    def __init__(self, table: SymbolicTable, samples: int = SAMPLES, seed: int = 0) -> None:
+    def __init__(
+        self, table: SymbolicTable, samples: int = SAMPLES, seed: int = 0, *, q: Array | None = None
+    ) -> None:
+        """``q`` are configurations to take instead, rad and m, shape (samples, n)."""
         self.table = table
         spec = table.spec
         self._metre = spec.units.metres(1.0)
@@ -38,7 +41,7 @@ class SampledConfigurations:
         random = np.random.default_rng(seed)
         shares = random.uniform(-1.0, 1.0, (samples, len(rows)))
         scale = np.array([math.pi if row.type.turns else self.reach for row in rows])
-        self.q: Array = shares * scale
+        self.q: Array = shares * scale if q is None else q
         """rad and m, shape (samples, n)."""
         self._frames = table_frame_poses(spec, self.q)
         self._known: dict[str, Array] = {}
@@ -96,6 +99,24 @@ class SampledConfigurations:
                 result[:, :3, k] = np.einsum("nij,nj->ni", R, z)
         return result
 
+    def body_jacobian(self, frame: str, com: Array) -> tuple[Array, Array]:
+        """Return the Jacobian in base_link of a point that a frame carries, and the frame's rotation.
+
+        Args:
+            frame: The frame.
+            com: The point in it, in the file's unit, shape (3,).
+
+        Returns:
+            Shapes (samples, 6, n) and (samples, 3, 3).
+        """
+        J = self.jacobian("base_link", frame)
+        carried = [self.table.frames[f"link_{i}"] <= self.table.frames[frame] for i in self.table.moving]
+        J = J * np.array(carried, dtype=np.float64)
+        R = self._in_base(frame)[:, :3, :3]
+        arm = np.einsum("nij,j->ni", R, com)
+        J[:, :3] += np.cross(J[:, 3:], arm[:, :, None], axis=1)
+        return J, R
+
     def _in_base(self, frame: str) -> Array:
         if frame not in self._known:
             self._known[frame] = self._pose_in_base(frame)
@@ -127,13 +148,21 @@ class SampledConfigurations:
         return poses[:, i - 1] @ row_matrix(joint, q).transpose(2, 0, 1)
 
 
-def check_form(form: Form, expected: Mapping[str, Array], configurations: SampledConfigurations) -> float:
+def check_form(
+    form: Form,
+    expected: Mapping[str, Array],
+    configurations: SampledConfigurations,
+    extra: Mapping[Atom, Any] | None = None,
+    size: float = 1.0,
+) -> float:
     """Compare the equations of a form with numbers.
 
     Args:
         form: What is to be shown.
         expected: For names of equations, arrays of shape (samples, rows, columns).
         configurations: Where they hold.
+        extra: Values of atoms that are no part of the table.
+        size: Of the numbers that the expected ones were computed from, if that is larger than they are.
 
     Returns:
         The largest difference, as a share of the largest number in the equation, or of the reach.
@@ -141,7 +170,7 @@ def check_form(form: Form, expected: Mapping[str, Array], configurations: Sample
     Raises:
         MismatchError: A difference is larger than 1e-13.
     """
-    values = configurations.values(form.atoms)
+    values = configurations.values(form.atoms) | dict(extra or {})
     worst = 0.0
     for equation in form.equations:
         wanted = expected[equation.name]
@@ -150,7 +179,7 @@ def check_form(form: Form, expected: Mapping[str, Array], configurations: Sample
         for k, value in enumerate(evaluated(equation.flat, form.named, values)):
             found[:, k // columns, k % columns] = value
         assert wanted.shape[1:] == (rows, columns)
-        scale = max(1.0, float(np.abs(wanted).max()))
+        scale = max(size, float(np.abs(wanted).max()))
         error = float(np.abs(found - wanted).max()) / scale
         if not error <= TOLERANCE:
             raise MismatchError(

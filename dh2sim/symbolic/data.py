@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from dh2sim.symbolic.angles import Angle
@@ -52,7 +53,11 @@ def form_data(form: Form) -> dict[str, Any]:
         "sums": {notation.atom(name): written(sum_, notation) for name, sum_ in form.named.items()},
         "cosines": cosines,
         "letters": {
-            letter.name: {"value": letter.value, "kind": letter.kind, "definition": letter.definition}
+            letter.name: {
+                "value": None if math.isnan(letter.value) else letter.value,
+                "kind": letter.kind,
+                "definition": letter.definition,
+            }
             for letter in used_letters(form.table, form.atoms)
         },
         "singular": [

@@ -13,7 +13,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Any, Final, NamedTuple, TypeAlias
 
-from dh2sim.symbolic.angles import slide_row, trig_of
+from dh2sim.symbolic.angles import rate_row, slide_row, trig_of
 from dh2sim.symbolic.polynomial import ROOTS, Atom, Monomial, Polynomial, Rational
 
 
@@ -203,6 +203,8 @@ def _atom_order(atom: Atom) -> tuple[Any, ...]:
     """Order atoms of a product: roots, letters, named cosines, slides, then cosines and sines by row."""
     if atom in ROOTS:
         return (0, atom)
+    if rate_row(atom) is not None:
+        return (5, rate_row(atom))
     trig = trig_of(atom)
     if trig is None:
         return (3, slide_row(atom)) if slide_row(atom) is not None else (1, atom)

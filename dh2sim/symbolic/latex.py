@@ -7,9 +7,9 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from dh2sim.symbolic.angles import Angle, slide_row, trig_of
+from dh2sim.symbolic.angles import Angle, rate_row, slide_row, trig_of
 from dh2sim.symbolic.form import Condition, Equation, Form, moving_angles, used_letters
-from dh2sim.symbolic.notation import decimal, written
+from dh2sim.symbolic.notation import decimal, is_simple_quotient, written
 from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
 from dh2sim.symbolic.table import Letter, SymbolicTable
 
@@ -28,6 +28,7 @@ class LatexNotation:
     def __init__(self, table: SymbolicTable, joint_names: str = "theta") -> None:
         """``joint_names`` is 'theta', with sliding coordinates d_i, or 'q'."""
         self._joint = joint_names
+        self._turns = [row.type.turns for row in table.spec.rows]
         self._taken = set(table.letters)
         self._separator = "," if len(table.spec.rows) > 9 else ""
 
@@ -38,6 +39,10 @@ class LatexNotation:
         row = slide_row(atom)
         if row is not None:
             return self.coordinate(row, turns=False)
+        row = rate_row(atom)
+        if row is not None:
+            name = self.coordinate(row, turns=self._turns[row - 1])
+            return rf"\dot{{{name[: name.index('_')]}}}{name[name.index('_') :]}"
         if atom.startswith("sqrt("):
             return rf"\sqrt{{{atom[5:-1]}}}"
         trig = trig_of(atom)
@@ -73,7 +78,9 @@ class LatexNotation:
 
     def number(self, number: Rational) -> str:
         """Return a decimal fraction, or a quotient."""
-        return decimal(number) or rf"\tfrac{{{number.numerator}}}{{{number.denominator}}}"
+        if not is_simple_quotient(number):
+            return decimal(number)
+        return rf"\tfrac{{{number.numerator}}}{{{number.denominator}}}"
 
     def power(self, base: str, exponent: int) -> str:
         """Return a power."""
@@ -226,13 +233,16 @@ def _legend(form: Form, notation: LatexNotation) -> Iterator[str]:
         c, s, text = notation.trig("cos", example), notation.trig("sin", example), notation.angle(example)
         yield rf"{c} &= \cos({text}), \quad {s} = \sin({text})"
     for letter in used_letters(form.table, form.atoms):
+        if math.isnan(letter.value):
+            continue
         yield _letter(letter, form.table)
 
 
 def _letter(letter: Letter, table: SymbolicTable) -> str:
     if letter.kind == "angle":
         return rf"{latex_name(letter.name)} &= {math.degrees(letter.value):.10g}^\circ"
-    unit = rf"\,\mathrm{{{table.unit.value}}}" if letter.kind == "length" else ""
+    power = {"length": "", "acceleration": "/s^2"}.get(letter.kind)
+    unit = "" if power is None else rf"\,\mathrm{{{table.unit.value}{power}}}"
     return f"{latex_name(letter.name)} &= {letter.value:.12g}{unit}"
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Protocol
+from typing import Final, Protocol
 
 from dh2sim.symbolic.expression import Sum
 from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
+
+_DIGITS: Final = 12
+"""Behind the decimal point, of a number that is written exactly."""
 
 
 class Notation(Protocol):
@@ -47,13 +50,22 @@ def written(sum_: Sum, notation: Notation) -> str:
     return text or notation.number(0)
 
 
-def decimal(number: Rational) -> str | None:
-    """Return a number as a decimal fraction if it is one with at most 17 digits behind the point, else None."""
+def decimal(number: Rational) -> str:
+    """Return a number that is not negative: exactly if that takes few digits, else as the double next to it."""
     fraction = Fraction(number)
-    for digits in range(18):
+    for digits in range(_DIGITS + 1):
         scaled = fraction * 10**digits
         if scaled.denominator == 1:
-            text = str(abs(scaled.numerator)).rjust(digits + 1, "0")
-            sign = "-" if fraction < 0 else ""
-            return f"{sign}{text[: len(text) - digits]}.{text[len(text) - digits :]}" if digits else f"{sign}{text}"
-    return None
+            text = str(scaled.numerator).rjust(digits + 1, "0")
+            return f"{text[: len(text) - digits]}.{text[len(text) - digits :]}" if digits else text
+    return repr(float(fraction))
+
+
+def is_simple_quotient(number: Rational) -> bool:
+    """Whether a number is better written as a quotient, such as 1/3."""
+    denominator = Fraction(number).denominator
+    rest = denominator
+    for prime in (2, 5):
+        while rest % prime == 0:
+            rest //= prime
+    return rest > 1 and denominator < 1000

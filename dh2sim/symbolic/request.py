@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, TypedDict
 
+from dh2sim.errors import Dh2simError
 from dh2sim.messages import member
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.symbolic.data import form_data
+from dh2sim.symbolic.dynamics import Bodies, dynamics_form
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.form import Equation, Form
 from dh2sim.symbolic.kinematics import jacobian_form, matrices_form, pose_form
@@ -23,6 +25,21 @@ class What(StrEnum):
     POSE = "pose"
     MATRICES = "matrices"
     JACOBIAN = "jacobian"
+    DYNAMICS = "dynamics"
+
+
+class SymbolicKeywords(TypedDict, total=False):
+    """Options of ``symbolic_form``, all of which have defaults."""
+
+    source: str
+    target: str
+    style: Style | str
+    lengths: Lengths | str | None
+    names: bool
+    numbers: bool
+    letters: bool
+    fold: Fold | str
+    joint_names: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +90,15 @@ def symbolic_form(
     letters: bool = False,
     fold: Fold | str = "parallel",
     joint_names: str = "theta",
+    bodies: Bodies | None = None,
 ) -> SymbolicForm:
     """Return the kinematics of a robot in symbols, compared with its table at random configurations.
 
     Args:
         spec: The robot.
         what: 'pose': a frame in another one; 'matrices': the transform of every row and every DH frame in frame 0;
-            'jacobian': the geometric Jacobian, and its determinant in factors.
+            'jacobian': the geometric Jacobian, and its determinant in factors; 'dynamics': mass matrix, Coriolis
+            matrix and gravity vector of up to four joints.
         source: Frame that a pose is given in.
         target: Frame whose pose it is.
         style: 'base': nested from the base, as textbooks print it; 'tool': nested from the tool, as computer
@@ -87,9 +106,11 @@ def symbolic_form(
         lengths: 'first' (outside) or 'last' (inside); by default first with style 'tool', else last.
         names: Whether sums that recur are named #1, #2, …
         numbers: Whether parameters of the robot file are numbers instead of letters.
-        letters: Whether lengths that are plain numbers get letters too: a1, d1, …
+        letters: Whether lengths that are plain numbers get letters too: a1, d1, …; in dynamics, m_i, lc_i and I_i
+            stand for what links weigh, which are numbers otherwise, and so are lengths.
         fold: Across which axes angles are added up: 'parallel', 'all' (antiparallel ones too) or 'none'.
         joint_names: 'theta', with d_i for slides, or 'q'.
+        bodies: What link_1 … link_n weigh, for dynamics without letters: ``RobotModel.bodies``.
 
     Returns:
         The form; ``str`` gives it as text.
@@ -99,11 +120,18 @@ def symbolic_form(
         MismatchError: The form differs from the table by more than 1e-13 of the reach.
         Dh2simError: An argument has a value that is not allowed.
     """
+    wanted = member(What, what, "form")
+    if wanted is What.DYNAMICS:
+        numbers = not letters
+        if numbers and bodies is None:
+            raise Dh2simError("dynamics in numbers needs bodies; pass letters=True for letters")
     table = symbolic_table(spec, letters=letters, numbers=numbers)
     style_ = member(Style, style, "style")
     lengths_ = None if lengths is None else member(Lengths, lengths, "lengths")
     fold_ = member(Fold, fold, "fold")
-    match member(What, what, "form"):
+    match wanted:
+        case What.DYNAMICS:
+            form = dynamics_form(table, None if letters else bodies, names=names, joint_names=joint_names)
         case What.POSE:
             form = pose_form(
                 table,

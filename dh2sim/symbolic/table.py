@@ -68,7 +68,7 @@ class Letter(NamedTuple):
     name: str
     value: float
     """In the file's length unit, rad, or neither, as what it is used for."""
-    kind: Literal["length", "angle", "number"]
+    kind: Literal["length", "angle", "acceleration", "number"]
     definition: str = ""
     """How it is made of others; empty for a plain number."""
 
@@ -106,6 +106,11 @@ class SymbolicTable:
     def unit(self) -> LengthUnit:
         """Unit of lengths, which is the file's."""
         return self.spec.units.length
+
+    @property
+    def exact_unit(self) -> Fraction:
+        """Unit of lengths, m."""
+        return _METRES[self.unit]
 
     @property
     def moving(self) -> tuple[int, ...]:
@@ -226,7 +231,7 @@ class _Reader:
         self._angle_parameters: dict[str, Rational] = {}
         self._tree = _tree(spec)
         self._parameters = {
-            name: Polynomial.number(_exact(value)) if numbers else Polynomial.atom(name)
+            name: Polynomial.number(exact_number(value)) if numbers else Polynomial.atom(name)
             for name, value in spec.parameters.items()
         }
         if numbers:
@@ -285,7 +290,7 @@ class _Reader:
             return ZERO
         found = self._found(at, value, self._units.metres)
         if found is None:
-            found = Polynomial.number(simple(_exact(value) / _METRES[self._units.length]))
+            found = Polynomial.number(simple(exact_number(value) / _METRES[self._units.length]))
         if isinstance(found, tuple):
             return Polynomial.atom(self._name(letter, found[1], "length", found[0]))
         if found.constant is None or not self._give_letters:
@@ -343,7 +348,7 @@ class _Reader:
         if node is None or node.value is None or isinstance(node.value, bool | list | dict):
             return None
         if not isinstance(node.value, str):
-            number = _exact(node.value)
+            number = exact_number(node.value)
             return Polynomial.number(number) if _same(to_si(float(node.value)), value) else None
         try:
             result = evaluate_in(node.value, self._expressions)
@@ -388,7 +393,7 @@ def _tree(spec: RobotSpec) -> Node | None:
         return None
 
 
-def _exact(value: float) -> Rational:
+def exact_number(value: float) -> Rational:
     """Return the decimal fraction that a double is printed as."""
     return simple(Fraction(repr(float(value))))
 

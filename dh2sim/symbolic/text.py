@@ -8,10 +8,10 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from dh2sim.symbolic.angles import Angle, slide_row, trig_of
+from dh2sim.symbolic.angles import Angle, rate_row, slide_row, trig_of
 from dh2sim.symbolic.expression import Sum
 from dh2sim.symbolic.form import Condition, Equation, Form, moving_angles, used_letters
-from dh2sim.symbolic.notation import decimal, written
+from dh2sim.symbolic.notation import decimal, is_simple_quotient, written
 from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
 from dh2sim.symbolic.table import Letter, SymbolicTable
 
@@ -28,6 +28,7 @@ class TextNotation:
     def __init__(self, table: SymbolicTable, joint_names: str = "theta") -> None:
         """``joint_names`` is 'theta', with sliding coordinates d_i, or 'q'."""
         self._joint = joint_names
+        self._turns = [row.type.turns for row in table.spec.rows]
         self._taken = set(table.letters)
         self._separator = "_" if len(table.spec.rows) > 9 else ""
 
@@ -36,6 +37,10 @@ class TextNotation:
         row = slide_row(atom)
         if row is not None:
             return self.coordinate(row, turns=False)
+        row = rate_row(atom)
+        if row is not None:
+            turns = self._turns[row - 1]
+            return f"d{self.coordinate(row, turns=turns)}"
         trig = trig_of(atom)
         if trig is None:
             return atom
@@ -79,7 +84,7 @@ class TextNotation:
 
     def number(self, number: Rational) -> str:
         """Return a decimal fraction, or a quotient."""
-        return decimal(number) or str(number)
+        return str(number) if is_simple_quotient(number) else decimal(number)
 
     def power(self, base: str, exponent: int) -> str:
         """Return a power."""
@@ -118,7 +123,7 @@ def legend_lines(form: Form, notation: TextNotation, width: int = WIDTH) -> Iter
             c, text = notation.short("c", example), notation.angle(example)
             items += [f"{c} = cos({text})", f"{notation.short('s', example)} = sin({text})"]
         items += [f"{notation.short('c', a)} = cos({notation.angle(a)})" for a in moving if not notation.is_plain(a)]
-    items += [letter_text(letter, form.table) for letter in used_letters(form.table, atoms)]
+    items += [text for letter in used_letters(form.table, atoms) if (text := letter_text(letter, form.table))]
     yield from _listed(items, width)
 
 
@@ -127,7 +132,9 @@ def letter_text(letter: Letter, table: SymbolicTable) -> str:
     definition = f" = {letter.definition}" if letter.definition else ""
     if letter.kind == "angle":
         return f"{letter.name}{definition} = {math.degrees(letter.value):.10g}°"
-    unit = f" {table.unit.value}" if letter.kind == "length" else ""
+    if math.isnan(letter.value):
+        return ""
+    unit = {"length": f" {table.unit.value}", "acceleration": f" {table.unit.value}/s²"}.get(letter.kind, "")
     return f"{letter.name}{definition} = {letter.value:.12g}{unit}"
 
 

@@ -56,7 +56,7 @@ def test_every_format_prints_something(format_: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--what", "pse"], "'pse' is not one of pose, matrices, jacobian. Did you mean 'pose'?"),
+        (["--what", "pse"], "'pse' is not one of pose, matrices, jacobian, dynamics. Did you mean 'pose'?"),
         (["--style", "bas"], "'bas' is not one of base, tool, expanded. Did you mean 'base'?"),
         (["--as", "tex"], "'tex' is not one of text, latex, markdown, json"),
         (["--fold", "some"], "'some' is not one of parallel, all, none"),
@@ -68,3 +68,14 @@ def test_what_is_not_allowed_is_said_with_what_is(arguments: list[str], message:
     assert run.status == 2
     assert message in run.err
     assert "Traceback" not in run.err
+
+
+def test_dynamics_in_letters_and_in_numbers() -> None:
+    assert "I1 + I2" in dh2sim("symbolic", "planar_2r", "--what", "dynamics", "--letters").out
+    assert "M, mass matrix" in dh2sim("symbolic", "planar_2r", "--what", "dynamics").out
+    run = dh2sim("symbolic", "puma560", "--what", "dynamics")
+    assert (run.status, run.out) == (2, "")
+    assert run.err == (
+        "dh2sim: puma560: has 6 joints that move; equations of motion are printed for up to 4. "
+        "For any arm: --what inverse-dynamics --as c\n"
+    )
