@@ -36,7 +36,7 @@ def test_kinematics_take_few_operations(name: str, pose: tuple[int, int], jacobi
 
 
 def with_links_of_the_usual_kind(spec: RobotSpec) -> RobotSpec:
-    """A PUMA 560 with inertias along the frames' axes, and the centres of mass of links 4 to 6 on their joints' axes."""
+    """A PUMA 560 with inertias along the frames' axes and, of links 4 to 6, centres of mass on the joints' axes."""
     coms = ([0, 0, 0], [0.07, 0.006, -0.016], [0, -0.07, 0.014], [0, 0, -0.02], [0, 0, 0], [0, 0, 0.03])
     links = [
         LinkSpec(mass=10.0 - i, com=read_only(com), inertia=read_only(np.diag([0.2, 0.3, 0.4]) / (i + 1)))
