@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import chain, product
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from dh2sim.inverse.loop import Arm, Candidates, Flags, Indices, Loop, close_loop, inverse_poses, pose_and_jacobian
 from dh2sim.inverse.pencil import build_pencil
 from dh2sim.inverse.polish import polish
+from dh2sim.inverse.slides import OppositeSlides, ThreeSlides
 from dh2sim.typing import Array
 
 REACHED = 1e-10
@@ -25,12 +27,14 @@ SAME_IF_SINGULAR = 1e-4
 """... and by less than this where the arm is nearly singular, as rounding moves such solutions farther."""
 NEARLY_SINGULAR = 1e-6
 """Least singular value below which that is so."""
-TRIALS = 24
+TRIALS = 40
 """Poses of the trial."""
 _FIRST = 8
 """Of them on which a hopeless elimination is told from others."""
 _VIRTUAL = 0.05
 """How far virtual joints of a candidate may be from zero."""
+_NUDGE = 1e-6
+"""Size of changes, in lengths of the arm and rad, that make singular eliminations regular."""
 _GATE = 0.3
 """Error of a candidate, in lengths of the arm and rad, above which it is none."""
 _BLOCK = 128
@@ -78,9 +82,9 @@ class Method:
     virtual: tuple[Array, ...] = field(repr=False)
     """Links before, between and behind the virtual joints that make six of fewer joints, each of shape (4, 4)."""
     eliminations: tuple[Elimination, ...]
-    """The best one, and the one to fall back on."""
+    """The best one, and those to fall back on."""
     found_share: float
-    """Share of the solutions known of the trial's poses that these two find."""
+    """Share of the solutions known of the trial's poses that the first two find."""
 
     def solve(self, T: Array, locked: Mapping[int, Array]) -> Found:
         """Return all solutions of N poses.
@@ -100,14 +104,14 @@ class Method:
     def _solve_block(self, T: Array, locked: Mapping[int, Array]) -> Found:
         found = self.solve_by(self.eliminations[0], T, locked)
         for other in self.eliminations[1:]:
-            again = np.nonzero(self._doubtful(found, len(T)))[0]
+            again = np.nonzero(self.doubtful(found, len(T)))[0]
             if len(again):
                 more = self.solve_by(other, T[again], {j: q if len(q) == 1 else q[again] for j, q in locked.items()})
                 more = Found(pose=again[more.pose], q=more.q, sigma=more.sigma)
                 found = self.distinct(_joined([found, more], self.arm.n))
         return found
 
-    def _doubtful(self, found: Found, poses: int) -> Flags:
+    def doubtful(self, found: Found, poses: int) -> Flags:
         """Whether solutions of a pose may be missing: there are none, an odd number, or singular ones; bool (N,)."""
         regular = found.sigma > NEARLY_SINGULAR
         counts = np.bincount(found.pose[regular], minlength=poses)
@@ -180,40 +184,92 @@ def _tried(arm: Arm, moving: Flags, q: Array, virtual: tuple[Array, ...], rng: n
     T = np.zeros((len(q), 4, 4))
     T[:, :3], T[:, 3, 3] = pose_and_jacobian(arm, q)[0], 1.0
     locked = {int(joint): q[:, joint] for joint in np.flatnonzero(np.logical_not(moving))}
-    bare = Method(arm=arm, moving=moving, virtual=virtual, eliminations=(), found_share=0.0)
     loop = close_loop(arm, T, locked, virtual)
-    first = {joint: value[:_FIRST] for joint, value in locked.items()}
     drawn = Found(pose=np.arange(len(q)), q=q, sigma=np.ones(len(q)))
-    results: list[tuple[int, int, float, Elimination, Found]] = []
-    for elimination in _eliminations(loop, rng):
-        found = bare.solve_by(elimination, T[:_FIRST], first)
-        if _own(bare, found, drawn) < _FIRST // 2:
-            continue
-        found = bare.solve_by(elimination, T, locked)
-        condition = elimination.condition(loop)
-        results.append((_own(bare, found, drawn), len(found.pose), condition, elimination, found))
-    results.sort(key=lambda result: (-result[0], -result[1], result[2]))
-    union = bare.distinct(_joined([drawn, *(result[4] for result in results)], arm.n))
-    best = results[:2]
-    ours = bare.distinct(_joined([result[4] for result in best], arm.n))
-    return Method(
-        arm=arm,
-        moving=moving,
-        virtual=virtual,
-        eliminations=tuple(result[3] for result in best),
-        found_share=len(ours.pose) / len(union.pose),
-    )
+    bare = Method(arm=arm, moving=moving, virtual=virtual, eliminations=(), found_share=0.0)
+    trials: list[_Trial] = []
+    share = 0.0
+    nudges = _nudges(rng)
+    nudged = loop.moved(nudges)
+    for seen, hidden in ((loop, (0,)), (loop, (1, 2)), (nudged, (0,)), (nudged, (1, 2))):
+        for elimination in _eliminations(seen, hidden, rng):
+            used = elimination if seen is loop else Nudged(elimination=elimination, nudges=nudges)
+            few = bare.solve_by(used, T[:_FIRST], {joint: value[:_FIRST] for joint, value in locked.items()})
+            if _own(bare, few, drawn) >= _FIRST // 2:
+                found = bare.solve_by(used, T, locked)
+                own, condition = _own(bare, found, drawn), elimination.condition(seen)
+                trials.append(_Trial(elimination=used, found=found, own=own, condition=condition))
+        trials.sort(key=lambda trial: trial.rank)
+        union = bare.distinct(_joined([drawn, *(trial.found for trial in trials)], arm.n))
+        ours = bare.distinct(_joined([trial.found for trial in trials[:2]], arm.n))
+        share = len(ours.pose) / len(union.pose)
+        if share == 1.0 and not bare.doubtful(ours, len(q)).any():
+            break
+    best = [trial.elimination for trial in trials[:2]]
+    # a pose at which the arm is singular is regular for an arm that is nearly the same
+    best += [Nudged(elimination=elimination, nudges=_nudges(rng)) for elimination in best[:1]]
+    return Method(arm=arm, moving=moving, virtual=virtual, eliminations=tuple(best), found_share=share)
 
 
-def _eliminations(loop: Loop, rng: np.random.Generator) -> Iterator[Elimination]:
-    """Yield the eliminations that may suit a ring, the smallest first."""
-    for wrist in (True, False):
-        for hidden in range(2) if wrist else (0,):
-            for backwards in (False, True):
-                for first in range(6):
-                    pencil = build_pencil(loop, first, backwards=backwards, wrist=wrist, hidden=hidden, rng=rng)
-                    if pencil is not None:
-                        yield pencil
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Trial:
+    """How an elimination did."""
+
+    elimination: Elimination
+    found: Found
+    own: int
+    """How many of the drawn configurations it found."""
+    condition: float
+
+    @property
+    def rank(self) -> tuple[int, int, float]:
+        """Sort the best first: what finds most, then what is conditioned best."""
+        return -self.own, -len(self.found.pose), self.condition
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Nudged:
+    """An elimination of an arm whose links are a little different, where that of the arm itself is singular."""
+
+    elimination: Elimination
+    nudges: Array = field(repr=False)
+    """Small motions of the six links, shape (6, 4, 4)."""
+
+    def candidates(self, loop: Loop) -> Candidates:
+        """Return configurations near all solutions of N poses, and some that are none."""
+        return self.elimination.candidates(loop.moved(self.nudges))
+
+    def condition(self, loop: Loop) -> float:
+        """Return the median condition at N poses."""
+        return self.elimination.condition(loop.moved(self.nudges))
+
+
+def _nudges(rng: np.random.Generator) -> Array:
+    nudges = np.zeros((6, 4, 4))
+    turns, shifts = _NUDGE * rng.normal(size=(2, 6, 3))
+    x, y, z = turns.T
+    nudges[:, 0, 1], nudges[:, 0, 2], nudges[:, 1, 2] = -z, y, -x
+    nudges[:, :3, :3] += np.eye(3) - np.swapaxes(nudges[:, :3, :3], 1, 2)
+    left, _, right = np.linalg.svd(nudges[:, :3, :3])
+    nudges[:, :3, :3] = left @ right
+    nudges[:, :3, 3], nudges[:, 3, 3] = shifts, 1.0
+    return nudges
+
+
+def _eliminations(loop: Loop, hidden: tuple[int, ...], rng: np.random.Generator) -> Iterator[Elimination]:
+    """Yield the eliminations that may suit a ring, with the first or another joint as the eigenvalue of pencils."""
+    slides = [i for i, turns in enumerate(loop.turns) if not turns]
+    both = (False, True)
+    if len(slides) == 3:
+        yield ThreeSlides()
+    elif len(slides) == 2 and slides[1] - slides[0] == 3:
+        yield from (OppositeSlides(first=first, backwards=backwards) for first, backwards in product(slides, both))
+    else:
+        wrists = product((True,), (0, 1), both, range(6)) if 0 in hidden else ()
+        for wrist, which, backwards, first in chain(wrists, product((False,), hidden, both, range(6))):
+            pencil = build_pencil(loop, first, backwards=backwards, wrist=wrist, hidden=which, rng=rng)
+            if pencil is not None:
+                yield pencil
 
 
 def _own(method: Method, found: Found, drawn: Found) -> int:

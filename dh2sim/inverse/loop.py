@@ -89,11 +89,10 @@ def build_arm(chain: KinematicChain, travels: Sequence[tuple[float, float] | Non
         quarter = np.eye(4)
         quarter[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
         links += [quarter] * (goal_joints - 1) + [np.linalg.matrix_power(quarter.T, goal_joints - 1)]
-    length = max((float(np.linalg.norm(K[:3, 3])) for K in links[1:-1]), default=0.0)
     slides = [travel for travel, joint in zip(travels, chain.moving_joints, strict=True) if not joint.type.turns]
-    length = max(length, *(max(map(abs, travel)) for travel in slides if travel is not None), 0.0)
-    if length == 0.0:
-        length = max(float(np.linalg.norm(K[:3, 3])) for K in (links[0], links[-1])) or 1.0
+    counted = links if None in slides else links[1:-1]
+    lengths = [float(np.linalg.norm(K[:3, 3])) for K in counted]
+    length = max([*lengths, *(max(map(abs, travel)) for travel in slides if travel is not None)], default=0.0) or 1.0
     for K in links:
         K[:3, 3] = K[:3, 3] / length
     return Arm(
@@ -247,6 +246,10 @@ class Loop:
         else:
             links = [self.links[i] for i in order]
         return Loop(turns=tuple(self.turns[i] for i in order), links=tuple(links))
+
+    def moved(self, motions: Array) -> Loop:
+        """Return a ring with each link changed by a small motion, shape (6, 4, 4)."""
+        return Loop(turns=self.turns, links=tuple(K @ M for K, M in zip(self.links, motions, strict=True)))
 
 
 def loop_order(first: int, *, backwards: bool) -> list[int]:
