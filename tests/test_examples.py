@@ -22,7 +22,10 @@ ERRORS: dict[str, dict[str, float]] = {
     "convert_convention": {r"tool0: at most (\S+) apart": 1e-14},
     "export_to_mujoco": {r"by the table: (\S+) m apart": 1e-14},
     "import_urdf": {r"axis: at most (\S+) m apart": 1e-12},
-    "inverse_kinematics_with_mink": {r"off the goal by (\S+) m": 1e-6},
+    "inverse_kinematics": {
+        r"vectors, off the pose by at most (\S+)": 1e-12,
+        r"line, off the pose by at most (\S+)": 1e-9,
+    },
     "load_in_pybullet": {
         r"by the table: at most (\S+) m": 1e-14,
         r"MuJoCo: at most (\S+) N·m": 1e-12,

@@ -19,7 +19,7 @@ from tests.program import Outcome, dh2sim, environment
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 MODULES = {
-    "view": {"viser", "mink", "websockets", "msgspec"},
+    "view": {"viser", "websockets", "msgspec"},
     "plot": {"matplotlib", "xarray"},
     "video": {"PIL", "imageio_ffmpeg", "xarray"},
     "data": {"xarray", "pyarrow", "h5netcdf", "h5py"},
@@ -32,8 +32,6 @@ BROUGHT = {
     "pybullet",
     "pandas",
     "scipy",
-    "qpsolvers",
-    "daqp",
     "requests",
     "imageio",
     "lxml",

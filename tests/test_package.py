@@ -20,7 +20,7 @@ RUNS = {"zarr", "numcodecs", "google_crc32c"}
 TABLES = {"xarray", "pandas", "pyarrow", "h5netcdf", "h5py"}
 PICTURES = {"matplotlib", "PIL", "imageio_ffmpeg"}
 MODELS = {"trimesh", "yourdfpy", "pinocchio", "pybullet", "scipy", "lxml"}
-VIEWER = {"viser", "mink", "websockets", "requests"}
+VIEWER = {"viser", "websockets", "requests"}
 HEAVY = {"numpy", "mujoco", "pydantic", "ruamel", "rich", *RUNS, *TABLES, *PICTURES, *MODELS, *VIEWER}
 
 MODULES = """

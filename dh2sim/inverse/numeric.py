@@ -131,6 +131,7 @@ class NumericSolver:
         self._signs = np.array([joint.sign for joint in chain.moving_joints])
         self._links = _links(chain, self.size)
         self._lower, self._upper = lower / self._units, upper / self._units
+        self._limits = read_only(lower), read_only(upper)
         spread = np.where(self.turns, math.pi, 1.0)
         self._start_lower = np.where(np.isfinite(lower), self._lower, np.minimum(self._upper, spread) - 2.0 * spread)
         self._start_upper = np.where(np.isfinite(upper), self._upper, self._start_lower + 2.0 * spread)
@@ -149,7 +150,23 @@ class NumericSolver:
         """
         goals = self._goals(T, free, lever)
         q = np.clip(q0 / self._units, self._lower, self._upper)
-        return self._nearest(self._descended(goals, q, steps)[0], T, free)
+        return self.errors(self._robots(self._descended(goals, q, steps)[0]), T, free)
+
+    def errors(self, q: Array, T: Array, free: Free | None = None) -> Nearest:
+        """Return how far configurations, rad and m, shape (N, n), are from their goals, shape (N, 4, 4)."""
+        frames = self._frames(q / self._units)[-1]
+        frames[:, :3, 3] *= self.size
+        position, rotation = goal_distances(frames, T), goal_angles(frames, T, free)
+        return Nearest(
+            q=read_only(q),
+            position_error=read_only(position),
+            rotation_error=read_only(rotation),
+            reached=(position <= REACHED * self.size) & (rotation <= REACHED),
+        )
+
+    def _robots(self, q: Array) -> Array:
+        """Return coordinates in rad and m; rounding takes none beyond its limit."""
+        return np.asarray(np.clip(q * self._units, *self._limits))
 
     def search(
         self,
@@ -193,24 +210,12 @@ class NumericSolver:
             pending = np.flatnonzero(left > 0.5 * REACHED**2)
             if not len(pending):
                 break
-        return self._nearest(best, T, free)
+        return self.errors(self._robots(best), T, free)
 
     def _goals(self, T: Array, free: Free | None, lever: float) -> _Goals:
         p, farthest = T[:, :3, 3], FARTHEST * self.size
         far = np.maximum(np.abs(p).max(axis=1, keepdims=True), farthest)
         return _Goals(p=p * (farthest / far) / self.size, R=T[:, :3, :3], weights=lever**2 * np.array(_WEIGHTS[free]))
-
-    def _nearest(self, q: Array, T: Array, free: Free | None) -> Nearest:
-        frames = self._frames(q)[-1]
-        frames[:, :3, 3] *= self.size
-        position = goal_distances(frames, T)
-        rotation = goal_angles(frames, T, free)
-        return Nearest(
-            q=read_only(q * self._units),
-            position_error=read_only(position),
-            rotation_error=read_only(rotation),
-            reached=(position <= REACHED * self.size) & (rotation <= REACHED),
-        )
 
     # ------------------------------------------------------------------------ the descent
 

@@ -2,4 +2,4 @@
 
 from dh2sim.extras import require_extra
 
-require_extra("view", "viser", "websockets", "msgspec", "mink", what="the viewer")
+require_extra("view", "viser", "websockets", "msgspec", what="the viewer")

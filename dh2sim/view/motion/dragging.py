@@ -19,7 +19,7 @@ from dh2sim.view.state import LinkDrag, Matrix, Mode, Part, ViewState
 if TYPE_CHECKING:
     import viser
 
-    from dh2sim.view.motion.inverse import InverseKinematics
+    from dh2sim.view.motion.inverse import HandleKinematics
     from dh2sim.view.panel.bound import Send
     from dh2sim.view.scene.items import Vector
     from dh2sim.view.scene.painter import Painter
@@ -51,7 +51,7 @@ class ToolHandle:
         self._scale = 0.0
         self._queued = False
         """Whether a solution is queued; it will use the handle's pose of that time."""
-        self._solver: tuple[RobotModel, InverseKinematics] | None = None
+        self._solver: tuple[RobotModel, HandleKinematics] | None = None
 
     def show(self, state: ViewState) -> None:
         """Show the handle of a state, if it has one."""
@@ -86,16 +86,16 @@ class ToolHandle:
         T = _pose(self._handle.position, self._handle.wxyz)
         if not np.isfinite(T).all():
             return
-        solution = self._inverse_kinematics(state.model).solve(state.q, T)
+        solution = self._kinematics(state.model).solve(state.q, T)
         rows: Matrix = tuple(tuple(row) for row in T.tolist())
         q = tuple(solution.q.tolist())
         self._apply(MoveTool(T_base_link_tool0=rows, q=q, reached=solution.reached))
 
-    def _inverse_kinematics(self, model: RobotModel) -> InverseKinematics:
-        from dh2sim.view.motion.inverse import InverseKinematics
+    def _kinematics(self, model: RobotModel) -> HandleKinematics:
+        from dh2sim.view.motion.inverse import HandleKinematics
 
         if self._solver is None or self._solver[0] is not model:
-            self._solver = (model, InverseKinematics(model))
+            self._solver = (model, HandleKinematics(model))
         return self._solver[1]
 
 
