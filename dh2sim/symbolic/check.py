@@ -46,6 +46,16 @@ class SampledConfigurations:
         self._frames = table_frame_poses(spec, self.q)
         self._known: dict[str, Array] = {}
 
+    @property
+    def length(self) -> float:
+        """The reach in the file's unit."""
+        return self.reach / self._metre
+
+    @property
+    def pose_scale(self) -> Array:
+        """Sizes of the columns of a pose: 1 of its rotation, the reach of its position."""
+        return np.array([1.0, 1.0, 1.0, self.length])
+
     def values(self, atoms: Iterable[Atom]) -> dict[Atom, Any]:
         """Return what atoms are: lengths in the file's unit, arrays of shape (samples,)."""
         column = {row: self.q[:, k] for k, row in enumerate(self.table.moving)}
@@ -153,7 +163,7 @@ def check_form(
     expected: Mapping[str, Array],
     configurations: SampledConfigurations,
     extra: Mapping[Atom, Any] | None = None,
-    size: float = 1.0,
+    scales: Mapping[str, Array | float] | None = None,
 ) -> float:
     """Compare the equations of a form with numbers.
 
@@ -162,10 +172,11 @@ def check_form(
         expected: For names of equations, arrays of shape (samples, rows, columns).
         configurations: Where they hold.
         extra: Values of atoms that are no part of the table.
-        size: Of the numbers that the expected ones were computed from, if that is larger than they are.
+        scales: For names of equations, the sizes that differences are measured by, of the shape of the equation or of
+            one that broadcasts to it; by default the reach for poses, 1 for their rotations.
 
     Returns:
-        The largest difference, as a share of the largest number in the equation, or of the reach.
+        The largest difference as a share of those sizes.
 
     Raises:
         MismatchError: A difference is larger than 1e-13.
@@ -179,8 +190,8 @@ def check_form(
         for k, value in enumerate(evaluated(equation.flat, form.named, values)):
             found[:, k // columns, k % columns] = value
         assert wanted.shape[1:] == (rows, columns)
-        scale = max(size, float(np.abs(wanted).max()))
-        error = float(np.abs(found - wanted).max()) / scale
+        scale = (scales or {}).get(equation.name, configurations.pose_scale)
+        error = float((np.abs(found - wanted).max(axis=0) / scale).max())
         if not error <= TOLERANCE:
             raise MismatchError(
                 f"{form.table.spec.name}: {equation.name} in symbols differs from the table by {error:.2g} of its "

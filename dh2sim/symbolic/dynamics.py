@@ -498,7 +498,9 @@ def _check(
         - np.einsum("knij,in->nkj", slope, rates)
     )
     size = max(1.0, float(np.abs(slope).max()), float(np.abs(M).max()))
-    check_form(form, {"M": M, "C": C, "g": g[:, :, None]}, configurations, extra, size)
+    expected = {"M": M, "C": C, "g": g[:, :, None]}
+    scales = {"M": size, "C": size, "g": max(1.0, float(np.abs(g).max()))}
+    check_form(form, expected, configurations, extra, scales)
 
 
 def _values(matrix: Matrix, value: Callable[[Polynomial], float]) -> Array:

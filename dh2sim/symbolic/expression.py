@@ -121,11 +121,27 @@ class Nesting:
 
 
 def _collected(polynomial: Polynomial, groups: Sequence[Sequence[Atom]]) -> Sum:
+    shared = _shared_twists(polynomial) if groups else ()
+    if shared:
+        rest = {
+            tuple(pair for pair in monomial if pair not in shared): number
+            for monomial, number in polynomial.terms.items()
+        }
+        return _times(shared, _collected(Polynomial(rest), groups))
     for k, group in enumerate(groups):
         parts = _by(polynomial, set(group).__contains__)
         if len(parts) > 1 or (parts and parts[0][0]):
             return _joined(_times(monomial, _collected(rest, groups[k + 1 :])) for monomial, rest in parts)
     return _plain(polynomial)
+
+
+def _shared_twists(polynomial: Polynomial) -> Monomial:
+    """Return the cosines and sines of named twists that several terms have in common, all of them."""
+    first, *others = polynomial.terms or ((),)
+    if not others:
+        return ()
+    constant = [pair for pair in first if (trig := trig_of(pair[0])) is not None and trig.angle.is_constant]
+    return tuple(pair for pair in constant if all(pair in monomial for monomial in others))
 
 
 def _plain(polynomial: Polynomial) -> Sum:
@@ -163,10 +179,14 @@ def tidied(sum_: Sum) -> Sum:
     terms = []
     for term in sum_.terms:
         factors = [Factor(tidied(base) if isinstance(base, Sum) else base, power) for base, power in term.factors]
-        factors.sort(key=lambda factor: (1,) if isinstance(factor.base, Sum) else (0, _atom_order(factor.base)))
+        factors.sort(key=lambda factor: (1,) if _is_sum(factor.base) else (0, _atom_order(str(factor.base))))
         terms.append(Term(term.number, tuple(factors)))
     first = next((k for k, term in enumerate(terms) if term.number > 0), 0)
     return Sum((terms[first], *terms[:first], *terms[first + 1 :]) if terms else ())
+
+
+def _is_sum(base: Atom | Sum) -> bool:
+    return isinstance(base, Sum) or base.startswith("#")
 
 
 def _joined(sums: Iterable[Sum]) -> Sum:
@@ -258,12 +278,11 @@ def name_sums(sums: Sequence[Sum], *, least: int = 2, prefix: str = "#") -> tupl
                 factors.append(Factor(replaced(base), power))
                 continue
             if key not in names:
-                negative = sum(part.number < 0 for part in base.terms)
-                defined = tidied(-base) if 2 * negative > len(base.terms) else base
-                definition = replaced(defined)
+                definition = replaced(base)
+                turned = 2 * sum(part.number < 0 for part in definition.terms) > len(definition.terms)
                 name = f"{prefix}{len(named) + 1}"
-                names[key] = (name, defined.key)
-                named[name] = definition
+                names[key] = (name, opposite if turned else own)
+                named[name] = tidied(-definition if turned else definition)
             name, defined_key = names[key]
             factors.append(Factor(name, power))
             if defined_key != own and power % 2:

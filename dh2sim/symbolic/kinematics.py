@@ -163,6 +163,8 @@ def jacobian_form(
     )
     equations, named = with_names([shown], names=names)
     expected = {"J": numbers}
+    length = configurations.length
+    scales: dict[str, Array | float] = {"J": np.array([[length]] * 3 + [[1.0]] * 3)}
     conditions: tuple[Condition, ...] = ()
     notes: tuple[str, ...] = ()
     rows = square_rows(J)
@@ -175,7 +177,9 @@ def jacobian_form(
             term = _signed(found, nesting, determinant, configurations)
             of = "" if len(rows) == 6 else "(" + ", ".join(VELOCITIES[i] for i in rows) + ")"
             equations = (*equations, Equation(name=f"det J{of}", entries=((Sum((term,) if term.number else ()),),)))
-            expected[equations[-1].name] = determinant[:, None, None]
+            name = equations[-1].name
+            expected[name] = determinant[:, None, None]
+            scales[name] = max(float(np.abs(determinant).max()), length ** sum(i < 3 for i in rows))
             conditions = tuple(
                 Condition(expression=nesting(s.factor), name=s.name, angle=s.angle, degrees=s.degrees)
                 for s in singularities(table, found)
@@ -191,7 +195,7 @@ def jacobian_form(
         notes=notes,
         joint_names=joint_names,
     )
-    check_form(form, expected, configurations)
+    check_form(form, expected, configurations, scales=scales)
     return form
 
 

@@ -220,13 +220,24 @@ def pieces(text: str) -> list[str]:
 
 
 def _filled_cell(text: str, width: int) -> list[str]:
-    """Return an expression in lines, cut between terms."""
+    """Return an expression in lines, cut between terms; a term that is too long by itself is cut after a ``*``."""
     lines: list[str] = []
     for piece in pieces(text):
-        if lines and len(lines[-1]) + 1 + len(piece) <= width:
+        if len(piece) > width:
+            lines += _cut(piece, width)
+        elif lines and len(lines[-1]) + 1 + len(piece) <= width:
             lines[-1] += f" {piece}"
         else:
             lines.append(piece)
+    return lines
+
+
+def _cut(term: str, width: int) -> list[str]:
+    lines = [""]
+    for factor in re.split(r"(?<=[^*]\*)(?!\*)", term):
+        if lines[-1] and len(lines[-1]) + len(factor) > width:
+            lines.append("")
+        lines[-1] += factor
     return lines
 
 

@@ -27,7 +27,8 @@ def test_jacobian_equals_that_of_the_chain(spec: RobotSpec, fold: Fold) -> None:
     configurations = SampledConfigurations(form.table, seed=3)
     J = geometric_jacobian(build_chain(spec), configurations.q)
     only_J = replace(form, equations=form.equations[:1])
-    assert check_form(only_J, {"J": J}, configurations) <= 1e-13
+    scale = np.array([[configurations.length]] * 3 + [[1.0]] * 3)
+    assert check_form(only_J, {"J": J}, configurations, scales={"J": scale}) <= 1e-13
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if len(spec_of(name).rows) == 6])
@@ -37,7 +38,8 @@ def test_determinant_of_every_six_axis_arm_has_factors_equal_to_that_of_the_chai
     configurations = SampledConfigurations(form.table, seed=4)
     expected = np.linalg.det(geometric_jacobian(build_chain(spec_of(name)), configurations.q))
     only = replace(form, equations=(determinant,))
-    check_form(only, {"det J": expected[:, None, None]}, configurations)
+    size = max(float(np.abs(expected).max()), configurations.length**3)
+    check_form(only, {"det J": expected[:, None, None]}, configurations, scales={"det J": size})
     assert len(determinant.flat[0].terms) == 1
 
 
