@@ -175,7 +175,9 @@ class Shoulder:
     tolerance: float
     """Offsets below this, m, count as none in names."""
     front: float = 0.0
-    """Sign tells which way along f is the front, where there is no offset: towards joint 2, or as axis 2 points."""
+    """How far axis 2 is before axis 1 along f, m."""
+    sense: float = 1.0
+    """Positive where axis 2 points along y, if f is along x."""
 
     def describe(self, sheet: Worksheet) -> None:
         """Write what the letters are."""
@@ -261,7 +263,7 @@ class Shoulder:
         elif abs(self.front) > self.tolerance:
             yield "front" if rho * self.front > 0.0 else "back"
         else:
-            yield "left" if rho > 0.0 else "right"
+            yield "left" if rho * self.sense > 0.0 else "right"
 
 
 def law_of_cosines(
@@ -422,6 +424,7 @@ def shoulder_of(axes: ArmAxes, W0: Array) -> tuple[Shoulder, Array, Array, Array
             size=axes.size,
             tolerance=axes.tolerance * axes.size,
             front=before,
+            sense=float(w2 @ e),
         ),
         f,
         e,
