@@ -274,6 +274,7 @@ def frames(
       dh2sim frames axes.yaml
       dh2sim frames axes.yaml --explain -o arm.yaml
     """
+    from dh2sim.importing.source_errors import errors_of
     from dh2sim.importing.sources import import_axes
     from dh2sim.robot.axes_file import read_axes
     from dh2sim.robot.spec import CONVENTIONS, Convention
@@ -294,7 +295,8 @@ def frames(
             print(f"dh2sim: no picture is drawn: {error}", file=sys.stderr)
     require_free(drawing, force=force)
     folder = Path.cwd() if out is None else out.resolve().parent
-    imported = import_axes(spec, convention=chosen, tolerance=allowed, explain=explain, folder=folder)
+    with errors_of(axes):
+        imported = import_axes(spec, convention=chosen, tolerance=allowed, explain=explain, folder=folder)
     if as_json:
         hand_over_json(imported.text, out, imported.spec, imported.notes, _residual(imported))
     else:

@@ -17,6 +17,7 @@ from dh2sim.importing.convert import EXACT_CONFIGURATIONS
 from dh2sim.importing.convert import TOLERANCE as EXACT_TOLERANCE
 from dh2sim.importing.result import Imported
 from dh2sim.importing.serial import import_serial, robot_name
+from dh2sim.importing.source_errors import MADE
 from dh2sim.kinematics.arm_path import arm_path
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.compaction import compact_rows
@@ -357,4 +358,4 @@ def _written(spec: RobotSpec, notes: Sequence[str], nominal: RobotSpec, folder: 
     units = nominal.units if nominal.source_file is not None else Units(angle=AngleUnit.DEG)
     header = [f"Note: {note}" for note in notes]
     text = robot_file_text(spec, header=header, folder=folder, angle=units.angle, length=units.length)
-    return text, parse_robot(text, file="the robot file", directory=folder)
+    return text, parse_robot(text, file=MADE, directory=folder)

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from dh2sim.errors import Dh2simError, MismatchError
+from dh2sim.errors import MismatchError
 from dh2sim.formats.serial_robot import SerialLink, SerialMesh, SerialRobot
 from dh2sim.importing.mechanics import measure_mechanics
 from dh2sim.importing.result import Imported
+from dh2sim.importing.source_errors import MADE
 from dh2sim.kinematics.frame_assignment.recover import (
     CONFIGURATIONS,
     TOLERANCE,
@@ -26,9 +27,23 @@ from dh2sim.kinematics.frame_assignment.recover import (
 from dh2sim.kinematics.frame_assignment.result import Step, Tolerances
 from dh2sim.kinematics.frame_assignment.rounding import simple_angles, simple_length, simple_turn, simple_vector
 from dh2sim.kinematics.transforms import invert, pose_from_rpy, rotate_tensor, rpy_from_rotation
-from dh2sim.messages import listed, shown
+from dh2sim.messages import Notes, listed, shown
 from dh2sim.model.mass import is_possible, made_possible
 from dh2sim.robot.fields import LONGEST_NAME, is_reserved, name_problem
+from dh2sim.robot.magnitudes import (
+    ANGLE,
+    ARMATURE,
+    DAMPING,
+    EFFORT,
+    FRICTION,
+    INERTIA,
+    LENGTH,
+    MASS,
+    POSITION_GAIN,
+    SCALE,
+    VELOCITY_GAIN,
+    Magnitude,
+)
 from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import ActuatorSpec, BaseSpec, Convention, Limits, LinkSpec, MeshSpec, Pose, RobotSpec, Row
 from dh2sim.robot.write import robot_file_text
@@ -186,6 +201,51 @@ def _without_invented_masses(robot: SerialRobot) -> tuple[SerialRobot, list[str]
     return replace(robot, links=tuple(links)), notes
 
 
+def _without_absurd_numbers(robot: SerialRobot) -> tuple[SerialRobot, list[str]]:
+    """Leave out limits, dynamics, gains and masses beyond what a robot may have, and return a sentence on each kind.
+
+    Files write 1e16 or 1e-300 where they mean that there is no limit.
+    """
+    notes = Notes()
+
+    def fits(value: float | None, size: Magnitude, what: str, name: str, least: float = 0.0) -> bool:
+        if value is None or value == 0.0 or least <= abs(value) <= size.most:
+            return True
+        notes.group(f"Left out, as a robot cannot have such {what}: that of {{}}.", name, f"{value:g}")
+        return False
+
+    def kept(value: float | None, size: Magnitude, what: str, name: str) -> float | None:
+        return value if fits(value, size, what, name, size.least) else None
+
+    limits, dynamics, links = [], [], []
+    for joint, given, moved, link in zip(robot.chain.joints, robot.limits, robot.dynamics, robot.links, strict=True):
+        size, name = ANGLE if joint.type.turns else LENGTH, joint.name
+        ends = given.position if all(fits(q, size, "a limit", name) for q in given.position or ()) else None
+        velocity = kept(given.velocity, size, "a limit of velocity", name)
+        limits.append(Limits(position=ends, velocity=velocity, effort=kept(given.effort, EFFORT, "an effort", name)))
+        sizes = {"damping": DAMPING, "friction": FRICTION, "armature": ARMATURE}
+        values = {what: kept(getattr(moved, what), size, f"a {what}", name) for what, size in sizes.items()}
+        dynamics.append(replace(moved, **{what: value or 0.0 for what, value in values.items()}))
+        if kept(link.mass, MASS, "a mass", link.name) is None:
+            link = replace(link, mass=None, com=None, inertia=None)
+        largest = None if link.inertia is None else float(np.abs(link.inertia).max())
+        if not fits(largest, INERTIA, "an inertia", link.name):
+            link = replace(link, inertia=None)
+        if link.mesh is not None and kept(link.mesh.scale, SCALE, "a scale of a mesh", link.name) is None:
+            link = replace(link, mesh=None)
+        links.append(link)
+    drives = robot.actuators and tuple(
+        replace(
+            drive,
+            kp=kept(drive.kp, POSITION_GAIN, "a gain", joint.name),
+            kv=kept(drive.kv, VELOCITY_GAIN, "a gain", joint.name),
+        )
+        for joint, drive in zip(robot.chain.joints, robot.actuators, strict=True)
+    )
+    changed = replace(robot, limits=tuple(limits), dynamics=tuple(dynamics), links=tuple(links), actuators=drives)
+    return changed, list(notes.sentences())
+
+
 def _limits(limits: Limits, row: Row, tolerances: Tolerances) -> Limits:
     """Return limits that are as simple as the table: a file's 2.9670597 rad may mean 170 degrees."""
     simple = simple_turn if row.type.turns else simple_length
@@ -260,16 +320,25 @@ def import_serial(
 
     Raises:
         MismatchError: The residual is above the tolerance.
-        Dh2simError: The robot cannot be written as a robot file.
+        RobotError: The robot cannot be written as a robot file.
     """
     names, renamed = joint_names([joint.name for joint in robot.chain.joints])
     own_name = robot_name(robot.name if name is None else name)
     joints = tuple(replace(joint, name=own) for joint, own in zip(robot.chain.joints, names, strict=True))
-    robot, weighed = _without_invented_masses(replace(robot, chain=replace(robot.chain, joints=joints)))
+    robot, absurd = _without_absurd_numbers(replace(robot, chain=replace(robot.chain, joints=joints)))
+    robot, weighed = _without_invented_masses(robot)
     recovery = recover_table(robot.chain, convention=convention, tolerance=tolerance, name=own_name)
     spec = assemble(robot, recovery, name=own_name, joint_names=names)
     hint = None if calibrated else simpler_with(spec, tolerance)
-    notes = (*robot.notes, *weighed, *_base_mass(robot), *renamed, *_tilted(recovery), *([hint] if hint else []))
+    notes = (
+        *robot.notes,
+        *absurd,
+        *weighed,
+        *_base_mass(robot),
+        *renamed,
+        *_tilted(recovery),
+        *([hint] if hint else []),
+    )
     comments = [*header, *(f"Note: {note}" for note in notes)]
     origin = source or robot.description
     spec = replace(spec, description=description, source=origin)
@@ -315,10 +384,7 @@ def _read_back(spec: RobotSpec, comments: Sequence[str], folder: Path | None) ->
 
 
 def _read(text: str, folder: Path | None) -> RobotSpec:
-    try:
-        return parse_robot(text, file="the robot file", directory=folder)
-    except Dh2simError as error:
-        raise Dh2simError(f"the robot cannot be written as a robot file:\n{error}") from error
+    return parse_robot(text, file=MADE, directory=folder)
 
 
 def _base_mass(robot: SerialRobot) -> list[str]:

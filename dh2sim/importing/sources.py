@@ -22,6 +22,7 @@ from dh2sim.formats.xml_read import Element
 from dh2sim.importing.explain import explanation
 from dh2sim.importing.result import Imported
 from dh2sim.importing.serial import import_serial, robot_name
+from dh2sim.importing.source_errors import MADE, errors_of
 from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.compaction import far_frames
 from dh2sim.kinematics.frame_assignment.recover import TOLERANCE
@@ -83,7 +84,9 @@ def import_table(
         )
     header = [f"Note: {note}" for note in notes]
     text = robot_file_text(spec, header=header, folder=folder, angle=read.units.angle, length=read.units.length)
-    return Imported(text=text, spec=parse_robot(text, file="the robot file", directory=folder), notes=tuple(notes))
+    with errors_of(file):
+        made = parse_robot(text, file=MADE, directory=folder)
+    return Imported(text=text, spec=made, notes=tuple(notes))
 
 
 def _sentence(note: str) -> str:
@@ -297,9 +300,9 @@ def import_data(data: bytes, file: str, options: ImportOptions, *, folder: Path 
         _refuse_yaml(data, file)
     match root:
         case "robot":
-            return _serial(_read_urdf(data, file, options), data, options, folder)
+            return _serial(_read_urdf(data, file, options), data, file, options, folder)
         case "mujoco" | "mujocoinclude":
-            return _serial(_read_mjcf(file, options), data, options, folder)
+            return _serial(_read_mjcf(file, options), data, file, options, folder)
         case None:
             return _table(data, file, options, folder)
         case _:
@@ -409,19 +412,20 @@ def _refuse_units(file: str, kind: str, options: ImportOptions) -> None:
         raise Dh2simError(f"{file}: table is the number of a table in a text; this is {kind}")
 
 
-def _serial(robot: SerialRobot, data: bytes, options: ImportOptions, folder: Path | None) -> Imported:
+def _serial(robot: SerialRobot, data: bytes, file: str, options: ImportOptions, folder: Path | None) -> Imported:
     if options.convention is Convention.HAYATI:
         raise Dh2simError(_NO_HAYATI)
     given = ", ".join(f"{name}:={value}" for name, value in options.arguments.items())
     expanded = f", expanded by xacro with {given}" if given else ""
-    return import_serial(
-        robot,
-        convention=_choice(Convention, options.convention, "convention") or Convention.STANDARD,
-        tolerance=options.tolerance,
-        folder=folder,
-        name=options.name,
-        source=f"{robot.description}{expanded} (SHA-256 {hashlib.sha256(data).hexdigest()[:16]}…).",
-    )
+    with errors_of(file, data, [joint.name for joint in robot.chain.joints]):
+        return import_serial(
+            robot,
+            convention=_choice(Convention, options.convention, "convention") or Convention.STANDARD,
+            tolerance=options.tolerance,
+            folder=folder,
+            name=options.name,
+            source=f"{robot.description}{expanded} (SHA-256 {hashlib.sha256(data).hexdigest()[:16]}…).",
+        )
 
 
 def _calibration(data: bytes, file: str, options: ImportOptions, folder: Path | None) -> Imported:
@@ -435,16 +439,17 @@ def _calibration(data: bytes, file: str, options: ImportOptions, folder: Path | 
     given = options.nominal
     nominal = load_robot(given) if isinstance(given, str | os.PathLike) else None if given is None else spec_of(given)
     called = "standard input" if file == STDIN else Path(file).name
-    return import_calibration(
-        data,
-        file=file,
-        nominal=nominal,
-        convention=_choice(Convention, options.convention, "convention"),
-        tolerance=options.tolerance,
-        name=options.name,
-        folder=folder,
-        origin=f"Calibration in {called} (SHA-256 {hashlib.sha256(data).hexdigest()[:16]}…)",
-    )
+    with errors_of(file):
+        return import_calibration(
+            data,
+            file=file,
+            nominal=nominal,
+            convention=_choice(Convention, options.convention, "convention"),
+            tolerance=options.tolerance,
+            name=options.name,
+            folder=folder,
+            origin=f"Calibration in {called} (SHA-256 {hashlib.sha256(data).hexdigest()[:16]}…)",
+        )
 
 
 def _table(data: bytes, file: str, options: ImportOptions, folder: Path | None) -> Imported:

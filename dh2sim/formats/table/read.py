@@ -9,7 +9,7 @@ from pathlib import PurePath
 from types import MappingProxyType
 from typing import Final
 
-from dh2sim.errors import Dh2simError, ImportedFileError, RobotFileError
+from dh2sim.errors import Dh2simError, ImportedFileError, RobotError, RobotFileError
 from dh2sim.formats.table import conventions, units
 from dh2sim.formats.table.constants import find_constants
 from dh2sim.formats.table.dh_table import Located, Table
@@ -31,7 +31,7 @@ from dh2sim.formats.table.printout import (
     pose_of,
 )
 from dh2sim.formats.table.rows import Body, ResolvedUnits, is_hayati, read_body, to_row
-from dh2sim.messages import member, shown
+from dh2sim.messages import loc_of, member, path_of, shown
 from dh2sim.robot.fields import name_problem
 from dh2sim.robot.spec import (
     AngleUnit,
@@ -230,7 +230,11 @@ class _Reader:
         )
         self._check_printout(rows)
         findings.check()
-        spec = self._spec(name, rows, chosen, used.length)
+        try:
+            spec = self._spec(name, rows, chosen, used.length)
+        except RobotError as error:
+            self._note_wrong(error)
+            raise findings.error() from None
         for symbol in body.constants:
             findings.note(f"line {constants[symbol].line} gives {symbol} its value")
         self._note_unread()
@@ -266,6 +270,18 @@ class _Reader:
         chosen = conventions.decide_convention(option, printed, self._columns, self._lines, lines, self._findings)
         chosen = chosen or Convention.STANDARD
         return chosen, [Convention.HAYATI if own else chosen for own in hayati]
+
+    def _note_wrong(self, error: RobotError) -> None:
+        """Note what is wrong with the robot at the rows of the table."""
+        cells = self._table.rows
+        for problem in error.problems:
+            match loc_of(problem.path):
+                case ("joints", int(number), *rest) if number < len(cells):
+                    self._findings.wrong(
+                        cells[number][0], f"row {number + 1}, {path_of(tuple(rest))}", problem.message
+                    )
+                case _:
+                    self._findings.wrong(self._table.header[0], problem.path, problem.message)
 
     def _check_printout(self, rows: Sequence[Row]) -> None:
         """Check that the joints of a printout are those that its first line announces."""
