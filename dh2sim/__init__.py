@@ -40,6 +40,7 @@ _HOMES = {
     "find_slips": "model.slips",
     "forward_kinematics": "kinematics.forward",
     "frame_poses": "kinematics.forward",
+    "generate_code": "codegen.generate",
     "geometric_jacobian": "kinematics.forward",
     "import_robot": "importing.sources",
     "inverse_kinematics": "inverse.solver",
@@ -57,6 +58,7 @@ _HOMES = {
 __all__ = [*_HOMES]
 
 if TYPE_CHECKING:
+    from dh2sim.codegen.generate import generate_code as generate_code
     from dh2sim.errors import Dh2simError as Dh2simError
     from dh2sim.errors import RobotError as RobotError
     from dh2sim.errors import RobotFileError as RobotFileError

@@ -630,9 +630,9 @@ class Robot:
         Raises:
             Dh2simError: There is no such language or code; or the code differs from the table.
         """
-        from dh2sim.codegen.generate import generate
+        from dh2sim.codegen.generate import generate_code
 
-        return generate(self, what, language, name=name)
+        return generate_code(self, what, language, name=name)
 
     def rollout(
         self,

@@ -19,6 +19,7 @@ PAGE = ROOT / "docs" / "library.md"
 
 ERRORS: dict[str, dict[str, float]] = {
     "batch_kinematics": {},
+    "control_with_generated_code": {r"to within (\S+) rad": 1e-3},
     "convert_convention": {r"tool0: at most (\S+) apart": 1e-14},
     "export_to_mujoco": {r"by the table: (\S+) m apart": 1e-14},
     "import_urdf": {r"axis: at most (\S+) m apart": 1e-12},
@@ -112,6 +113,7 @@ assert_type(robot.jacobian(np.zeros((2, 3))), Array)
 assert_type(robot.limits, tuple[Array, Array])
 assert_type(robot.configurations, Mapping[str, Array])
 assert_type(robot.mjcf(), str)
+assert_type(robot.code("c", ["pose", "jacobian"]), str)
 assert_type(robot.export("build"), ExportReport)
 assert_type(robot.validate(), RobotReport)
 assert_type(robot.validate().ok, bool)

@@ -41,7 +41,7 @@ def print_code(robot: str, what: str, as_: str, out: Path | None, *, force: bool
     Raises:
         BadParameter: An option has a wrong value, or does not apply.
     """
-    from dh2sim.codegen.generate import generate, summarize
+    from dh2sim.codegen.generate import generate_code, summarize
 
     for option, given in others.items():
         if given:
@@ -53,7 +53,7 @@ def print_code(robot: str, what: str, as_: str, out: Path | None, *, force: bool
     if as_.lower() in LANGUAGES:
         # MATLAB calls a function by the name of its file
         name = out.stem if out is not None and as_.lower() == Language.MATLAB else None
-        text = generate(spec, [word for word in wanted if word is not None], as_.lower(), name=name)
+        text = generate_code(spec, [word for word in wanted if word is not None], as_.lower(), name=name)
     elif about != What.INVERSE_DYNAMICS:
         raise typer.BadParameter(f"takes one of {', '.join(Language)} for several functions", param_hint="--as")
     elif as_ == "json":

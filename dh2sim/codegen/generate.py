@@ -27,7 +27,7 @@ from dh2sim.robot.spec import RobotSpec
 _WIDTH: Final = 100
 
 
-def generate(
+def generate_code(
     robot: ModelLike,
     what: What | str | Iterable[What | str] = (What.POSE,),
     language: Language | str = Language.PYTHON,
@@ -81,7 +81,7 @@ class CodeSummary:
 
 
 def summarize(robot: ModelLike, what: What | str | Iterable[What | str] = (What.INVERSE_DYNAMICS,)) -> CodeSummary:
-    """Return what ``generate`` would write, in numbers; arguments and errors are those of it."""
+    """Return what ``generate_code`` would write, in numbers; arguments and errors are those of it."""
     program, _, _ = _asked_for(robot, what, None)
     return CodeSummary(
         operations={function.name: program.operations(function) for function in program.functions},

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dh2sim.codegen.generate import generate
+from dh2sim.codegen.generate import generate_code
 from tests.program import dh2sim
 from tests.sample_robots import robot
 
@@ -16,15 +16,15 @@ ALL = "pose,jacobian,inverse-dynamics"
 def test_code_is_printed_in_every_language(language: str) -> None:
     done = dh2sim("symbolic", "rpr", "--what", "pose, jacobian", "--as", language)
     assert (done.status, done.err) == (0, "")
-    assert done.out == generate(robot("rpr"), ["pose", "jacobian"], language)
-    assert dh2sim("symbolic", "rpr", "--as", language.upper()).out == generate(robot("rpr"), "pose", language)
+    assert done.out == generate_code(robot("rpr"), ["pose", "jacobian"], language)
+    assert dh2sim("symbolic", "rpr", "--as", language.upper()).out == generate_code(robot("rpr"), "pose", language)
 
 
 def test_code_is_written_to_a_file_and_a_file_is_not_overwritten_unasked(tmp_path: Path) -> None:
     file = tmp_path / "arm.c"
     done = dh2sim("symbolic", "rpr", "--what", ALL, "--as", "c", "-o", file)
     assert (done.status, done.out) == (0, f"{file}: rpr: pose, jacobian, inverse-dynamics as c\n")
-    assert file.read_text() == generate(robot("rpr"), ALL.split(","), "c")
+    assert file.read_text() == generate_code(robot("rpr"), ALL.split(","), "c")
     again = dh2sim("symbolic", "rpr", "--as", "c", "-o", file)
     assert again.status == 2
     assert "exists already" in again.err

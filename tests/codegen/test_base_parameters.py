@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dh2sim import Prismatic, Revolute, Robot
-from dh2sim.codegen.generate import generate, summarize
+from dh2sim.codegen.generate import generate_code, summarize
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
@@ -78,6 +78,6 @@ def test_forces_of_general_links_equal_those_of_mujoco(name: str) -> None:
 
 
 def test_links_that_cannot_move_a_joint_are_not_in_its_code() -> None:
-    text = generate(with_general_links(robot("planar_2r")), "inverse-dynamics", "python")
+    text = generate_code(with_general_links(robot("planar_2r")), "inverse-dynamics", "python")
     # its axes are vertical
     assert set(re.findall(r"^([A-Z]+[0-9]) =", text, flags=re.MULTILINE)) == {"ZZ1", "MX2", "MY2", "ZZ2"}

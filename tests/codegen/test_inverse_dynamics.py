@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from dh2sim.codegen.generate import generate
+from dh2sim.codegen.generate import generate_code
 from dh2sim.engines.mujoco_engine import keep_centers_of_mass
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.errors import ModelError
@@ -56,7 +56,7 @@ def assert_equal_forces(found: Array, expected: Array) -> None:
 
 
 def forces_of(built: RobotModel, q: Array, qd: Array, qdd: Array) -> Array:
-    function = python_functions(generate(built, "inverse-dynamics", "numpy"))["inverse_dynamics"]
+    function = python_functions(generate_code(built, "inverse-dynamics", "numpy"))["inverse_dynamics"]
     return np.asarray(function(q, qd, qdd))
 
 
