@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,10 +13,12 @@ from dh2sim.cli.common import RobotArgument, choice, load_all
 from dh2sim.cli.output import hand_over, require_free
 from dh2sim.cli.symbolic_code import LANGUAGES, is_about_code, print_code
 from dh2sim.errors import Dh2simError
-from dh2sim.symbolic.dynamics import MOST_JOINTS
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.request import What, symbolic_form
 from dh2sim.symbolic.table import Fold
+
+if TYPE_CHECKING:
+    from dh2sim.robot.spec import RobotSpec
 
 
 class Format(StrEnum):
@@ -97,11 +99,8 @@ def symbolic(
     require_free(out, force=force)
     [spec] = load_all([robot])
     bodies = None
-    if wanted is What.DYNAMICS and len(spec.moving_rows) > MOST_JOINTS:
-        raise Dh2simError(
-            f"{spec.name}: has {len(spec.moving_rows)} joints that move; equations of motion are printed for up to "
-            f"{MOST_JOINTS}. For any arm: --what inverse-dynamics --as c"
-        )
+    if wanted is What.DYNAMICS:
+        _require_few_joints(spec)
     if wanted is What.DYNAMICS and not letters:
         from dh2sim.model.build import build_model
 
@@ -130,3 +129,13 @@ def symbolic(
         case _:
             text = f"{spec.name}: {form}\n"
     hand_over(text, out, summary=f"{spec.name}: {wanted} as {format_}", quiet=out is None)
+
+
+def _require_few_joints(spec: RobotSpec) -> None:
+    from dh2sim.symbolic.dynamics import MOST_JOINTS
+
+    if len(spec.moving_rows) > MOST_JOINTS:
+        raise Dh2simError(
+            f"{spec.name}: has {len(spec.moving_rows)} joints that move; equations of motion are printed for up to "
+            f"{MOST_JOINTS}. For any arm: --what inverse-dynamics --as c"
+        )

@@ -23,6 +23,18 @@ TOLERANCE: Final = 1e-13
 """Of entries without a unit; times the reach for lengths."""
 
 
+def scattered(count: int, dimensions: int, seed: int = 0) -> Array:
+    """Return points of the unit cube that no hyperplane through few of them explains, shape (count, dimensions).
+
+    Multiples of the square roots of primes, less their whole parts (H. Weyl, 1916): numpy.random takes longer to
+    import than most forms take to compute.
+    """
+    primes = [p for p in range(2, 8 * dimensions + 16) if all(p % d for d in range(2, math.isqrt(p) + 1))]
+    steps = np.arange(1, count + 1)[:, None] + 1009 * seed
+    points: Array = np.modf(steps * np.sqrt(np.array(primes[:dimensions], dtype=np.float64)))[0]
+    return points
+
+
 class SampledConfigurations:
     """Random configurations of a robot, and what atoms and frames are there."""
 
@@ -38,8 +50,7 @@ class SampledConfigurations:
         lengths += [abs(v) for pose in (spec.base.pose, spec.tool.pose) for v in pose.xyz.tolist()]
         self.reach = max(math.fsum(lengths), self._metre)
         """Sum of the lengths of the table, m, and how far slides are moved."""
-        random = np.random.default_rng(seed)
-        shares = random.uniform(-1.0, 1.0, (samples, len(rows)))
+        shares = 2.0 * scattered(samples, len(rows), seed) - 1.0
         scale = np.array([math.pi if row.type.turns else self.reach for row in rows])
         self.q: Array = shares * scale if q is None else q
         """rad and m, shape (samples, n)."""

@@ -20,7 +20,7 @@ import numpy as np
 from dh2sim.errors import Dh2simError
 from dh2sim.robot.spec import Convention
 from dh2sim.symbolic.angles import derivative_by, rate, slide, trig_of
-from dh2sim.symbolic.check import SampledConfigurations, check_form
+from dh2sim.symbolic.check import SampledConfigurations, check_form, scattered
 from dh2sim.symbolic.expression import Factor, Nesting, Sum, Term, name_sums, tidied
 from dh2sim.symbolic.form import Equation, Form
 from dh2sim.symbolic.harmonics import Harmonics, Runs
@@ -455,11 +455,12 @@ def _check(
 ) -> None:
     """Compare M, C and g with sums over bodies at random configurations, for random values of letters."""
     table = form.table
-    random = np.random.default_rng(1)
     configurations = SampledConfigurations(table)
     count = len(configurations.q)
-    extra: dict[Atom, Any] = {name: float(random.uniform(0.5, 2.0)) for name in letters}
-    extra |= {rate(i): random.uniform(-1.0, 1.0, count) for i in table.moving}
+    sizes = scattered(1, len(letters), seed=1)[0].tolist()
+    extra: dict[Atom, Any] = {name: 0.5 + size for name, size in zip(letters, sizes, strict=True)}
+    rates = 2.0 * scattered(count, len(table.moving), seed=2).T - 1.0
+    extra |= {rate(i): values for i, values in zip(table.moving, rates, strict=True)}
     metre = table.spec.units.metres(1.0)
 
     def value(polynomial: Polynomial) -> float:
@@ -491,7 +492,6 @@ def _check(
 
     M, g = mass_matrix(configurations.q)
     slope = np.stack([_exact_slope(mass_matrix, configurations, k) for k in range(M.shape[1])])
-    rates = np.stack([extra[rate(i)] for i in table.moving])
     C = 0.5 * (
         np.einsum("inkj,in->nkj", slope, rates)
         + np.einsum("jnki,in->nkj", slope, rates)

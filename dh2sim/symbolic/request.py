@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from dh2sim.errors import Dh2simError
 from dh2sim.messages import member
 from dh2sim.robot.spec import RobotSpec
-from dh2sim.symbolic.data import form_data
-from dh2sim.symbolic.dynamics import Bodies, dynamics_form
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.form import Equation, Form
 from dh2sim.symbolic.kinematics import jacobian_form, matrices_form, pose_form
-from dh2sim.symbolic.latex import latex_document, latex_fragment, markdown
 from dh2sim.symbolic.table import Fold, symbolic_table
 from dh2sim.symbolic.text import form_text
+
+if TYPE_CHECKING:
+    from dh2sim.symbolic.dynamics import Bodies
 
 
 class What(StrEnum):
@@ -59,17 +59,25 @@ class SymbolicForm:
 
     def latex(self) -> str:
         """Return a LaTeX document that compiles as it stands; wide matrices are listed entry by entry."""
+        from dh2sim.symbolic.latex import latex_document
+
         return latex_document(self.form, self._title)
 
     def markdown(self) -> str:
         """Return Markdown with formulas."""
+        from dh2sim.symbolic.latex import markdown
+
         return markdown(self.form, self._title)
 
     def data(self) -> dict[str, Any]:
         """Return the form as data ready for JSON, as ``docs/symbolic.md`` describes it."""
+        from dh2sim.symbolic.data import form_data
+
         return form_data(self.form)
 
     def _repr_latex_(self) -> str:
+        from dh2sim.symbolic.latex import latex_fragment
+
         return latex_fragment(self.form)
 
     @property
@@ -131,6 +139,8 @@ def symbolic_form(
     fold_ = member(Fold, fold, "fold")
     match wanted:
         case What.DYNAMICS:
+            from dh2sim.symbolic.dynamics import dynamics_form
+
             form = dynamics_form(table, None if letters else bodies, names=names, joint_names=joint_names)
         case What.POSE:
             form = pose_form(
