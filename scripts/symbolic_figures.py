@@ -4,8 +4,8 @@
     scripts/symbolic_figures.py            print the table
     scripts/symbolic_figures.py --write    write it into the page
 
-Times are processor time of the library, best of five, checks included; reading the robot file and starting Python come
-on top. Operations are those of the pose with its sums named.
+Times are processor time of the library, best of five, checks included; reading the robot file and starting Python
+come on top. Operations are those of the pose with its sums named.
 """
 
 from __future__ import annotations
