@@ -28,6 +28,9 @@ from dh2sim.typing import Array, read_only
 ROUNDED: Final = 1e-5
 """Angles, rad, and lengths as a share of the arm's size, by which a table's rounding may miss a textbook's class."""
 
+_EXACT_ENOUGH: Final = 1e-5
+"""Share of the arm's size, and rad: a double root has half the digits of a double."""
+
 _WIDTH: Final = 80
 
 
@@ -147,14 +150,15 @@ def explain(robot: SpecLike, T: ArrayLike) -> Explanation:
                 q=q, name=branch_name(form, q), signs=branch.signs, position_error=position, rotation_error=rotation
             )
         )
-    small = 100.0 * tolerance
+    small = _EXACT_ENOUGH if tolerance == EXACT else 100.0 * tolerance
     branches = tuple(b for b in found if b.position_error <= small * axes.size and b.rotation_error <= small)
     others = tuple(b for b in found if b not in branches)
     for other in others:
         signs = ", ".join(f"{letter} = {sign:+d}" for letter, sign in other.signs)
         sheet.note(
-            f"{signs or 'The one choice'}: misses the position by {sheet.measure(other.position_error)} and the "
-            f"orientation by {sheet.angle(other.rotation_error)}; {len(axes.joints)} joints cannot have both."
+            f"{signs or 'The one choice'}: {len(axes.joints)} joints come within "
+            f"{sheet.measure(other.position_error)} of the goal's position, turned from its orientation by "
+            f"{sheet.angle(other.rotation_error)}."
         )
     worst = max((max(b.position_error / axes.size, b.rotation_error) for b in branches), default=0.0)
     if tolerance > EXACT:
@@ -181,7 +185,7 @@ def _filled(text: str, indent: str = "") -> list[str]:
 
 def _step_lines(number: int, step: Step) -> list[str]:
     """Return a step: title, formulas, remark, and its lines below the signs that lead to them."""
-    lines = _filled(f"{number}. {step.title}")
+    lines = textwrap.wrap(f"{number}. {step.title}", _WIDTH, subsequent_indent=" " * (len(str(number)) + 2))
     lines += [f"      {formula}" for formula in step.formulas]
     lines += _filled(step.remark, "   ")
     if step.lines and (step.formulas or step.remark):

@@ -25,7 +25,7 @@ DOUBLE: Final = 1e-7
 
 _MEASURED: Final = "Measured on the mechanism at zero; f is the arm's direction, z up along axis 1."
 
-UNDETERMINED: Final = 1e-9
+UNDETERMINED: Final = 1e-11
 """Share of the arm's size, within which a point is on an axis."""
 
 
@@ -287,7 +287,7 @@ def law_of_cosines(
         f" / (2 · {sheet.length(l2)} · {sheet.length(l3)})"
     )
     sheet.line("cos γ", cosine, "", numbers, signs)
-    if abs(cosine) > 1.0 + 1e-12:
+    if abs(cosine) > 1.0 + 1e-10:
         far = reach - (l2 + l3) if cosine > 0.0 else abs(l2 - l3) - reach
         sheet.note(
             f"Out of reach by {sheet.measure(far)}{with_signs(signs)}: the point is {sheet.measure(reach)} away, and "
@@ -359,6 +359,8 @@ class ElbowArm:
     def solve(self, sheet: Worksheet, W: Array) -> list[PartialBranch]:
         """Write the steps to a point in base_link, m, shape (3,), and return every way to get there."""
         ways = self.shoulder.solve(sheet, W, "r")
+        if not ways:
+            return []
         sheet.step(
             "Joint 3: the elbow, by the law of cosines in the arm's plane",
             f"u = r - a1,  {self._v}" if self.a1 else f"u = r,  {self._v}",
@@ -373,6 +375,8 @@ class ElbowArm:
                 with_s3: Signs = (*signs, ("σ3", s3))
                 q3 = self.bend.write(sheet, gamma, acos_text(s3, gamma), with_s3)
                 bent.append((with_s3, q1, q3, gamma, u, v))
+        if not bent:
+            return []
         found = []
         sheet.step(
             "Joint 2: the upper arm points at the wrist centre, less the triangle's angle",
@@ -492,6 +496,8 @@ class SphericalArm:
     def solve(self, sheet: Worksheet, W: Array) -> list[PartialBranch]:
         """Write the steps to a point in base_link, m, shape (3,), and return every way to get there."""
         ways = self.shoulder.solve(sheet, W, "r")
+        if not ways:
+            return []
         root = "sqrt(u² + v² - b²)" if self.b else "sqrt(u² + v²)"
         sheet.step(
             "Joint 3: the slide's length in the arm's plane",
@@ -525,6 +531,8 @@ class SphericalArm:
                     "q3", s3 * out - self.c, METRE, text + (term(sheet.length(-self.c)) if self.c else ""), with_s3
                 )
                 slid.append((with_s3, q1, s3 * out, u, v))
+        if not slid:
+            return []
         sheet.step(
             "Joint 2: the slide points at the wrist centre; its angle is counted from z",
             f"{self.slope.symbol} = atan2(σ3 u, σ3 v)"
@@ -610,6 +618,8 @@ class CylindricalArm:
     def solve(self, sheet: Worksheet, W: Array) -> list[PartialBranch]:
         """Write the steps to a point in base_link, m, shape (3,), and return every way to get there."""
         ways = self.shoulder.solve(sheet, W, "r")
+        if not ways:
+            return []
         lift = f"q{self.lift + 1}"
         rise = "z - h" if self.upwards > 0 else "h - z"
         sheet.step(

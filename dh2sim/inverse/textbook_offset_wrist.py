@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -26,11 +26,14 @@ from dh2sim.inverse.textbook_arms import (
     shoulder_of,
     with_signs,
 )
-from dh2sim.inverse.textbook_axes import ArmAxes, norm, turn_about, wrapped
+from dh2sim.inverse.textbook_axes import ArmAxes, norm, rotation, turn_about, wrapped
 from dh2sim.inverse.textbook_steps import METRE, RAD, Signs, Worksheet, number, term
 from dh2sim.typing import Array
 
-_SINGULAR = 1e-9
+_SINGULAR: Final = 1e-12
+"""Sine of the angle between axes 4 and 6, within which they are parallel."""
+_TRIED: Final = sorted(np.radians(np.arange(-175.0, 181.0, 5.0)).tolist(), key=abs)
+"""Angles of joint 6, rad, of which the first that leaves axis 4 within reach is taken where any will do."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -72,8 +75,10 @@ class OffsetWristArm:
         frame = self.shoulder.T_base_link_arm
         W = placed_point(sheet, self.axes, self.W0, T, frame, "Where axes 5 and 6 meet")
         ways = self.shoulder.solve(sheet, W, "r")
+        if not ways:
+            return []
         turned = T[:3, :3] @ self.axes.T_home[:3, :3].T
-        return self._rest(sheet, self._wrist(sheet, ways, turned), W)
+        return self._rest(sheet, self._wrist(sheet, ways, turned, W), W)
 
     def _describe(self, sheet: Worksheet) -> None:
         sheet.step(
@@ -98,7 +103,7 @@ class OffsetWristArm:
             angle.describe(sheet)
 
     def _wrist(
-        self, sheet: Worksheet, ways: list[tuple[Signs, float, float, float]], turned: Array
+        self, sheet: Worksheet, ways: list[tuple[Signs, float, float, float]], turned: Array, W: Array
     ) -> list[tuple[Signs, float, float, float, Array]]:
         """Write the steps of joints 5 and 6; return signs, q1, q5, q6 and the direction of axis 5 in base_link."""
         w4, w5, w6 = (self.axes.joints[i].direction for i in (3, 4, 5))
@@ -110,6 +115,7 @@ class OffsetWristArm:
             remark="z6 is the direction of axis 6 at the goal, z4 that of axis 4, across the arm's plane.",
         )
         z6 = turned @ w6
+        axis = turned @ w5  # where the goal would have axis 5 if it were fixed to the tool
         bent = []
         for signs, q1, _, _ in ways:
             z4 = self.axes.motion(0, q1)[:3, :3] @ w4
@@ -118,11 +124,6 @@ class OffsetWristArm:
             tilt = math.atan2(norm(np.cross(z4, z6)), cosine)
             singular = math.sin(tilt) <= _SINGULAR
             sheet.line("z4 · z6", cosine, "", "", signs)
-            if singular:
-                sheet.note(
-                    f"Wrist singular{with_signs(signs)}: axes 4 and 6 are parallel, so that joints 2, 3, 4 and 6 "
-                    "turn about one direction, and any q6 will do; 0 is taken here."
-                )
             for s5 in (1,) if singular else (1, -1):
                 with_s5: Signs = (*signs, ("σ5", s5))
                 q5 = self.tilt.write(sheet, s5 * tilt, acos_text(s5, tilt), with_s5)
@@ -134,11 +135,14 @@ class OffsetWristArm:
         )
         found = []
         for signs, q1, q5, z4, singular in bent:
-            axis = turned @ w5  # where the goal would have axis 5 if it were fixed to the tool
             if singular:
-                q6 = 0.0
-                z5 = axis
+                q6 = next((x for x in _TRIED if self._reaches(W, q1, rotation(z6, -x) @ axis)), 0.0)
+                z5 = rotation(z6, -q6) @ axis
                 sheet.line("q6", q6, RAD, "any", signs)
+                sheet.note(
+                    f"Wrist singular{with_signs(signs)}: axes 4 and 6 are parallel, so that joints 2, 3, 4 and 6 "
+                    f"turn about one direction, and q6 is free within reach; {sheet.angle(q6)} is taken here."
+                )
             else:
                 sine = math.sin(self.tilt.at_zero + self.tilt.sense * q5)
                 z5 = np.cross(z4, z6) / sine
@@ -148,6 +152,16 @@ class OffsetWristArm:
                 sheet.line("q6", q6, RAD, f"atan2({number(pair[0])}, {number(pair[1])})", signs)
             found.append((signs, q1, q5, q6, z5))
         return found
+
+    def _axis_4(self, W: Array, q1: float, z5: Array) -> tuple[float, float]:
+        """Return where axis 4 must be, seen from axis 2: along f and along z, m."""
+        f, e, z = self._frame(q1)
+        P4 = W - self.d5 * z5 + self.c4 * np.cross(e, z5) - self.shoulder.T_base_link_arm[:3, 3]
+        return float(f @ P4) - self.a1, float(z @ P4) - self.d1
+
+    def _reaches(self, W: Array, q1: float, z5: Array) -> bool:
+        """Whether two links reach axis 4."""
+        return abs(self.l2 - self.l3) <= math.hypot(*self._axis_4(W, q1, z5)) <= self.l2 + self.l3
 
     def _rest(
         self, sheet: Worksheet, wrists: list[tuple[Signs, float, float, float, Array]], W: Array
@@ -163,13 +177,13 @@ class OffsetWristArm:
         )
         bent = []
         for signs, q1, q5, q6, z5 in wrists:
-            f, e, z = self._frame(q1)
-            P4 = W - self.d5 * z5 + self.c4 * np.cross(e, z5) - self.shoulder.T_base_link_arm[:3, 3]
-            u, v = float(f @ P4) - self.a1, float(z @ P4) - self.d1
+            u, v = self._axis_4(W, q1, z5)
             for s3, gamma in law_of_cosines(sheet, u, v, self.l2, self.l3, ("l2", "l3"), signs):
                 with_s3: Signs = (*signs, ("σ3", s3))
                 q3 = self.bend.write(sheet, gamma, acos_text(s3, gamma), with_s3)
                 bent.append((with_s3, (q1, q3, q5, q6), gamma, u, v, z5))
+        if not bent:
+            return []
         sheet.step(
             "Joint 2: the upper arm points at axis 4, less the triangle's angle",
             f"{self.elevation.symbol} = atan2(v, u) - atan2(l3 sin γ, l2 + l3 cos γ)",

@@ -89,6 +89,8 @@ class PlanarArm:
         for sign, gamma in law_of_cosines(sheet, x, y, self.l1, self.l2, ("l1", "l2"), ()):
             signs: Signs = ((f"σ{b}", sign),)
             bent.append((signs, self.bend.write(sheet, gamma, acos_text(sign, gamma), signs), gamma))
+        if not bent:
+            return []
         sheet.step(
             f"Joint {self.turns[0] + 1}: the first link points at the point, less the triangle's angle",
             f"{self.azimuth.symbol} = atan2(y, x) - atan2(l2 sin γ, l1 + l2 cos γ)",
@@ -101,7 +103,7 @@ class PlanarArm:
             if self.slide is not None:
                 q[self.slide] = self.upwards * (float(z) - self.height)
             found.append(PartialBranch(signs=signs, q=tuple(q[joint] for joint in sorted(q))))
-        if self.slide is not None and found:
+        if self.slide is not None:
             self._write_slide(sheet, float(z), found[0].q[sorted([*self.turns[:2], self.slide]).index(self.slide)])
         return found
 
@@ -120,7 +122,7 @@ class PlanarArm:
         title = "The point that the two links place" + ("" if third is None else f", on axis {third + 1}")
         W = placed_point(sheet, self.axes, self.point, T, self.T_base_link_arm, title)
         found = self.solve(sheet, W)
-        if third is None:
+        if third is None or not found:
             return found
         R = self.T_base_link_arm[:3, :3].T @ T[:3, :3] @ self.axes.T_home[:3, :3].T @ self.T_base_link_arm[:3, :3]
         turned = math.atan2(R[1, 0], R[0, 0])

@@ -18,7 +18,7 @@ from dh2sim.inverse.textbook_axes import ArmAxes, rotation, turn_about
 from dh2sim.inverse.textbook_steps import RAD, Signs, Worksheet, number
 from dh2sim.typing import Array
 
-SINGULAR: Final = 1e-9
+SINGULAR: Final = 1e-12
 """Sine of the wrist's bend, within which its outer axes are one line."""
 
 
