@@ -5,6 +5,7 @@ Every export reports what its formats cannot hold of the robot file, so that not
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, fields
 from enum import StrEnum
@@ -21,6 +22,7 @@ from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
+from dh2sim.messages import listed
 from dh2sim.model.robot_model import FilledIn, RobotModel
 from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Dynamics
@@ -243,11 +245,11 @@ class ExportReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
-    """A file on disk that is not what an export would write."""
+    """A file on disk that is not what an export would write, or a folder with files of different exports."""
 
     path: Path
     what: str
-    """'missing', 'unreadable: …' or where it differs."""
+    """'missing', 'unreadable: …', where it differs, or of a folder, which files of different exports it contains."""
 
 
 def export_robot(
@@ -302,6 +304,52 @@ def export_robot(
     )
 
 
+_ORIGIN = re.compile(rb": made by dh2sim from (.+)\.\r?\n")
+_HEADER = 4096
+"""Bytes at the beginning of a file that contain its origin."""
+_SHOWN = 12
+"""Digits of a hash that messages show."""
+
+
+def mixture(model: RobotModel, folder: Path, formats: Collection[Format] = ALL_FORMATS) -> str:
+    """Return a sentence if the files of a robot come from different robot files, or an empty text.
+
+    The first line of each says which, with its SHA-256. Files without such a line were not exported, and are ignored.
+
+    Args:
+        model: The robot.
+        folder: The folder with its files.
+        formats: What to look at.
+    """
+    names: dict[str, list[str]] = {}
+    for relative in _names(model, formats):
+        origin = _origin(folder / relative)
+        if origin is not None:
+            names.setdefault(origin, []).append(relative)
+    if len(names) < 2:
+        return ""
+    parts = "; ".join(f"{listed(files)} from {_shortened(origin)}" for origin, files in names.items())
+    return f"contains files of different exports: {parts}"
+
+
+def _names(model: RobotModel, formats: Collection[Format]) -> list[str]:
+    urdf = [f"{model.name}.urdf"] if Format.URDF in formats else []
+    return [*urdf, *([f"{model.name}.xml", "scene.xml"] if Format.MJCF in formats else [])]
+
+
+def _origin(path: Path) -> str | None:
+    try:
+        with open(path, "rb") as file:
+            found = _ORIGIN.search(file.read(_HEADER))
+    except OSError:
+        return None
+    return None if found is None else found[1].decode("utf-8", "replace")
+
+
+def _shortened(origin: str) -> str:
+    return re.sub(rf"(SHA-256 [0-9a-f]{{{_SHOWN}}})[0-9a-f]+", r"\1…", origin)
+
+
 def drift(
     model: RobotModel, out: Path, *, formats: Collection[Format] = ALL_FORMATS, dh_frames: bool = True
 ) -> list[Drift]:
@@ -326,6 +374,9 @@ def drift(
         else:
             if actual != expected:
                 found.append(Drift(path=path, what=_difference(actual, expected)))
+    mixed = mixture(model, out / model.name, formats)
+    if mixed:
+        found.append(Drift(path=out / model.name, what=mixed))
     return found
 
 

@@ -19,6 +19,7 @@ import mujoco
 from mujoco.rendering.classic import gl_context
 
 from dh2sim.errors import PictureError
+from dh2sim.files import signals_deferred
 
 OFF = ("disable", "disabled", "off", "false", "0")
 """Values of MUJOCO_GL with which MuJoCo renders nothing."""
@@ -60,7 +61,8 @@ def open_renderer(model: Any, width: int, height: int, *, max_geom: int = 10_000
     model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
     model.vis.global_.offheight = max(height, model.vis.global_.offheight)
     try:
-        with _mujoco_gl(backend):
+        # an interrupted call of a driver would look like one that does not work
+        with signals_deferred(), _mujoco_gl(backend):
             renderer = mujoco.Renderer(model, height, width, max_geom)
     except Exception as error:  # a driver raises whatever it trips over
         raise PictureError(f"{_backend_failure(backend, str(error))}. {ADVICE}") from error

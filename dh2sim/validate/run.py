@@ -16,7 +16,7 @@ from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.engines.pybullet_engine import PybulletEngine
 from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
 from dh2sim.errors import Dh2simError, EngineCapacityError, EngineError
-from dh2sim.export import export_robot
+from dh2sim.export import export_robot, mixture
 from dh2sim.files import finish_interrupted, signals_deferred
 from dh2sim.importing.sources import ImportOptions
 from dh2sim.kinematics.sampling import random_configurations
@@ -100,6 +100,11 @@ def validate_robot(
         if folder is not None:
             finish_interrupted(folder.parent, folder.name)
             report = _validate(model, folder, samples, seed, tolerance, arm, advance)
+            mixed = mixture(model, folder)
+            if mixed:
+                reason = f"{folder} {mixed}; write them again with 'dh2sim export'"
+                check = Check(engine="files", quantity=Quantity.FILE, ok=False, reason=reason)
+                report = replace(report, checks=(check, *report.checks))
         else:
             with TemporaryDirectory(prefix="dh2sim-") as temporary:
                 export_robot(model, Path(temporary), verified=False)

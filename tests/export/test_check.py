@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import pytest
@@ -95,3 +96,31 @@ def test_a_urdf_with_dh_frames_is_not_one_without(exported: Path) -> None:
     assert run.status == 1
     assert run.out.startswith(f"small: {path}: differs from line ")
     assert run.out.count("\n") == 1
+
+
+@pytest.mark.parametrize("old", ["small.urdf", "small.xml", "scene.xml"])
+def test_files_of_different_exports_are_noticed_in_one_folder(exported: Path, old: str) -> None:
+    folder = exported / "made" / "small"
+    kept, before = (folder / old).read_bytes(), hashlib.sha256((exported / "robot.yaml").read_bytes()).hexdigest()
+    robot = write(exported, small(length=0.5), "robot")
+    assert dh2sim("export", robot, "--out", exported / "made").status == 0
+    (folder / old).write_bytes(kept)
+    after = hashlib.sha256(robot.read_bytes()).hexdigest()
+    others = [name for name in ("small.urdf", "small.xml", "scene.xml") if name != old]
+    parts = [
+        f"{', '.join(others)} from robot.yaml (SHA-256 {after[:12]}…)",
+        f"{old} from robot.yaml (SHA-256 {before[:12]}…)",
+    ]
+    if old == "small.urdf":
+        parts.reverse()
+    run = _check(exported)
+    assert (run.status, run.err) == (1, ADVICE)
+    assert run.out.splitlines()[1:] == [f"small: {folder}: contains files of different exports: {'; '.join(parts)}"]
+    alone = "mjcf" if old == "small.urdf" else "urdf"
+    assert _check(exported, "--format", alone).status == 0
+
+
+def test_files_that_no_export_wrote_are_of_no_export(exported: Path) -> None:
+    path = exported / "made" / "small" / "small.urdf"
+    path.write_bytes(b"<robot name='small'/>\n")
+    assert "different exports" not in _check(exported).out

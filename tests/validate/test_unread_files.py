@@ -165,3 +165,17 @@ def test_no_damage_to_a_file_makes_a_traceback(
         assert run.status in (0, 1), f"{found} -> {new}"
     assert {path.name for path in exported.iterdir()} == {"odd.yaml", "made"}
     capfd.readouterr()  # what readers written in C++ have to say
+
+
+@pytest.mark.parametrize("file", ["odd.urdf", "odd.xml", "scene.xml"])
+def test_files_of_different_exports_have_failed_even_if_their_numbers_agree(exported: Path, file: str) -> None:
+    robot, folder = exported / "odd.yaml", exported / "made" / "odd"
+    robot.write_bytes(robot.read_bytes() + b"# another version\n")
+    assert dh2sim("export", robot, "--out", exported / "other").status == 0
+    assert validated(robot, exported / "made")["ok"], "those of one older version match the table"
+    (folder / file).write_bytes((exported / "other" / "odd" / file).read_bytes())
+    failed = failures(validated(robot, exported / "made"))
+    assert list(failed) == [("files", "file")]
+    reason = failed["files", "file"]["reason"]
+    assert reason.startswith(f"{folder} contains files of different exports: ")
+    assert reason.count("odd.yaml (SHA-256 ") == 2
