@@ -6,8 +6,9 @@ configurations reach, and the best two are kept. What the trial shows that they 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, product
 from typing import Protocol
 
@@ -17,10 +18,13 @@ from dh2sim.inverse.loop import Arm, Candidates, Flags, Indices, Loop, close_loo
 from dh2sim.inverse.pencil import build_pencil
 from dh2sim.inverse.polish import polish
 from dh2sim.inverse.slides import OppositeSlides, ThreeSlides
+from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.typing import Array
 
+CONVERGED = 1e-12
+"""Error, in lengths of the arm and rad, up to which a configuration of six joints reaches a pose."""
 REACHED = 1e-10
-"""Error, in lengths of the arm and rad, up to which a configuration reaches a pose."""
+"""Error up to which one of fewer does, whose pose may have been rounded."""
 SAME = 1e-6
 """Configurations that differ by less, in rad and lengths of the arm, are the same..."""
 SAME_IF_SINGULAR = 1e-4
@@ -37,6 +41,12 @@ _NUDGE = 1e-6
 """Size of changes, in lengths of the arm and rad, that make singular eliminations regular."""
 _GATE = 0.3
 """Error of a candidate, in lengths of the arm and rad, above which it is none."""
+_DOUBTFUL = 1e-5
+"""Least singular value of a solution below which others may be missing."""
+_ILL = 1e6
+"""Condition above which solutions may be missing."""
+_STARTS = 48
+"""Of a search where all eliminations are singular."""
 _BLOCK = 128
 """Poses solved at a time, so that their matrices stay in the processor's cache."""
 _SEED = 2026
@@ -51,8 +61,8 @@ class Elimination(Protocol):
         """Return configurations near all solutions of N poses, and some that are none."""
         ...
 
-    def condition(self, loop: Loop) -> float:
-        """Return how ill-conditioned the elimination is at N poses: the median."""
+    def condition(self, loop: Loop) -> Array:
+        """Return how ill-conditioned the elimination is at N poses, shape (N,)."""
         ...
 
 
@@ -79,6 +89,8 @@ class Method:
     arm: Arm
     moving: Flags
     """Which joints are not locked, bool, shape (n,)."""
+    ranges: Array = field(repr=False)
+    """Where configurations are drawn from, in the arm's units, shape (n, 2)."""
     virtual: tuple[Array, ...] = field(repr=False)
     """Links before, between and behind the virtual joints that make six of fewer joints, each of shape (4, 4)."""
     eliminations: tuple[Elimination, ...]
@@ -102,11 +114,14 @@ class Method:
         return _joined(blocks, self.arm.n)
 
     def _solve_block(self, T: Array, locked: Mapping[int, Array]) -> Found:
-        found = self.solve_by(self.eliminations[0], T, locked)
-        for other in self.eliminations[1:]:
-            again = np.nonzero(self.doubtful(found, len(T)))[0]
+        found = self.solve_by(self.eliminations[0], T, locked) if self.eliminations else _joined([], self.arm.n)
+        for other in (*self.eliminations[1:], None):
+            again = np.flatnonzero(self.doubtful(found, len(T)))
+            if other is None or other is not self.eliminations[1]:
+                again = self._ill(again, found, T, locked)
             if len(again):
-                more = self.solve_by(other, T[again], {j: q if len(q) == 1 else q[again] for j, q in locked.items()})
+                values = {joint: q if len(q) == 1 else q[again] for joint, q in locked.items()}
+                more = self._searched(T[again], values) if other is None else self.solve_by(other, T[again], values)
                 more = Found(pose=again[more.pose], q=more.q, sigma=more.sigma)
                 found = self.distinct(_joined([found, more], self.arm.n))
         return found
@@ -115,9 +130,27 @@ class Method:
         """Whether solutions of a pose may be missing: there are none, an odd number, or singular ones; bool (N,)."""
         regular = found.sigma > NEARLY_SINGULAR
         counts = np.bincount(found.pose[regular], minlength=poses)
-        singular = np.bincount(found.pose[~regular], minlength=poses) > 0
+        singular = np.bincount(found.pose[found.sigma < _DOUBTFUL], minlength=poses) > 0
         even = (counts % 2 == 0) | bool(self.virtual)  # only some solutions of a ring with virtual joints count
         return np.asarray((counts == 0) | ~even | singular)
+
+    def _ill(self, again: Indices, found: Found, T: Array, locked: Mapping[int, Array]) -> Indices:
+        """Return doubtful poses, without those that are well-conditioned and have no solution: out of reach."""
+        none = again[np.bincount(found.pose, minlength=len(T))[again] == 0]
+        if not len(none) or not self.eliminations:
+            return again
+        values = {joint: q if len(q) == 1 else q[none] for joint, q in locked.items()}
+        condition = self.eliminations[0].condition(close_loop(self.arm, T[none], values, self.virtual))
+        return np.setdiff1d(again, none[condition < _ILL])
+
+    def _searched(self, T: Array, locked: Mapping[int, Array]) -> Found:
+        """Return what Levenberg-Marquardt finds from scattered starts: the last resort where the arm is singular."""
+        starts = scattered_configurations(self.ranges[:, 0], self.ranges[:, 1], _STARTS)
+        pose = np.repeat(np.arange(len(T)), _STARTS)
+        q = np.tile(starts, (len(T), 1))
+        for joint, value in locked.items():
+            q[:, joint] = value[0] if len(value) == 1 else value[pose]
+        return self.polished(pose, q, T, gate=math.inf)
 
     def solve_by(self, elimination: Elimination, T: Array, locked: Mapping[int, Array]) -> Found:
         """Return the solutions of N poses that one elimination leads to."""
@@ -133,10 +166,11 @@ class Method:
             q[:, joint] = value[0] if len(value) == 1 else value[pose]
         return self.polished(pose, q, T)
 
-    def polished(self, pose: Indices, q: Array, T: Array) -> Found:
-        """Return the distinct solutions that configurations lead to."""
-        q, error = polish(self.arm, q, T[pose], self.moving, gate=_GATE)
-        reached = error < REACHED
+    def polished(self, pose: Indices, q: Array, T: Array, gate: float = _GATE) -> Found:
+        """Return the distinct solutions that configurations lead to, if their errors are below the gate."""
+        q, error = polish(self.arm, q, T[pose], self.moving, gate=gate)
+        extent = 1.0 + np.abs(q[:, np.logical_not(self.arm.turns)]).max(axis=1, initial=0.0)  # rounding grows with it
+        reached = error < extent * (REACHED if self.virtual else CONVERGED)
         pose, q = pose[reached], q[reached]
         J = pose_and_jacobian(self.arm, q)[1][:, :, self.moving]
         sigma = np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1], dtype=np.float64)
@@ -173,20 +207,22 @@ def choose_method(arm: Arm, moving: Flags, ranges: Array) -> Method:
     q = q[np.sort(np.argsort(-np.linalg.svd(J, compute_uv=False)[:, -1])[:TRIALS])]  # away from singular ones
     # three virtual joints make a wrist, unless that leaves the others with a point that they cannot move freely
     wrists = (True, False) if missing == 3 else (False,)
-    methods = [_tried(arm, moving, q, _virtual_links(missing, rng, wrist=wrist), rng) for wrist in wrists[:1]]
+    methods = [_tried(arm, moving, ranges, q, _virtual_links(missing, rng, wrist=wrist), rng) for wrist in wrists[:1]]
     if methods[0].found_share < 1.0 and len(wrists) > 1:
-        methods.append(_tried(arm, moving, q, _virtual_links(missing, rng, wrist=False), rng))
+        methods.append(_tried(arm, moving, ranges, q, _virtual_links(missing, rng, wrist=False), rng))
     return max(methods, key=lambda method: method.found_share)
 
 
-def _tried(arm: Arm, moving: Flags, q: Array, virtual: tuple[Array, ...], rng: np.random.Generator) -> Method:
+def _tried(
+    arm: Arm, moving: Flags, ranges: Array, q: Array, virtual: tuple[Array, ...], rng: np.random.Generator
+) -> Method:
     """Return the best eliminations for the poses that trial configurations reach."""
     T = np.zeros((len(q), 4, 4))
     T[:, :3], T[:, 3, 3] = pose_and_jacobian(arm, q)[0], 1.0
     locked = {int(joint): q[:, joint] for joint in np.flatnonzero(np.logical_not(moving))}
     loop = close_loop(arm, T, locked, virtual)
     drawn = Found(pose=np.arange(len(q)), q=q, sigma=np.ones(len(q)))
-    bare = Method(arm=arm, moving=moving, virtual=virtual, eliminations=(), found_share=0.0)
+    bare = Method(arm=arm, moving=moving, ranges=ranges, virtual=virtual, eliminations=(), found_share=0.0)
     trials: list[_Trial] = []
     share = 0.0
     nudges = _nudges(rng)
@@ -197,7 +233,7 @@ def _tried(arm: Arm, moving: Flags, q: Array, virtual: tuple[Array, ...], rng: n
             few = bare.solve_by(used, T[:_FIRST], {joint: value[:_FIRST] for joint, value in locked.items()})
             if _own(bare, few, drawn) >= _FIRST // 2:
                 found = bare.solve_by(used, T, locked)
-                own, condition = _own(bare, found, drawn), elimination.condition(seen)
+                own, condition = _own(bare, found, drawn), float(np.median(elimination.condition(seen)))
                 trials.append(_Trial(elimination=used, found=found, own=own, condition=condition))
         trials.sort(key=lambda trial: trial.rank)
         union = bare.distinct(_joined([drawn, *(trial.found for trial in trials)], arm.n))
@@ -206,9 +242,10 @@ def _tried(arm: Arm, moving: Flags, q: Array, virtual: tuple[Array, ...], rng: n
         if share == 1.0 and not bare.doubtful(ours, len(q)).any():
             break
     best = [trial.elimination for trial in trials[:2]]
-    # a pose at which the arm is singular is regular for an arm that is nearly the same
-    best += [Nudged(elimination=elimination, nudges=_nudges(rng)) for elimination in best[:1]]
-    return Method(arm=arm, moving=moving, virtual=virtual, eliminations=tuple(best), found_share=share)
+    # near a singularity another kind may be regular, and at one an arm that is nearly the same
+    others = [trial.elimination for trial in trials[2:] if trials[0].is_another(trial)]
+    best += [*others[:1], *(Nudged(elimination=elimination, nudges=_nudges(rng)) for elimination in best[:1])]
+    return replace(bare, eliminations=tuple(best), found_share=share)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -226,6 +263,11 @@ class _Trial:
         """Sort the best first: what finds most, then what is conditioned best."""
         return -self.own, -len(self.found.pose), self.condition
 
+    def is_another(self, other: _Trial) -> bool:
+        """Whether another elimination is of another kind, and found as much."""
+        wrists = [getattr(trial.elimination, "wrist", None) for trial in (self, other)]
+        return wrists[0] != wrists[1] and self.own == other.own
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Nudged:
@@ -239,8 +281,8 @@ class Nudged:
         """Return configurations near all solutions of N poses, and some that are none."""
         return self.elimination.candidates(loop.moved(self.nudges))
 
-    def condition(self, loop: Loop) -> float:
-        """Return the median condition at N poses."""
+    def condition(self, loop: Loop) -> Array:
+        """Return how ill-conditioned the elimination is at N poses, shape (N,)."""
         return self.elimination.condition(loop.moved(self.nudges))
 
 

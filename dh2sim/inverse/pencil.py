@@ -10,7 +10,7 @@ inverse kinematics for general 6R manipulators, IEEE Trans. Robotics and Automat
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 
 import numpy as np
@@ -52,6 +52,11 @@ class Pencil:
     """Where half-angle tangents are measured from, rad, shape (6,): random, so that no solution is at infinity."""
     mixing: Array = field(repr=False)
     """Random weights that combine surplus equations, shape (12, 28)."""
+    motions: tuple[Array, ...] = field(repr=False)
+    """Each joint at its three sampled coordinates, those eliminated linearly moving back, shape (3, 4, 4)."""
+    bases: tuple[Array, Array] = field(repr=False)
+    """From samples to coefficients: of products of (1, cos, sin) or (1, d, d²) for the joints eliminated linearly,
+    and of powers of half-angle tangents for the others."""
 
     def candidates(self, loop: Loop) -> Candidates:
         """Return configurations near all solutions of N poses, and some that are none."""
@@ -76,11 +81,11 @@ class Pencil:
         ordered[:, loop_order(self.first, backwards=self.backwards)] = -q if self.backwards else q
         return Candidates(pose=pose, q=ordered)
 
-    def condition(self, loop: Loop) -> float:
-        """Return the median condition number of the matrix that is divided by; huge for a singular pencil."""
+    def condition(self, loop: Loop) -> Array:
+        """Return the condition numbers of the matrices that are divided by, shape (N,): huge if singular."""
         ring = loop.variant(self.first, backwards=self.backwards)
         values = np.linalg.svd(self._matrices(ring, self._right_side(ring))[2], compute_uv=False)
-        return float(np.median(values[:, 0] / np.maximum(values[:, -1], 1e-300)))
+        return np.asarray(values[:, 0] / np.maximum(values[:, -1], 1e-300 + 1e-300 * values[:, 0]))
 
     @property
     def _linear(self) -> tuple[int, ...]:
@@ -110,15 +115,10 @@ class Pencil:
     def _right_side(self, ring: Loop) -> _RightSide:
         """Return the equations' coefficients of products of the joints that are eliminated linearly."""
         seen = self._ends(ring)[1]
-        transforms = []
         for joint in self._linear:
-            turns = ring.turns[joint]
-            back = inverse_poses(joint_motion(turns, _THIRDS if turns else _UNITS))
-            seen = _stacked(inverse_poses(ring.links[joint]), _sampled(back, seen))
-            transforms.append(_HARMONICS if turns else _POWERS)
+            seen = _stacked(inverse_poses(ring.links[joint]), _sampled(self.motions[joint], seen))
         values = _numbers(seen)
-        values = values.reshape(*values.shape[:2], -1)
-        terms = values @ _kronecker(transforms[::-1]).T
+        terms = values.reshape(*values.shape[:2], -1) @ self.bases[0]
         U, S, Vt = np.linalg.svd(terms[:, :, 1:])
         inverse = np.zeros_like(S)
         np.divide(1.0, S, out=inverse, where=_ZERO * S[:, :1] < S)
@@ -133,16 +133,13 @@ class Pencil:
     def _matrices(self, ring: Loop, right: _RightSide) -> Array:
         """Return the coefficients of 1, t, t² of the square matrix that is singular at solutions, (3, N, s, s)."""
         seen, joints = self._ends(ring)[0], sorted(self._left)
-        transforms: list[Array] = []
         for joint in reversed(joints):
-            turns, phase = ring.turns[joint], self.phases[joint]
-            seen = _sampled(joint_motion(turns, phase + _THIRDS if turns else _UNITS), seen)
+            seen = _sampled(self.motions[joint], seen)
             if joint != joints[0]:
                 seen = _stacked(ring.links[joint - 1], seen)
-            transforms.insert(0, _in_half_tangents(turns, phase))
         values = _numbers(seen)
         values = values.reshape(*values.shape[:2], -1) - right.constant[:, :, None]
-        reduced = right.null @ (values @ _kronecker(transforms).T)
+        reduced = right.null @ (values @ self.bases[1])
         count, rows = reduced.shape[:2]
         reduced = reduced.reshape(count, rows, *[3] * len(joints))
         reduced = np.moveaxis(reduced, 2 + self.hidden, 0).reshape(3, count, rows, 3, -1)
@@ -223,14 +220,29 @@ def build_pencil(
         return None
     phases, mixing = rng.uniform(-np.pi, np.pi, 6), np.linalg.qr(rng.normal(size=(28, 12)))[0].T
 
-    def pencil(rank: int) -> Pencil:
-        return Pencil(
-            first=first, backwards=backwards, wrist=wrist, hidden=hidden, rank=rank, phases=phases, mixing=mixing
-        )
-
+    linear, others = ((0,), (1, 2)) if wrist else ((0, 1), (2, 3, 4))
+    motions = []
+    for joint, turns in enumerate(ring.turns):
+        start = 0.0 if joint in linear else float(phases[joint])
+        sampled = joint_motion(turns, start + _THIRDS if turns else _UNITS)
+        motions.append(inverse_poses(sampled) if joint in linear else sampled)
     full, rows, size = (2, 4, 4) if wrist else (8, 14, 12)
-    rank = pencil(full)._right_side(ring).rank
-    return pencil(rank) if 2 * (rows - rank) >= size else None
+    pencil = Pencil(
+        first=first,
+        backwards=backwards,
+        wrist=wrist,
+        hidden=hidden,
+        rank=full,
+        phases=phases,
+        mixing=mixing,
+        motions=tuple(motions),
+        bases=(
+            _kronecker([_HARMONICS if ring.turns[joint] else _POWERS for joint in reversed(linear)]).T,
+            _kronecker([_in_half_tangents(ring.turns[joint], float(phases[joint])) for joint in others]).T,
+        ),
+    )
+    rank = pencil._right_side(ring).rank
+    return replace(pencil, rank=rank) if 2 * (rows - rank) >= size else None
 
 
 def wrist_centre(ring: Loop) -> tuple[Array, Array]:

@@ -11,7 +11,12 @@ from dh2sim.typing import Array
 
 _DONE = 1e-14
 """What is left of a pose, in lengths of the arm and rad, that no step makes less."""
-_STEPS = 16
+_STEPS = 24
+_PATIENT_STEPS = 60
+"""Where configurations may be far from solutions."""
+_SOON = 3
+_NEAR = 1e-3
+"""What is not as near as that to its pose after a few steps is not on its way to a solution nearby."""
 _LONGEST = 1.0
 """Longest step of a coordinate, rad or lengths of the arm."""
 
@@ -28,7 +33,8 @@ def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) 
         q: Coordinates of all its joints, in its own units, shape (M, n).
         T: Poses to reach, positions in units of the arm's length, shape (M, 4, 4).
         moving: Which joints may move, bool, shape (n,).
-        gate: Configurations farther than that from their poses, in lengths of the arm and rad, stay as they are.
+        gate: Configurations farther than that from their poses, in lengths of the arm and rad, stay as they are; so
+            do those that are not near their poses soon. Without it, all are moved, and longer.
 
     Returns:
         Coordinates, shape (M, n), and norms of the errors, shape (M,).
@@ -41,7 +47,8 @@ def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) 
     active = np.flatnonzero((norm > _DONE) & (norm < gate))
     J, error = J[active][:, :, moving], error[active]
     diagonal = np.arange(int(moving.sum()))
-    for _ in range(_STEPS):
+    patient = gate == math.inf
+    for attempt in range(_PATIENT_STEPS if patient else _STEPS):
         if not len(active):
             break
         Jt = np.swapaxes(J, 1, 2)
@@ -60,6 +67,8 @@ def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) 
         J[better], error[better] = J_trial[better][:, :, moving], error_trial[better]
         damping[active] = np.where(better, 0.1 * damping[active], 10.0 * np.maximum(damping[active], 1e-8))
         # near the end an attempt that does not help is the end
-        keep = (norm[active] > _DONE) & (better | (norm[active] > 1e-11)) & (damping[active] < 1e6)
+        keep = (norm[active] > _DONE) & (better | (norm[active] > 1e-13)) & (damping[active] < 1e6)
+        if attempt >= _SOON and not patient:
+            keep &= norm[active] < _NEAR
         active, J, error = active[keep], J[keep], error[keep]
     return q, norm

@@ -48,9 +48,9 @@ class ThreeSlides:
         q[:, [i for i in range(6) if not loop.turns[i]]] = d[:, :, 0]
         return Candidates(pose=pose, q=q)
 
-    def condition(self, loop: Loop) -> float:  # noqa: ARG002
-        """Return 1: only slides in one plane would be ill-conditioned, and such arms have fewer freedoms."""
-        return 1.0
+    def condition(self, loop: Loop) -> Array:
+        """Return 1: the slides of an arm with six freedoms are not in a plane."""
+        return np.ones(len(loop.links[5]))
 
     @staticmethod
     def _rotation(loop: Loop, joint: int, following: int) -> Array:
@@ -85,10 +85,11 @@ class OppositeSlides:
         ordered[:, loop_order(self.first, backwards=self.backwards)] = -q if self.backwards else q
         return Candidates(pose=root[which], q=ordered)
 
-    def condition(self, loop: Loop) -> float:
-        """Return how nearly parallel the axes on both sides of the first slide are; they must not be."""
+    def condition(self, loop: Loop) -> Array:
+        """Return how nearly parallel the axes on both sides of the first slide are; they must not be, shape (N,)."""
         ring = _Ring(loop.variant(self.first, backwards=self.backwards))
-        return float(1.0 / max(np.median(np.hypot(ring.d[:, 0], ring.d[:, 1])), 1e-300))
+        apart = np.maximum(np.hypot(ring.d[:, 0], ring.d[:, 1]), 1e-300)
+        return np.broadcast_to(1.0 / apart, (len(loop.links[5]),))
 
 
 class _Ring:
