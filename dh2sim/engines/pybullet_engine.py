@@ -143,10 +143,10 @@ class PybulletEngine:
         with _printed() as printed, suppress(self._bullet.error, SystemError):
             self._bullet.calculateInverseDynamics(self._body, rest, rest, rest, physicsClientId=self._client)
             return None
-        if "invalid inertia tensor" in printed() and "!=" in printed():
+        if "invalid inertia" in printed():
             return EngineCapacityError(
-                "no inverse dynamics of links so large in PyBullet: it wants inertias to be symmetric within an "
-                "absolute tolerance, which its own rounding exceeds"
+                "no inverse dynamics of links so large or so thin in PyBullet: its own rounding makes inertias of "
+                "them that it refuses"
             )
         return EngineError(f"{self._path}: PyBullet refuses inverse dynamics: {printed()}")
 

@@ -12,6 +12,9 @@ from dh2sim.engines.engine import present_frames, require_joints
 from dh2sim.errors import EngineError
 from dh2sim.typing import Array
 
+NOTICED = 1e-7
+"""rad or m: its scene graph keeps a transform that differs by less than 1e-8 from the one before."""
+
 
 class YourdfpyEngine:
     """One URDF file, read by yourdfpy; a Python loop, so it is used for fewer configurations."""
@@ -43,8 +46,12 @@ class YourdfpyEngine:
     def frame_poses(self, q: Array) -> Array:
         """Return the poses of ``frames`` in base_link; see ``PoseEngine``."""
         poses = np.empty((len(q), len(self.frames), 4, 4))
+        previous = np.full(q.shape[1], np.inf)
         for k, row in enumerate(q):
+            if (np.abs(row - previous) < NOTICED).any():
+                self._urdf.update_cfg(np.array(row[self._order] + 1.0, dtype=np.float64))
             self._urdf.update_cfg(np.array(row[self._order], dtype=np.float64))
+            previous = row
             T, before = np.eye(4), "base_link"
             for i, frame in enumerate(self.frames):
                 # from frame to frame: the time for a path through its scene graph grows with the cube of its length

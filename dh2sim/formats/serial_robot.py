@@ -13,7 +13,7 @@ from dh2sim.messages import Notes, listed
 from dh2sim.model.mass import MassProperties, thickened
 from dh2sim.model.robot_model import Color
 from dh2sim.robot.fields import MESH_SUFFIXES
-from dh2sim.robot.magnitudes import LARGEST
+from dh2sim.robot.magnitudes import INERTIA, LARGEST, shown_size
 from dh2sim.robot.spec import ActuatorSpec, Dynamics, Limits
 from dh2sim.typing import Array, read_only
 
@@ -134,6 +134,9 @@ def possible_inertial(whole: MassProperties, name: str, notes: Notes) -> Inertia
     inertia = thickened(whole.inertia)
     if inertia is None:
         notes.group("Impossible inertias are left out, of links {}.", name)
+    elif float(whole.inertia.max()) < INERTIA.least:
+        least = shown_size(INERTIA.least)
+        notes.group(f"Inertias of less than {least} kg·m² are made greater by that, of links {{}}.", name)
     elif inertia is not whole.inertia:
         notes.group("Inertias of thin rods, zero about the rod, are made greater by 1e-9 of them, of links {}.", name)
     return Inertial(mass=whole.mass, com=whole.com, inertia=inertia)

@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from dh2sim.errors import Dh2simError, MismatchError
+from dh2sim.importing.source_errors import MADE, errors_of
 from dh2sim.kinematics.chain import SpecLike, build_chain, spec_of
 from dh2sim.kinematics.compaction import compact_rows
 from dh2sim.kinematics.conversion import convert_rows
@@ -102,7 +103,8 @@ def convert_robot(spec: SpecLike, to: TableFormLike, *, folder: Path | None = No
         angle=units.angle,
         length=units.length,
     )
-    read = parse_robot(text, file="the robot file", directory=folder)
+    with errors_of(spec.name if spec.source_file is None else spec.source_file.path):
+        read = parse_robot(text, file=MADE, directory=folder)
     count = EXACT_CONFIGURATIONS if compact else CONFIGURATIONS
     q = _configurations(spec, count)
     position, rotation = table_tool_errors(read, spec, q) if compact else _errors(spec, read, q)
