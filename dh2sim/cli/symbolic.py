@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dh2sim.cli.common import RobotArgument, choice, load_all
-from dh2sim.cli.output import hand_over, require_free
+from dh2sim.cli.output import hand_over, json_text, require_free
 from dh2sim.cli.symbolic_code import LANGUAGES, is_about_code, print_code
 from dh2sim.errors import Dh2simError
 from dh2sim.symbolic.expression import Lengths, Style
@@ -125,7 +124,7 @@ def symbolic(
         case Format.MARKDOWN:
             text = form.markdown()
         case Format.JSON:
-            text = json.dumps(form.data(), indent=2, ensure_ascii=False) + "\n"
+            text = json_text(form.data(), ensure_ascii=False) + "\n"
         case _:
             text = f"{spec.name}: {form}\n"
     hand_over(text, out, summary=f"{spec.name}: {wanted} as {format_}", quiet=out is None)

@@ -185,6 +185,10 @@ def tidied(sum_: Sum) -> Sum:
     return Sum((terms[first], *terms[:first], *terms[first + 1 :]) if terms else ())
 
 
+def _positive_first(sum_: Sum) -> Sum:
+    return Sum(tuple(sorted(tidied(sum_).terms, key=lambda term: term.number < 0)))
+
+
 def _is_sum(base: Atom | Sum) -> bool:
     return isinstance(base, Sum) or base.startswith("#")
 
@@ -282,7 +286,7 @@ def name_sums(sums: Sequence[Sum], *, least: int = 2, prefix: str = "#") -> tupl
                 turned = 2 * sum(part.number < 0 for part in definition.terms) > len(definition.terms)
                 name = f"{prefix}{len(named) + 1}"
                 names[key] = (name, opposite if turned else own)
-                named[name] = tidied(-definition if turned else definition)
+                named[name] = _positive_first(-definition) if turned else tidied(definition)
             name, defined_key = names[key]
             factors.append(Factor(name, power))
             if defined_key != own and power % 2:

@@ -123,6 +123,8 @@ def legend_lines(form: Form, notation: TextNotation, width: int = WIDTH) -> Iter
             c, text = notation.short("c", example), notation.angle(example)
             items += [f"{c} = cos({text})", f"{notation.short('s', example)} = sin({text})"]
         items += [f"{notation.short('c', a)} = cos({notation.angle(a)})" for a in moving if not notation.is_plain(a)]
+    rows = sorted(row for atom in atoms if (row := slide_row(atom)) is not None)
+    items += [f"{notation.coordinate(row, turns=False)} of {form.table.spec.rows[row - 1].name}" for row in rows]
     items += [text for letter in used_letters(form.table, atoms) if (text := letter_text(letter, form.table))]
     yield from _listed(items, width)
 
