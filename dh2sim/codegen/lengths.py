@@ -5,13 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from dh2sim.codegen.mechanism import Lengths
 from dh2sim.codegen.trace import Number, Trace
 from dh2sim.robot.spec import LengthUnit, RobotSpec
-from dh2sim.symbolic.angles import slide
-from dh2sim.symbolic.polynomial import Polynomial
-from dh2sim.symbolic.table import symbolic_table
+
+if TYPE_CHECKING:
+    from dh2sim.symbolic.polynomial import Polynomial
 
 
 def length_constants(spec: RobotSpec, trace: Trace) -> Lengths:
@@ -36,6 +37,10 @@ def length_constants(spec: RobotSpec, trace: Trace) -> Lengths:
 
 def _polynomials(spec: RobotSpec) -> Mapping[tuple[int | str, str], Polynomial]:
     """Return the lengths of the base, every row and the tool over the parameters, in the file's unit."""
+    from dh2sim.symbolic.angles import slide
+    from dh2sim.symbolic.polynomial import Polynomial
+    from dh2sim.symbolic.table import symbolic_table
+
     table = symbolic_table(spec)
     frames = ["base_link", *(f"dh_{i}" for i in range(len(spec.rows) + 1)), "tool0"]
     parts: list[int | str] = ["base", *range(1, len(spec.rows) + 1), "tool"]

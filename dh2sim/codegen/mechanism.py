@@ -303,8 +303,10 @@ def _zxz_angles(rotations: Sequence[_Step]) -> tuple[float, float, float]:
     for step in reversed(rotations):
         s, c = sin_cos(step.angle)
         columns = [_ROTATE[step.axis](Turn(c, s), column) for column in columns]
-    (r11, _, r31), (r12, _, r32), (r13, r23, r33) = cast("list[tuple[float, float, float]]", columns)
-    tilt = math.sqrt(r13 * r13 + r23 * r23)
-    if tilt <= _NO_TILT:
+    (r11, r21, _), (r12, r22, _), (r13, r23, r33) = cast("list[tuple[float, float, float]]", columns)
+    if math.sqrt(r13 * r13 + r23 * r23) <= _NO_TILT:
         return 0.0, 0.0 if r33 > 0 else math.pi, atan2(-r12, r11)
-    return atan2(r13, -r23), atan2(tilt, r33), atan2(r31, r32)
+    # near no tilt gamma is badly determined, and what remains makes up for its error
+    gamma = atan2(r13, -r23)
+    s, c = sin_cos(gamma)
+    return gamma, atan2(s * r13 - c * r23, r33), atan2(-(c * r12 + s * r22), c * r11 + s * r21)

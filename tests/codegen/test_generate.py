@@ -162,3 +162,30 @@ def test_lengths_follow_the_parameters_that_they_are_made_of(unit: str, reach: f
         np.testing.assert_allclose(longer["fk"](q), table_tool_pose(changed, q), rtol=0, atol=1e-14)
     else:
         assert "d2 = " in text, "a square root of mm is a number in m"
+
+
+@pytest.mark.parametrize("twist", [1e-12, 1e-9, 1e-6, 1e-3, np.pi - 1e-9, np.pi])
+def test_twists_next_to_none_or_half_a_turn_are_kept(twist: float) -> None:
+    table = [
+        Revolute(a=0.3, alpha=0.7),
+        Fixed(theta=np.pi, alpha=0.7 + twist),
+        Revolute(convention="hayati", alpha=twist, beta=1e-7),
+    ]
+    arm = Robot(table, tool=(1000.0, 0.0, 1000.0))
+    q = np.random.default_rng(14).uniform(-3, 3, (20, 2))
+    fk = python_functions(arm.code("numpy"))["fk"]
+    np.testing.assert_allclose(fk(q), table_tool_pose(arm.spec, q), rtol=0, atol=2e-12)
+
+
+def test_a_table_that_leads_far_from_the_arm_and_back_has_code() -> None:
+    # a calibrated arm of three nearly parallel axes
+    table = [
+        Revolute(d=0.1519, alpha=1.5707),
+        Revolute(d=574.3, a=-0.2436, alpha=1.2e-3),
+        Revolute(d=-598.1, a=-0.2132, alpha=-2.2e-3),
+        Revolute(d=23.93, alpha=1.5708),
+    ]
+    arm = Robot(table)
+    q = np.random.default_rng(15).uniform(-3, 3, (20, 4))
+    functions = python_functions(arm.code("numpy", ALL))
+    np.testing.assert_allclose(functions["fk"](q), table_tool_pose(arm.spec, q), rtol=0, atol=1e-12 * 600)
