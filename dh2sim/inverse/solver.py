@@ -135,6 +135,15 @@ class InverseSolver:
             alone = self._unreached(alone, poses[0], near, locked, free, limits=limits)
         return replace(alone, branch=branch_names(self._chain, alone.q)) if len(alone) else alone
 
+    def joints_to_lock(self, free: Free | None = None) -> tuple[str, ...]:
+        """Return the names of the joints to lock so that solutions are isolated: none for most arms of six joints."""
+        surplus = self._surplus(free, ())
+        if not surplus:
+            return ()
+        arm = self._arm(free)
+        chosen = joints_to_lock(arm, self._moving(free, ()), self._trial_ranges(arm), surplus)
+        return tuple(self.names[joint] for joint in sorted(chosen))
+
     def _numeric(
         self, T: Array, q0: Array, locked: Mapping[int, Array], free: Free | None, *, limits: bool
     ) -> list[Solutions]:

@@ -49,9 +49,11 @@ class Part(StrEnum):
     """That tool0 is dragged by."""
     ELLIPSOID = "ellipsoid"
     """Of the velocities that tool0's origin can have."""
+    BRANCHES = "branches"
+    """All other ways to hold tool0 where it is."""
 
 
-INITIALLY: Final = frozenset(Part) - {Part.TRACE, Part.ELLIPSOID}
+INITIALLY: Final = frozenset(Part) - {Part.TRACE, Part.ELLIPSOID, Part.BRANCHES}
 """Parts that a page shows at first."""
 
 

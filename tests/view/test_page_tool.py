@@ -12,6 +12,7 @@ import numpy as np
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
+from dh2sim.view.branches import branches_of
 from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.scene.link_poses import triad_length
 from dh2sim.view.server import Viewer
@@ -100,3 +101,16 @@ def test_tool0_follows_its_handle_and_the_page_says_where_it_cannot(
 
     page.get_by_role("button", name="home").click()
     wait_until(lambda: shown(page, "notice") == "", "another move is another goal")
+
+
+def test_branches_are_listed_and_clicked_through(open_page: OpenPage, viewer: Viewer) -> None:
+    page = open_page()
+    open_tab(page, "Pose")
+    (served,) = viewer.pages
+    page.get_by_label("All in scene").click()
+    page.get_by_role("button", name="2", exact=True).wait_for()
+    listed = branches_of(served.state).branches
+    other = next(number for number, branch in enumerate(listed, start=1) if not branch.here)
+    page.get_by_role("button", name=str(other), exact=True).click()
+    wait_until(lambda: served.state.q == listed[other - 1].q, "the robot is in the other branch")
+    wait_until(lambda: listed[other - 1].name in shown(page, "branch"), "the page names it")

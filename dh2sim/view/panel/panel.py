@@ -40,6 +40,7 @@ _PART_LABELS: Final = {
     Part.GHOST: "Show ghost",
     Part.HANDLE: "Handle to drag tool0",
     Part.ELLIPSOID: "Velocity ellipsoid",
+    Part.BRANCHES: "All branches",
     Part.GRID: "Floor",
     Part.SHADING: "Soft shading",
 }

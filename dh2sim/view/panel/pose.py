@@ -14,6 +14,7 @@ from dh2sim.view.events import ChooseFrame, ChooseReference, Show
 from dh2sim.view.frame_readout import FrameReadout, MujocoPose, readout_of, relative_pose
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Send, bind
+from dh2sim.view.panel.branches import BranchList
 from dh2sim.view.state import Part, ViewState
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ class PoseTab:
         self._reference = bind(chooser, send, lambda name: ChooseReference(name=name))
         self._pose = client.gui.add_html("")
         self._difference = client.gui.add_html("")
+        self._branches = BranchList(client, send, state)
         with client.gui.add_folder("Jacobian of tool0"):
             self._jacobian = client.gui.add_html("")
             self._ellipsoid = bind(
@@ -57,6 +59,7 @@ class PoseTab:
                 chooser.handle.options = names
             chooser.show(name)
         self._ellipsoid.show(Part.ELLIPSOID in state.shown)
+        self._branches.show(state)
         shown = (state.model, state.q, state.frame, state.reference, state.angle, state.floats)
         if shown != self._shown:
             self._shown = shown

@@ -16,8 +16,9 @@ from dh2sim.kinematics.singularity import velocity_ellipsoid
 from dh2sim.kinematics.transforms import compose, pose_errors
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
+from dh2sim.view.branches import branches_of
 from dh2sim.view.scene.annotations import row_annotations
-from dh2sim.view.scene.ghost import ToolOffset, ghost_configuration, ghost_scene
+from dh2sim.view.scene.ghost import PALE, ToolOffset, ghost_configuration, ghost_scene
 from dh2sim.view.scene.ground import ground_of
 from dh2sim.view.scene.items import (
     Arrow,
@@ -36,7 +37,7 @@ from dh2sim.view.scene.items import (
 from dh2sim.view.scene.labels import spread_labels
 from dh2sim.view.scene.link_poses import poses_at, robot_size, round_length, triad_length
 from dh2sim.view.scene.solids import ball_triangles, orientation_of, position_of, robot_solids
-from dh2sim.view.state import Goal, LinkDrag, Part, ViewState
+from dh2sim.view.state import Goal, LinkDrag, Mode, Part, ViewState
 
 ROBOT: Final = "/robot"
 NAMES: Final = "/names"
@@ -45,10 +46,12 @@ GHOST: Final = "/ghost"
 DRAG: Final = "/drag"
 GOAL: Final = "/goal"
 ELLIPSOID: Final = "/ellipsoid"
+BRANCHES: Final = "/branches"
 GRID: Final = "/grid"
 PEDESTAL: Final = "/pedestal"
-IN_BASE_LINK: Final = (ROBOT, NAMES, ROW, GHOST, ELLIPSOID)
+IN_BASE_LINK: Final = (ROBOT, NAMES, ROW, GHOST, ELLIPSOID, BRANCHES)
 """Items below these are given in base_link, all others, such as the trace and the grid, in the world."""
+_BRANCH_OPACITY: Final = 0.16
 _TRACE_COLOR: Final[Color] = (0.10, 0.45, 0.85)
 _GRID_COLOR: Final[Color] = (0.82, 0.84, 0.87)
 _AXIS_COLOR: Final[Color] = (0.62, 0.65, 0.70)
@@ -99,6 +102,8 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
     if Part.GHOST in state.shown and state.ghost is not None:
         configuration = ghost_configuration(state.ghost.model, state.model, state.q)
         yield from _without(GHOST, ghost_scene(state.ghost.model, configuration.q))
+    if Part.BRANCHES in state.shown and state.mode is Mode.MANUAL:
+        yield from _branches(state)
     if Part.ELLIPSOID in state.shown:
         yield from _ellipsoid(state)
     if state.drag is not None:
@@ -113,6 +118,14 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
         yield from _grid(robot_size(state.model)).items()
         if ground.pedestal is not None and not state.floats:
             yield PEDESTAL, ground.pedestal
+
+
+def _branches(state: ViewState) -> Iterator[tuple[str, Item]]:
+    """Yield the robot in all other branches that hold tool0 where it is."""
+    for number, branch in enumerate(branches_of(state).branches, start=1):
+        if not branch.here:
+            root = f"{BRANCHES}/branch_{number}"
+            yield from robot_solids(state.model, branch.q, root, color=PALE, opacity=_BRANCH_OPACITY).items()
 
 
 def _ellipsoid(state: ViewState) -> Iterator[tuple[str, Item]]:
