@@ -155,11 +155,12 @@ def explain(robot: SpecLike, T: ArrayLike) -> Explanation:
     others = tuple(b for b in found if b not in branches)
     for other in others:
         signs = ", ".join(f"{letter} = {sign:+d}" for letter, sign in other.signs)
-        sheet.note(
-            f"{signs or 'The one choice'}: {len(axes.joints)} joints come within "
-            f"{sheet.measure(other.position_error)} of the goal's position, turned from its orientation by "
-            f"{sheet.angle(other.rotation_error)}."
-        )
+        off = f"turned from its orientation by {sheet.angle(other.rotation_error)}"
+        if other.position_error <= small * axes.size:
+            sheet.note(f"{signs or 'The one choice'} reaches the goal's position, {off}.")
+        else:
+            far = sheet.measure(other.position_error)
+            sheet.note(f"{signs or 'The one choice'} misses the goal's position by {far}, {off}.")
     worst = max((max(b.position_error / axes.size, b.rotation_error) for b in branches), default=0.0)
     if tolerance > EXACT:
         sheet.note(

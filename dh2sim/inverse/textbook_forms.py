@@ -7,9 +7,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from dh2sim.inverse.textbook_arms import ArmPart, PartialBranch, arm_part, placed_point
+from dh2sim.inverse.textbook_arms import ArmPart, arm_part
 from dh2sim.inverse.textbook_axes import ArmAxes
 from dh2sim.inverse.textbook_offset_wrist import OffsetWristArm, offset_wrist_arm
+from dh2sim.inverse.textbook_parts import PartialBranch, placed_point
 from dh2sim.inverse.textbook_planar import PlanarArm, planar_arm
 from dh2sim.inverse.textbook_steps import Worksheet
 from dh2sim.inverse.textbook_wrists import Wrist, wrist
@@ -37,10 +38,9 @@ class TextbookArm:
         branches = [PartialBranch(signs=(), q=())]
         if self.arm is not None:
             self.arm.describe(sheet)
-            shoulder = getattr(self.arm, "shoulder", None)
-            frame = shoulder.T_base_link_arm if shoulder else getattr(self.arm, "T_base_link_arm", None)
             title = "The wrist centre" if self.wrist is not None else "The point to be reached"
-            branches = self.arm.solve(sheet, placed_point(sheet, self.axes, self.W0, T, frame, title))
+            point = placed_point(sheet, self.axes, self.W0, T, self.arm.T_base_link_arm, title)
+            branches = self.arm.solve(sheet, point)
         if self.wrist is not None and branches:
             branches = self.wrist.solve(sheet, branches, T[:3, :3])
         return branches

@@ -12,7 +12,8 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from dh2sim.inverse.textbook_arms import (
+from dh2sim.inverse.textbook_axes import ArmAxes, norm, rotation, turn_about, wrapped
+from dh2sim.inverse.textbook_parts import (
     FromAngle,
     PartialBranch,
     Shoulder,
@@ -26,7 +27,6 @@ from dh2sim.inverse.textbook_arms import (
     shoulder_of,
     with_signs,
 )
-from dh2sim.inverse.textbook_axes import ArmAxes, norm, rotation, turn_about, wrapped
 from dh2sim.inverse.textbook_steps import METRE, RAD, Signs, Worksheet, number, term
 from dh2sim.typing import Array
 

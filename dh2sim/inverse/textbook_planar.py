@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dh2sim.inverse.textbook_arms import (
+from dh2sim.inverse.textbook_axes import ArmAxes, norm, wrapped
+from dh2sim.inverse.textbook_parts import (
     FromAngle,
     PartialBranch,
     acos_text,
@@ -21,7 +22,6 @@ from dh2sim.inverse.textbook_arms import (
     law_of_cosines,
     placed_point,
 )
-from dh2sim.inverse.textbook_axes import ArmAxes, norm, wrapped
 from dh2sim.inverse.textbook_steps import METRE, RAD, Signs, Worksheet, term
 from dh2sim.typing import Array
 

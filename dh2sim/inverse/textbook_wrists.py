@@ -13,8 +13,8 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from dh2sim.inverse.textbook_arms import FromAngle, PartialBranch, from_angle, with_signs
 from dh2sim.inverse.textbook_axes import ArmAxes, rotation, turn_about
+from dh2sim.inverse.textbook_parts import FromAngle, PartialBranch, from_angle, with_signs
 from dh2sim.inverse.textbook_steps import RAD, Signs, Worksheet, number
 from dh2sim.typing import Array
 
@@ -76,7 +76,10 @@ class SphericalWrist(Wrist):
             f"{self.bend.symbol} = atan2({c} r13 + {s} r23, r33)",
             self.bend.formula,
             f"q{m} = atan2({c} r21 - {s} r11, {c} r22 - {s} r12)",
-            remark=f"R = [r11 … r33] is what the arm leaves to do; z along axis {i}, y along axis {k} at q{i} = 0.",
+            remark=(
+                f"R = [r11 … r33] is {'what the arm leaves to do' if self.first else 'the goal, turned from zero'}; "
+                f"z along axis {i}, y along axis {k} at q{i} = 0."
+            ),
         )
         self.bend.describe(sheet)
         H = rotation(self.axes.joints[self.first + 1].direction, self.bend.at_zero)
