@@ -56,15 +56,17 @@ def base_parameters(model: RobotModel, mechanism: Mechanism, trace: Trace) -> li
     links = _links(model, mechanism)
     rotations = [_rotation(_value(trace, joint.twist), joint.angle) for joint in mechanism.joints]
     spins = _spin_axes(mechanism, rotations)
-    found: list[InertialParameters] = []
+    sizes = [(0.0, 0.0)] * len(links)
     for i in reversed(range(len(links))):
         joint, link = mechanism.joints[i], links[i]
-        largest = _largest([link.moment]), _largest(link.inertia)
+        sizes[i] = _largest([link.moment]), _largest(link.inertia)
         regrouped = _taken(joint, link, spins[i])
         if i > 0:
             _add(links[i - 1], _moved(regrouped, rotations[i], [trace.value(value) for value in joint.offset]))
-        found.insert(0, _named(trace, joint.row, link, *largest))
-    return found
+    return [
+        _named(trace, joint.row, link, *size)
+        for joint, link, size in zip(mechanism.joints, links, sizes, strict=True)
+    ]
 
 
 def _value(trace: Trace, turn: Turn) -> tuple[float, float]:

@@ -34,7 +34,7 @@ def _python(program: Program) -> str:
     lines = [
         *_commented(program.header, "# "),
         "",
-        "from collections.abc import Sequence",
+        "from collections.abc import Iterable",
         *(["from math import cos, sin"] if _uses_functions(program) else []),
         "",
         *_assigned(listing.constants, "{} = {}", "  # "),
@@ -42,14 +42,14 @@ def _python(program: Program) -> str:
     ]
     for function in program.functions:
         body = listing.body(function)
-        arguments = ", ".join(f"{name}: Sequence[float]" for name in function.arguments)
+        arguments = ", ".join(f"{name}: Iterable[float]" for name in function.arguments)
         kind = "list[float]" if len(function.shape) == 1 else "list[list[float]]"
         lines += ["", "", f"def {function.name}({arguments}) -> {kind}:", f'    """Return {function.text}."""']
         for name, entries in body.arguments.items():
             if any(entries):
                 lines.append(f"    {_unpacked(entries)} = map(float, {name})")
         lines += _assigned(body.statements, "    {} = {}", "")
-        lines += _nested("    return ", body, function, "    ", "")
+        lines += _nested("return ", body, function, "    ", "")
     return _joined(lines)
 
 
@@ -73,7 +73,10 @@ def _numpy(program: Program) -> str:
             "",
             "",
             f"def {function.name}({arguments}) -> NDArray[np.float64]:",
-            f'    """Return {function.text}; shape ({shape}), of arguments of shape (..., {program.n})."""',
+            f'    """Return {function.text}.',
+            "",
+            f"    Arguments have the shape (..., {program.n}), the result ({shape}).",
+            '    """',
         ]
         if len(function.arguments) > 1:
             names = ", ".join(function.arguments)
@@ -133,6 +136,9 @@ def _cpp(program: Program) -> str:
     lines = [
         *_block_comment(program.header),
         "",
+        f"#ifndef DH2SIM_{namespace}",
+        f"#define DH2SIM_{namespace}",
+        "",
         "#include <array>",
         *(["#include <cmath>"] if _uses_functions(program) else []),
         "",
@@ -159,7 +165,7 @@ def _cpp(program: Program) -> str:
         else:
             lines.append("    return {};")
         lines.append("}")
-    return _joined([*lines, "", f"}}  // namespace {namespace}"])
+    return _joined([*lines, "", f"}}  // namespace {namespace}", "", "#endif"])
 
 
 def _matlab(program: Program) -> str:
@@ -229,7 +235,7 @@ def _javascript(program: Program) -> str:
             if any(entries):
                 lines.append(f"  const [{', '.join(entry or '' for entry in entries).rstrip(', ')}] = {name};")
         lines += _assigned(body.statements, "  const {} = {};", "")
-        lines += [*_nested("  return ", body, function, "  ", ";"), "}"]
+        lines += [*_nested("return ", body, function, "  ", ";"), "}"]
     return _joined(lines)
 
 
@@ -298,24 +304,23 @@ def _places(shape: Sequence[int]) -> list[str]:
     return [", ".join(map(str, index)) for index in _indices(shape)]
 
 
-def _nested(before: str, body: Body, function: Function, indent: str, end: str) -> list[str]:
-    """Return a statement with the result as lists."""
+def _nested(before: str, body: Body, function: Function, step: str, end: str) -> list[str]:
+    """Return a statement with the result as lists, in a function that is indented by one step."""
     if len(function.shape) == 1:
-        return _list(before, body.results, indent, end)
+        return _list(f"{step}{before}", body.results, step, 1, end)
     rows, columns = function.shape
-    lines = [f"{before}["]
+    lines = [f"{step}{before}["]
     for i in range(rows):
-        row = body.results[i * columns : (i + 1) * columns]
-        lines += _list(f"{indent}    ", row, f"{indent}    ", ",")
-    return [*lines, f"{indent}]{end}"]
+        lines += _list(2 * step, body.results[i * columns : (i + 1) * columns], step, 2, ",")
+    return [*lines, f"{step}]{end}"]
 
 
-def _list(before: str, values: Sequence[str], indent: str, end: str) -> list[str]:
+def _list(before: str, values: Sequence[str], step: str, depth: int, end: str) -> list[str]:
     """Return a list on one line, or on several if it is too long for one."""
     line = f"{before}[{', '.join(values)}]{end}"
     if len(line) <= _WIDTH:
         return [line]
-    return [f"{before}[", *(f"{indent}    {value}," for value in values), f"{indent}]{end}"]
+    return [f"{before}[", *(f"{(depth + 1) * step}{value}," for value in values), f"{depth * step}]{end}"]
 
 
 def _first_upper(text: str) -> str:

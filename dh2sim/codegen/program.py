@@ -241,6 +241,7 @@ class _Names:
                 left, right = nodes[i].operands
                 flipped = "m" if nodes[i].kind == DIFFERENCE else ""
                 pending += [(right, "m" if sign != flipped else ""), (left, sign)]
+        found.sort(key=lambda part: (part.startswith("m"), int(part.removeprefix("m"))))
         return ("" if all(len(part) == 1 for part in found) else "_").join(found)
 
     def _written(self, index: int) -> tuple[str, str, int]:

@@ -10,7 +10,7 @@ import builtins
 import keyword
 from typing import Final
 
-_PYTHON_IMPORTS: Final = "np cos sin Sequence ArrayLike NDArray"
+_PYTHON_IMPORTS: Final = "np cos sin Iterable ArrayLike NDArray"
 PYTHON_NAMES: Final = frozenset([*keyword.kwlist, *keyword.softkwlist, *dir(builtins), *_PYTHON_IMPORTS.split()])
 
 _C_KEYWORDS: Final = """

@@ -90,7 +90,7 @@ WORDS = """
     _x double int register inline restrict _Bool gamma y0 y1 jn erf NAN INFINITY M_PI HUGE_VAL linux unix I main
     namespace template std new delete this and or xor a__b operator constexpr function end endfunction i j e ans p arm
     varargin nargin eps zeros var let const export import Math typeof undefined await yield arguments eval print None
-    True abs Sequence v
+    True abs Iterable v DH2SIM_double_
 """
 NAMES_IN_USE = [*WORDS.split(), "a" * 100, "a" * 99 + "b"]
 
