@@ -15,6 +15,8 @@ from dh2sim.symbolic.text import TextNotation
 class _DataNotation(TextNotation):
     """Writes every name as an identifier, and powers with ``**``."""
 
+    _in_full = True
+
     def __init__(self, form: Form) -> None:
         super().__init__(form.table, form.joint_names)
         self._angles = moving_angles(form.atoms)

@@ -150,7 +150,8 @@ def jacobian_form(
     numbers = configurations.jacobian(source, target)
     within = sorted((table.frames[source], table.frames[target]))
     moves = [within[0] < table.frames[f"link_{i}"] <= within[1] for i in table.moving]
-    numbers = numbers * np.array(moves, dtype=np.float64)
+    forward = table.frames[source] <= table.frames[target]
+    numbers = numbers * np.array(moves, dtype=np.float64) * (1.0 if forward else -1.0)
     nesting = Nesting([entry for row in J for entry in row], style, lengths)
     columns = tuple(f"q{i}" for i in table.moving)
     shown = equation(

@@ -9,7 +9,7 @@ from typing import Final
 
 from dh2sim.symbolic.angles import Angle, rate_row, slide_row, trig_of
 from dh2sim.symbolic.form import Condition, Equation, Form, moving_angles, used_letters
-from dh2sim.symbolic.notation import decimal, is_simple_quotient, written
+from dh2sim.symbolic.notation import decimal, is_long_run, is_simple_quotient, written
 from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
 from dh2sim.symbolic.table import Letter, SymbolicTable
 
@@ -52,7 +52,10 @@ class LatexNotation:
         """Return c_{12} for plain sums of coordinates, a cosine in full for other angles."""
         plain = not angle.names and not angle.degrees and all(n == 1 for _, n in angle.coordinates)
         if plain and angle.coordinates:
-            rows = self._separator.join(str(row) for row, _ in angle.coordinates)
+            numbers = [row for row, _ in angle.coordinates]
+            if is_long_run(numbers):
+                return rf"{function[0]}_{{{numbers[0]}\dots{numbers[-1]}}}"
+            rows = self._separator.join(map(str, numbers))
             if f"{function[0]}{rows}" not in self._taken:
                 return f"{function[0]}_{{{rows}}}"
         return rf"\{function}({self.angle(angle)})"
@@ -67,6 +70,9 @@ class LatexNotation:
     def angle(self, angle: Angle) -> str:
         """Return an angle in full, without spaces."""
         parts = [(self.coordinate(row, turns=True), n) for row, n in angle.coordinates]
+        plain = not angle.names and not angle.degrees and all(n == 1 for _, n in angle.coordinates)
+        if plain and is_long_run([row for row, _ in angle.coordinates]):
+            return rf"{parts[0][0]}+\dots+{parts[-1][0]}"
         parts += [(latex_name(name), n) for name, n in angle.names]
         text = ""
         for name, n in parts:

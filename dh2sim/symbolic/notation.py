@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Final, Protocol
 
@@ -10,6 +11,9 @@ from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
 
 _DIGITS: Final = 12
 """Behind the decimal point, of a number that is written exactly."""
+
+_LISTED: Final = 6
+"""Rows in the name of a cosine: c123456."""
 
 
 class Notation(Protocol):
@@ -69,3 +73,8 @@ def is_simple_quotient(number: Rational) -> bool:
         while rest % prime == 0:
             rest //= prime
     return rest > 1 and denominator < 1000
+
+
+def is_long_run(rows: Sequence[int]) -> bool:
+    """Whether rows follow one another and are too many to be listed in the name of a cosine."""
+    return len(rows) > _LISTED and rows[-1] - rows[0] == len(rows) - 1

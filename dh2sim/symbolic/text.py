@@ -11,7 +11,7 @@ from typing import Final
 from dh2sim.symbolic.angles import Angle, rate_row, slide_row, trig_of
 from dh2sim.symbolic.expression import Sum
 from dh2sim.symbolic.form import Condition, Equation, Form, moving_angles, used_letters
-from dh2sim.symbolic.notation import decimal, is_simple_quotient, written
+from dh2sim.symbolic.notation import decimal, is_long_run, is_simple_quotient, written
 from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
 from dh2sim.symbolic.table import Letter, SymbolicTable
 
@@ -24,6 +24,8 @@ class TextNotation:
     """Writes c1, s23 for cosines and sines, d3 for the coordinate of a sliding row."""
 
     times = "*"
+    _in_full = False
+    """Whether long sums of coordinates are written without dots."""
 
     def __init__(self, table: SymbolicTable, joint_names: str = "theta") -> None:
         """``joint_names`` is 'theta', with sliding coordinates d_i, or 'q'."""
@@ -51,7 +53,9 @@ class TextNotation:
     def short(self, letter: str, angle: Angle) -> str:
         """Return c12 for plain sums of coordinates, c(1-2) for other angles."""
         if self.is_plain(angle):
-            name = letter + self._separator.join(str(row) for row, _ in angle.coordinates)
+            rows = [row for row, _ in angle.coordinates]
+            long = is_long_run(rows)
+            name = f"{letter}{rows[0]}..{rows[-1]}" if long else letter + self._separator.join(map(str, rows))
             if name not in self._taken:
                 return name
         return f"{letter}({angle})"
@@ -74,6 +78,8 @@ class TextNotation:
     def angle(self, angle: Angle) -> str:
         """Return an angle in full."""
         parts = [(self.coordinate(row, turns=True), n) for row, n in angle.coordinates] + list(angle.names)
+        if self.is_plain(angle) and is_long_run([row for row, _ in angle.coordinates]) and not self._in_full:
+            return f"{parts[0][0]} + … + {parts[-1][0]}"
         text = ""
         for name, n in parts:
             body = name if abs(n) == 1 else f"{self.number(magnitude(n))}*{name}"
@@ -124,7 +130,9 @@ def legend_lines(form: Form, notation: TextNotation, width: int = WIDTH) -> Iter
             items += [f"{c} = cos({text})", f"{notation.short('s', example)} = sin({text})"]
         items += [f"{notation.short('c', a)} = cos({notation.angle(a)})" for a in moving if not notation.is_plain(a)]
     rows = sorted(row for atom in atoms if (row := slide_row(atom)) is not None)
-    items += [f"{notation.coordinate(row, turns=False)} of {form.table.spec.rows[row - 1].name}" for row in rows]
+    items += [
+        f"{notation.coordinate(row, turns=False)}: coordinate of {form.table.spec.rows[row - 1].name}" for row in rows
+    ]
     items += [text for letter in used_letters(form.table, atoms) if (text := letter_text(letter, form.table))]
     yield from _listed(items, width)
 

@@ -11,11 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dh2sim.kinematics.chain import build_chain
-from dh2sim.kinematics.forward import geometric_jacobian
+from dh2sim.kinematics.forward import frame_pose, geometric_jacobian
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.symbolic.check import SampledConfigurations, check_form
+from dh2sim.symbolic.expression import evaluated
 from dh2sim.symbolic.request import symbolic_form
 from dh2sim.symbolic.table import Fold
+from dh2sim.typing import Array
 from tests.sample_robots import NAMES, row
 from tests.sample_robots import robot as spec_of
 from tests.strategies import robot_specs
@@ -86,3 +88,27 @@ def test_an_arm_of_odd_twists_prints_its_jacobian_without_a_determinant() -> Non
     rows = tuple(row(f"j{i}", a=0.1 + 0.01 * i, d=0.2 - 0.01 * i, alpha=0.3 + 0.1 * i) for i in range(6))
     text = " ".join(lines(RobotSpec(name="general", rows=rows)))
     assert "The determinant has no factors that its structure shows; it is left out." in text
+
+
+@pytest.mark.parametrize(("source", "target"), [("dh_2", "dh_5"), ("tool0", "base_link"), ("dh_4", "link_2")])
+def test_jacobian_of_any_frame_in_any_other_is_that_of_differences(source: str, target: str) -> None:
+    spec = spec_of("stanford")
+    form = symbolic_form(spec, "jacobian", source=source, target=target).form
+    chain = build_chain(spec)
+    q = SampledConfigurations(form.table, seed=5).q
+
+    def pose(q: Array) -> Array:
+        result: Array = np.linalg.inv(frame_pose(chain, source, q)) @ frame_pose(chain, target, q)
+        return result
+
+    J, step = np.empty((len(q), 6, 6)), 1e-6
+    for k in range(6):
+        ahead, behind = pose(q + step * np.eye(6)[k]), pose(q - step * np.eye(6)[k])
+        J[:, :3, k] = (ahead - behind)[:, :3, 3] / (2 * step)
+        turn = (ahead - behind)[:, :3, :3] @ pose(q)[:, :3, :3].transpose(0, 2, 1) / (2 * step)
+        J[:, 3:, k] = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
+    atoms = SampledConfigurations(form.table, q=q).values(form.atoms)
+    found = np.stack(
+        [np.broadcast_to(v, len(q)) for v in evaluated(form.equations[0].flat, form.named, atoms)], axis=1
+    )
+    assert found.reshape(-1, 6, 6) == pytest.approx(J, abs=1e-8)

@@ -12,7 +12,7 @@ from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.symbolic.latex import latex_name
 from dh2sim.symbolic.request import symbolic_form
-from tests.sample_robots import NAMES
+from tests.sample_robots import NAMES, row
 from tests.sample_robots import robot as spec_of
 
 PDFLATEX = shutil.which("pdflatex")
@@ -48,7 +48,8 @@ def compiled(text: str, folder: Path) -> str:
 
 def one_document(specs: list[RobotSpec], what: str) -> str:
     """Put the bodies of several documents into one: TeX takes longer to start than to set them."""
-    texts = [symbolic_form(spec, what).latex() for spec in specs]
+    letters = what == "dynamics"
+    texts = [symbolic_form(spec, what, letters=letters).latex() for spec in specs]
     head = texts[0].split(r"\begin{document}")[0]
     bodies = [text.split(r"\begin{document}")[1].split(r"\end{document}")[0] for text in texts]
     return "\n".join([head, r"\begin{document}", *bodies, r"\end{document}"])
@@ -60,6 +61,16 @@ def one_document(specs: list[RobotSpec], what: str) -> str:
 def test_latex_compiles_as_it_stands_and_fits_the_page(what: str, tmp_path: Path) -> None:
     log = compiled(one_document([*map(spec_of, NAMES), AWKWARD], what), tmp_path)
     assert "Overfull" not in log
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(PDFLATEX is None, reason="pdflatex is not installed")
+def test_equations_of_motion_and_long_chains_compile(tmp_path: Path) -> None:
+    arms = [spec_of(name) for name in ("planar_2r", "rpr", "cylindrical", "spherical_wrist", "scara")]
+    snake = RobotSpec(name="snake", rows=tuple(row(f"j{i}", a=0.1) for i in range(12)))
+    text = one_document(arms, "dynamics").replace(r"\end{document}", "")
+    body = symbolic_form(snake).latex().split(r"\begin{document}")[1]
+    assert "Overfull" not in compiled(text + body, tmp_path)
 
 
 @pytest.mark.slow

@@ -77,6 +77,9 @@ def test_numbers_of_rows_are_kept_apart_where_there_are_ten() -> None:
     rows = tuple(row(f"j{i}", a=0.1) for i in range(12))
     text = str(symbolic_form(RobotSpec(name="snake", rows=rows)))
     assert "0.1*c1_2_3" in text
+    assert "0.1*c1..12" in text
+    assert "c1..12 = cos(theta_1 + … + theta_12)" in text
+    assert max(map(len, text.splitlines())) <= 80
 
 
 def test_folding_across_opposite_axes_is_for_those_who_ask() -> None:
