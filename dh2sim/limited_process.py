@@ -1,8 +1,8 @@
 """Work on files of strangers in another process, whose time and memory are limited.
 
-A worker is a module with a function ``answer(request: bytes) -> bytes``. Its process is started once and imports the
-module; every request is then answered by a fork of it, which the limits count for alone. Where there is no safe fork
-(everywhere but on Linux), a process answers one request. Time is limited on every system, memory on Linux.
+A worker is a module with a function ``answer(request: bytes) -> bytes``. Its process is started once, imports the
+module, and answers one request after another. On Linux a fork of it does that, for which alone the limits of memory
+and processor time are; elsewhere there is no safe fork, and time by the clock is what is limited.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ import struct
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import IO, Final, NoReturn, TypeAlias
 
 from dh2sim.errors import Dh2simError
@@ -165,10 +166,7 @@ def ask_worker(module: str, request: bytes, *, seconds: int = SECONDS) -> bytes:
         except BaseException:  # Ctrl-C among others, after which the process may be at work still
             worker.close()
             raise
-        if _FORKS:
-            _workers[module] = worker
-        else:
-            worker.close()
+        _workers[module] = worker
         return answer
 
 
@@ -212,15 +210,19 @@ def serve(module: str) -> NoReturn:
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is no answer
     function = _function(module)
+    _limit({"FSIZE": 0, "CORE": 0})
     while True:
         try:
             _, limits, request = _receive(sys.stdin.buffer)
         except EOFError:
             os._exit(0)
-        child = os.fork() if _FORKS else 0
+        if not _FORKS:
+            _reply(function, request, answers)
+            continue
+        child = os.fork()
         if child == 0:
             try:
-                _limit(*limits)
+                _limit({"CPU": limits[0], "AS": _taken() + limits[1]})
                 _reply(function, request, answers)
                 os._exit(0)
             finally:
@@ -257,15 +259,17 @@ def _reply(function: _Answer, request: bytes, answers: IO[bytes]) -> None:
     answers.flush()
 
 
-def _limit(seconds: int, memory: int) -> None:
-    """Limit memory, processor time and what may be written, as far as the system does that."""
+def _taken() -> int:
+    """Return the bytes of address space that this process has, on Linux."""
+    return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def _limit(limits: Mapping[str, int]) -> None:
+    """Limit resources of this process, by the names that follow ``RLIMIT_``, where the system has them."""
     try:
         import resource
-    except ImportError:  # on Windows, where the caller's clock remains
+    except ImportError:  # on Windows
         return
-    limits = {"CPU": seconds, "FSIZE": 0, "CORE": 0}
-    with contextlib.suppress(OSError), open("/proc/self/statm", encoding="ascii") as stream:
-        limits["AS"] = int(stream.read().split()[0]) * resource.getpagesize() + memory
     for what, most in limits.items():
         with contextlib.suppress(ValueError, OSError):
             limit = getattr(resource, f"RLIMIT_{what}")

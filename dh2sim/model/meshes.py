@@ -1,25 +1,31 @@
-"""Meshes that show links, converted to binary STL, which every engine reads; trimesh reads all but COLLADA."""
+"""Meshes that show links, converted to binary STL, which every engine reads.
+
+They may come from strangers: another process reads them (``mesh_worker``), within limits of time and memory.
+"""
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import Any, Final
 
 from dh2sim.errors import MeshError
+from dh2sim.files import read_plain_file
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.model.collada import read_collada
+from dh2sim.limited_process import WorkerError, ask_worker
 from dh2sim.robot.spec import MeshSpec
 from dh2sim.typing import Array
 
-if TYPE_CHECKING:
-    import trimesh
-
+MAX_BYTES: Final = 100_000_000
+"""Of a mesh file."""
 MAX_FACES = 200_000
 """MuJoCo refuses an STL file with more."""
 MIN_CORNERS = 4
 """MuJoCo refuses a mesh with fewer."""
 MIN_AREA = 1e-12
 """m²: MuJoCo finds no centre of a smaller surface."""
+_WORKER: Final = "dh2sim.model.mesh_worker"
 STL_HEADER, STL_FACE = 84, 50
 """Bytes of a binary STL file: before the faces, and for each."""
 
@@ -48,21 +54,21 @@ def load_mesh(mesh: MeshSpec, link_name: str) -> MeshAsset:
         link_name: Names the exported file.
 
     Raises:
-        MeshError: It cannot be read, has no faces or too many, fewer than four corners, no area, or numbers that
-            are not finite; the text names the row of the robot file, or the link.
+        MeshError: It cannot be read or is too large, has no faces or too many, fewer than four corners, no area, or
+            numbers that are not finite; the text names the row of the robot file, or the link.
     """
     place = mesh.location or link_name
     try:
-        original = mesh.file.read_bytes()
-        surface = _read(mesh, original)
-    except Exception as error:  # trimesh's readers raise many types
+        original = read_mesh_file(mesh.file)
+        facts, data = _read(mesh.file.suffix.lower(), original)
+    except (OSError, WorkerError) as error:
         raise MeshError(f"{place}: cannot read the mesh '{mesh.file}': {_words(error)}") from error
-    _check(surface, mesh, place)
+    _check(facts, mesh, place)
     suffix = mesh.file.suffix.lower()
-    if suffix == ".stl" and len(original) == STL_HEADER + STL_FACE * len(surface.faces):
+    if suffix == ".stl" and len(original) == STL_HEADER + STL_FACE * facts["faces"]:
         data, converted = original, None
     else:
-        data, converted = bytes(surface.export(file_type="stl")), suffix
+        converted = suffix
     return MeshAsset(
         file_name=f"{link_name}.stl",
         data=data,
@@ -72,19 +78,25 @@ def load_mesh(mesh: MeshSpec, link_name: str) -> MeshAsset:
     )
 
 
-def _read(mesh: MeshSpec, data: bytes) -> trimesh.Trimesh:
-    import trimesh  # takes seconds: only robots with meshes pay for it
+def read_mesh_file(path: Path) -> bytes:
+    """Return the content of a mesh file.
 
-    if mesh.file.suffix.lower() == ".dae":
-        vertices, faces = read_collada(data)
-        return trimesh.Trimesh(vertices, faces, process=False)
-    return trimesh.load_mesh(mesh.file, process=False)
+    Raises:
+        OSError: It cannot be read, is not a plain file, or has more than ``MAX_BYTES`` bytes.
+    """
+    return read_plain_file(path.resolve(), MAX_BYTES)
 
 
-def _check(surface: trimesh.Trimesh, mesh: MeshSpec, place: str) -> None:
-    import numpy as np
+def _read(suffix: str, data: bytes) -> tuple[dict[str, Any], bytes]:
+    """Return what the worker says of a mesh, and the triangles as a binary STL file."""
+    head, _, stl = ask_worker(_WORKER, suffix.encode() + b"\n" + data).partition(b"\n")
+    return json.loads(head), stl
 
-    faces = len(getattr(surface, "faces", ()))
+
+def _check(facts: dict[str, Any], mesh: MeshSpec, place: str) -> None:
+    if (reason := facts.get("refused")) is not None:
+        raise MeshError(f"{place}: cannot read the mesh '{mesh.file}': {reason}")
+    faces = facts["faces"]
     if faces == 0:
         raise MeshError(f"{place}: the mesh '{mesh.file}' has no faces")
     if faces > MAX_FACES:
@@ -92,12 +104,11 @@ def _check(surface: trimesh.Trimesh, mesh: MeshSpec, place: str) -> None:
             f"{place}: the mesh '{mesh.file}' has {faces} faces; MuJoCo reads at most {MAX_FACES}. "
             "Simplify it, for instance with Blender's Decimate or trimesh's simplify_quadric_decimation"
         )
-    corners = np.asarray(surface.vertices)[np.unique(surface.faces)]
-    if not (np.abs(corners) <= np.finfo(np.float32).max).all():  # STL files hold single precision
+    if not facts["finite"]:
         raise MeshError(f"{place}: the mesh '{mesh.file}' has coordinates that are not finite")
-    if len(np.unique(corners.astype(np.float32), axis=0)) < MIN_CORNERS:
+    if facts["corners"] < MIN_CORNERS:
         raise MeshError(f"{place}: the mesh '{mesh.file}' has fewer than {MIN_CORNERS} corners; MuJoCo refuses it")
-    area = float(surface.area) * mesh.scale**2
+    area = facts["area"] * mesh.scale**2
     if not area >= MIN_AREA:
         raise MeshError(
             f"{place}: the mesh '{mesh.file}' has an area of {area:.3g} m² with scale {mesh.scale!r}; MuJoCo "

@@ -1,15 +1,22 @@
 from __future__ import annotations
 
-from functools import partial
+import json
+import os
+import struct
+import sys
+import zlib
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 
+from dh2sim import limited_process
 from dh2sim.errors import MeshError, RobotFileError
 from dh2sim.model.build import build_model
-from dh2sim.model.meshes import MAX_FACES
+from dh2sim.model.meshes import MAX_BYTES, MAX_FACES
 from dh2sim.robot.read import parse_robot
 from tests.refusals import refusal
 
@@ -126,3 +133,126 @@ def test_more_faces_than_mujoco_reads_are_refused(tmp_path: Path) -> None:
         f"{WHERE}: the mesh '{file}' has 200001 faces; MuJoCo reads at most 200000. Simplify it, for instance "
         "with Blender's Decimate or trimesh's simplify_quadric_decimation"
     )
+
+
+def glb(tree: dict[str, Any], binary: bytes = b"") -> bytes:
+    """A GLB file of a description and a buffer."""
+    text = json.dumps({"asset": {"version": "2.0"}, "buffers": [{"byteLength": len(binary)}], **tree}).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def tetrahedra(count: int, nodes: list[dict[str, Any]], picture: bytes = b"") -> bytes:
+    """A GLB file with a mesh of some tetrahedra, nodes that show it, and a picture on it."""
+    corners = np.tile(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32), (count, 1))
+    one = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
+    faces = (one + 4 * np.arange(count)[:, None, None]).astype(np.uint32)
+    parts = [corners.tobytes(), faces.tobytes(), picture + b"\0" * (-len(picture) % 4)]
+    starts = [0, len(parts[0]), len(parts[0]) + len(parts[1])]
+    views = [{"buffer": 0, "byteOffset": a, "byteLength": len(part)} for a, part in zip(starts, parts, strict=True)]
+    primitive = {"attributes": {"POSITION": 0}, "indices": 1, "material": 0}
+    return glb(
+        {
+            "scene": 0,
+            "scenes": [{"nodes": list(range(len(nodes)))}],
+            "nodes": nodes,
+            "meshes": [{"primitives": [primitive]}],
+            "accessors": [
+                {"bufferView": 0, "componentType": 5126, "count": 4 * count, "type": "VEC3"},
+                {"bufferView": 1, "componentType": 5125, "count": 12 * count, "type": "SCALAR"},
+            ],
+            "bufferViews": views if picture else views[:2],
+            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}} if picture else {}}],
+            "textures": [{"source": 0}] if picture else [],
+            "images": [{"bufferView": 2, "mimeType": "image/png"}] if picture else [],
+        },
+        b"".join(parts),
+    )
+
+
+@cache
+def white(side: int) -> bytes:
+    """A PNG file of a white square."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    rows = zlib.compressobj(1)
+    data = b"".join(rows.compress(b"\0" + b"\xff" * (3 * side)) for _ in range(side)) + rows.flush()
+    head = struct.pack(">IIBBBBB", side, side, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
+
+
+SCENE = [{"mesh": 0}]
+HUGE = {"componentType": 5126, "count": 2**31, "type": "VEC3"}
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "reason"),
+    [
+        ("zeros.glb", glb({"accessors": [HUGE]}), "its accessors hold 2147483648 items; at most 8000000 are read"),
+        ("many.glb", glb({"nodes": [{}] * 10_001}), "it has 10001 nodes; at most 10000 are read"),
+        ("copies.glb", tetrahedra(1000, SCENE * 1000), "its scene has more than 10000 nodes, or 2000000 faces"),
+        (
+            "tree.glb",
+            tetrahedra(1, [*({"children": [i + 1, i + 1]} for i in range(40)), {"mesh": 0}]),
+            "its scene has more than 10000 nodes, or 2000000 faces",
+        ),
+        (
+            "short.ply",
+            b"ply\nformat binary_little_endian 1.0\nelement vertex 999999999999\nproperty float x\nend_header\n",
+            "it announces 999999999999 of element 'vertex'; the file has 92 bytes, and at most 2000000 are read",
+        ),
+    ],
+    ids=["zeros", "nodes", "copies", "doubling", "PLY"],
+)
+def test_a_mesh_that_would_become_huge_is_refused_before_it_is_read(
+    tmp_path: Path, name: str, data: bytes, reason: str
+) -> None:
+    (tmp_path / name).write_bytes(data)
+    assert refused(tmp_path, name) == f"{WHERE}: cannot read the mesh '{tmp_path / name}': {reason}"
+
+
+def test_a_mesh_file_that_is_too_large_or_no_file_is_not_opened(tmp_path: Path) -> None:
+    with (tmp_path / "large.stl").open("wb") as stream:
+        stream.truncate(MAX_BYTES + 1)
+    reason = f"is larger than {MAX_BYTES} bytes"
+    assert refused(tmp_path, "large.stl") == f"{WHERE}: cannot read the mesh '{tmp_path / 'large.stl'}': {reason}"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+def test_a_pipe_in_place_of_a_mesh_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.stl")
+    assert "pipe.stl" in refusal(Exception, build, tmp_path, "pipe.stl")
+
+
+@pytest.mark.parametrize("kind", ["glb", "obj", "ply"])
+def test_pictures_on_a_mesh_are_not_opened(tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They would take 243 MB."""
+    monkeypatch.setattr(limited_process, "MEMORY", 150_000_000)
+    (tmp_path / "white.png").write_bytes(white(9_000))
+    corners = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n"
+    match kind:
+        case "glb":
+            (tmp_path / "part.glb").write_bytes(tetrahedra(1, SCENE, white(9_000)))
+        case "obj":
+            (tmp_path / "part.mtl").write_text("newmtl m\nmap_Kd white.png\n")
+            faces = "f 1/1 2/1 3/1\nf 1/1 2/1 4/1\nf 1/1 3/1 4/1\nf 2/1 3/1 4/1\n"
+            vertices = "".join(f"v {line}\n" for line in corners.splitlines())
+            (tmp_path / "part.obj").write_text(f"mtllib part.mtl\n{vertices}vt 0 0\nusemtl m\n{faces}")
+        case _:
+            (tmp_path / "part.ply").write_text(
+                "ply\nformat ascii 1.0\ncomment TextureFile white.png\nelement vertex 4\nproperty float x\n"
+                "property float y\nproperty float z\nelement face 4\nproperty list uchar int vertex_indices\n"
+                f"end_header\n{corners}3 0 1 2\n3 0 1 3\n3 0 2 3\n3 1 2 3\n"
+            )
+    build(tmp_path, f"part.{kind}")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux only")
+def test_a_mesh_that_takes_too_much_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "part.obj").write_text("v 0 0 0\n" * 300_000 + "f 1 2 3\n" * 300_000)
+    monkeypatch.setattr(limited_process, "MEMORY", 40_000_000)
+    reason = "it needs more than 40 MB of memory"
+    assert refused(tmp_path, "part.obj") == f"{WHERE}: cannot read the mesh '{tmp_path / 'part.obj'}': {reason}"

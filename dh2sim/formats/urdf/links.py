@@ -19,6 +19,7 @@ from dh2sim.kinematics.transforms import compose, identity, invert, move_point, 
 from dh2sim.messages import Notes, shown
 from dh2sim.model.collada import T_read_file
 from dh2sim.model.mass import MassProperties, combine, thickened
+from dh2sim.model.meshes import read_mesh_file
 from dh2sim.model.robot_model import Color
 from dh2sim.typing import Array, read_only
 
@@ -261,7 +262,7 @@ def _unturned(file: Path, T: Array, name: str, notes: Notes) -> Array:
     if file.suffix.lower() != ".dae":
         return T
     try:
-        T_file = T_read_file(file.read_bytes())
+        T_file = T_read_file(read_mesh_file(file))
     except (OSError, ValueError):  # which the export will report
         return T
     if not np.array_equal(T_file, identity()):
