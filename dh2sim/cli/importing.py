@@ -71,7 +71,7 @@ def import_robot(
     root: Annotated[
         Path | None,
         typer.Option(
-            metavar="FOLDER", help="Folder to read included files in and below. [default: the file's folder]"
+            metavar="FOLDER", help="Folder to read included files and meshes in and below. [default: the file's own]"
         ),
     ] = None,
     arg: Annotated[

@@ -215,7 +215,8 @@ class ImportOptions:
     package_paths: Sequence[str | os.PathLike[str]] = ()
     """Folders, or the path of one, in which ``package://`` is looked for first."""
     root: str | os.PathLike[str] | None = None
-    """Folder outside of which an MJCF or a xacro file includes no file; by default the file's own."""
+    """Folder outside of which an MJCF or a xacro file includes no file; by default the file's own. Meshes in it are
+    used, too."""
     arguments: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     """Values of a xacro file's arguments, by name."""
     nominal: SpecLike | str | os.PathLike[str] | None = None
@@ -359,7 +360,7 @@ def _read_urdf(data: bytes, file: str, options: ImportOptions) -> SerialRobot:
 
     _refuse_units(file, "URDF", options)
     directory = Path.cwd() if file == STDIN else Path(file).parent
-    find_mesh = mesh_finder(directory, [Path(folder) for folder in options.package_paths])
+    find_mesh = mesh_finder(directory, [Path(folder) for folder in options.package_paths], _root(file, options))
     element, notes = _expanded(parse_xml(data, file=file), data, file, options)
     robot = read_urdf(element, file=file, base=options.base, tip=options.tip, find_mesh=find_mesh)
     return replace(robot, notes=(*notes, *robot.notes))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dh2sim.formats.mesh_paths import mesh_finder
+from dh2sim.formats.mesh_paths import FindMesh, MeshOutsideError, mesh_finder
 
 
 @pytest.fixture(autouse=True)
@@ -130,3 +130,65 @@ def test_a_package_may_be_in_a_folder_of_another_name(tmp_path: Path) -> None:
     assert mesh_finder(folder)("package://my_arm/meshes/a.stl") == tmp_path / "a_clone" / "meshes" / "a.stl"
     assert mesh_finder(folder)("package://other/meshes/a.stl") is None
     assert mesh_finder(tmp_path, [tmp_path / "a_clone"])("package://my_arm/meshes/a.stl") is not None
+
+
+def outside(find: FindMesh, uri: str) -> bool:
+    """Whether a mesh is there and may not be used."""
+    try:
+        assert find(uri) is None
+    except MeshOutsideError:
+        return True
+    return False
+
+
+def test_no_name_leads_out_of_the_files_own_folders(tmp_path: Path) -> None:
+    secret = mesh(tmp_path / "home" / "secret.stl")
+    package = tmp_path / "home" / "downloads" / "arm"
+    own = mesh(package / "meshes" / "a.stl")
+    (package / "package.xml").write_text("<package><name>arm</name></package>")
+    (package / "urdf" / "deep").mkdir(parents=True)
+    for folder in (package / "urdf", package / "urdf" / "deep"):
+        find = mesh_finder(folder)
+        up = os.path.relpath(secret, folder)
+        for uri in (
+            f"package://arm/../../{secret.name}",
+            f"package://arm/meshes/../../../{secret.name}",
+            f"package://arm/%2e%2e/%2e%2e/{secret.name}",
+            f"model://arm/../../{secret.name}",
+            f"file://{secret}",
+            f"file://{up}",
+            str(secret),
+            up,
+        ):
+            assert outside(find, uri), uri
+            assert mesh_finder(folder, [], tmp_path / "home")(uri) is not None
+        assert find(os.path.relpath(own, folder)) is not None
+        assert find(f"file://{own}") == own
+        assert find("package://arm/urdf/../meshes/a.stl") is not None
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights there")
+def test_no_link_leads_out_of_the_files_own_folders(tmp_path: Path) -> None:
+    secret = mesh(tmp_path / "home" / "secret.stl")
+    package = tmp_path / "downloads" / "arm"
+    (package / "meshes").mkdir(parents=True)
+    (package / "urdf").mkdir()
+    (package / "package.xml").write_text("<package><name>arm</name></package>")
+    (package / "meshes" / "link.stl").symlink_to(secret)
+    (package / "folder").symlink_to(secret.parent)
+    own = mesh(package / "meshes" / "own.stl")
+    (package / "meshes" / "inner.stl").symlink_to(own)
+    find = mesh_finder(package / "urdf")
+    for uri in ("package://arm/meshes/link.stl", "../meshes/link.stl", "package://arm/folder/secret.stl"):
+        assert outside(find, uri)
+        assert mesh_finder(package / "urdf", [secret.parent])(uri) is not None
+    assert find("package://arm/meshes/inner.stl") == package / "meshes" / "inner.stl"
+
+
+def test_a_link_to_the_package_itself_is_followed(tmp_path: Path) -> None:
+    found = mesh(tmp_path / "source" / "arm" / "a.stl")
+    (tmp_path / "share").mkdir()
+    (tmp_path / "share" / "arm").symlink_to(tmp_path / "source" / "arm")
+    find = mesh_finder(tmp_path / "urdf", [tmp_path / "share"])
+    assert find("package://arm/a.stl") == tmp_path / "share" / "arm" / "a.stl"
+    assert found.exists()

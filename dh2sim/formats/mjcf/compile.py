@@ -57,6 +57,8 @@ class Compiled:
     """By the number of the mesh."""
     lost_geoms: Mapping[int, str]
     """Geoms whose file was not used, by number, with the file's name; a ball replaces each."""
+    outside: frozenset[str]
+    """Names of files that are not in the folders whose meshes are used."""
     meshes_refused: bool
     """Whether MuJoCo could not use files that exist, so that none was used."""
     unknown_masses: frozenset[int]
@@ -82,7 +84,11 @@ def compile_mjcf(files: MjcfFiles, notes: Notes) -> Compiled:
         ImportedFileError: MuJoCo refuses the model, or needs too much time or memory for it.
     """
     try:
-        facts, model = _compiled(path=str(files.path), folders=[str(folder) for folder in files.folders])
+        facts, model = _compiled(
+            path=str(files.path),
+            folders=[str(folder) for folder in files.folders],
+            allowed=[str(folder) for folder in files.allowed],
+        )
     except WorkerError as error:
         raise files.error(f"MuJoCo cannot compile the file: {error}") from None
     for sentence in warning_sentences(facts["warnings"]):
@@ -96,6 +102,7 @@ def compile_mjcf(files: MjcfFiles, notes: Notes) -> Compiled:
         name=facts["name"],
         mesh_files={int(number): MeshFile.of(found) for number, found in facts["mesh_files"].items()},
         lost_geoms={int(number): uri for number, uri in facts["lost_geoms"].items()},
+        outside=frozenset(facts["outside"]),
         meshes_refused=reason is not None,
         unknown_masses=frozenset(facts["unknown_masses"]),
         unknown_damping=frozenset(facts["unknown_damping"]),

@@ -19,6 +19,7 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
+from dh2sim.formats.mesh_paths import is_inside
 from dh2sim.formats.mjcf.includes import MAX_POINTS
 
 MAX_ASSET_BYTES: Final = 100_000_000
@@ -46,6 +47,8 @@ class Assets:
 
     meshes: dict[str, Path | None] = field(repr=False)
     fields: dict[str, Path | None] = field(repr=False)
+    outside: tuple[str, ...]
+    """Names of files that exist where they may not be used."""
 
     @property
     def has_files(self) -> bool:
@@ -53,28 +56,44 @@ class Assets:
         return any((*self.meshes.values(), *self.fields.values()))
 
 
-def find_assets(spec: Any, folders: Sequence[Path]) -> Assets:
-    """Look for the files that a model's meshes and height fields come from."""
+def find_assets(spec: Any, folders: Sequence[Path], allowed: Sequence[Path]) -> Assets:
+    """Look for the files that a model's meshes and height fields come from.
+
+    Args:
+        spec: The model, not compiled yet.
+        folders: Of the models that it is made of.
+        allowed: Folders, without links, in and below which files are used.
+    """
+    outside: dict[str, None] = {}
+
+    def found(asset: Any) -> Path | None:
+        """Return the file of an asset; MuJoCo does not say which of several attached models names it."""
+        name = asset.file.replace("\\", "/")
+        if spec.strippath:
+            name = name.rpartition("/")[2]
+        for folder in folders:
+            path = folder / asset.compiler.meshdir.replace("\\", "/") / name
+            if not _can_be_read(path):
+                continue
+            if is_inside(path, allowed):
+                return Path(os.path.normpath(path))
+            outside.setdefault(asset.file)
+        return None
+
     return Assets(
-        meshes={mesh.name: _found(mesh, spec, folders) for mesh in spec.meshes if mesh.file},
-        fields={field.name: _found(field, spec, folders) for field in spec.hfields if field.file},
+        meshes={mesh.name: found(mesh) for mesh in spec.meshes if mesh.file},
+        fields={field.name: found(field) for field in spec.hfields if field.file},
+        outside=tuple(outside),
     )
 
 
-def _found(asset: Any, spec: Any, folders: Sequence[Path]) -> Path | None:
-    """Return the file of an asset; MuJoCo does not say which of several attached models names it."""
-    name = asset.file.replace("\\", "/")
-    if spec.strippath:
-        name = name.rpartition("/")[2]
-    for folder in folders:
-        path = folder / asset.compiler.meshdir.replace("\\", "/") / name
-        try:
-            status = path.stat()
-        except (OSError, ValueError):  # ValueError: a name that no file can have
-            continue
-        if stat.S_ISREG(status.st_mode) and status.st_size <= MAX_ASSET_BYTES and _pixels(path) <= MAX_POINTS:
-            return Path(os.path.normpath(path))
-    return None
+def _can_be_read(path: Path) -> bool:
+    """Whether there is a file of moderate size."""
+    try:
+        status = path.stat()
+        return stat.S_ISREG(status.st_mode) and status.st_size <= MAX_ASSET_BYTES and _pixels(path) <= MAX_POINTS
+    except (OSError, ValueError):  # ValueError: a name that no file can have
+        return False
 
 
 def _pixels(path: Path) -> int:
@@ -163,7 +182,8 @@ def _gives_mass(geom: Any, body: Any) -> bool:
 def answer(request: bytes) -> bytes:
     """Compile an MJCF; the model comes after a line of JSON that says what MuJoCo does not keep in it.
 
-    The request names a file (``path``, and ``folders`` in which its meshes may be), or it has the ``text`` of one and
+    The request names a file (``path``, ``folders`` from which its meshes are looked for, and those in which they are
+    ``allowed``), or it has the ``text`` of one and
     the texts of those that it includes (``included``, by name), which is compiled as it is.
 
     Raises:
@@ -180,7 +200,11 @@ def answer(request: bytes) -> bytes:
                 included = {name: text.encode() for name, text in asked["included"].items()}
                 model = mujoco.MjModel.from_xml_string(asked["text"], included)
             else:
-                model, facts = _compiled_anyhow(asked["path"], [Path(folder) for folder in asked["folders"]])
+                model, facts = _compiled_anyhow(
+                    asked["path"],
+                    [Path(folder) for folder in asked["folders"]],
+                    [Path(folder) for folder in asked["allowed"]],
+                )
         except Exception as error:  # MuJoCo's bindings raise a handful of types
             facts = {"refused": _text(error)}
     facts["warnings"] = messages + [str(warning.message) for warning in caught]
@@ -196,10 +220,10 @@ def _text(error: Exception) -> str:
     return text or type(error).__name__
 
 
-def _compiled_anyhow(path: str, folders: Sequence[Path]) -> tuple[Any, dict[str, Any]]:
+def _compiled_anyhow(path: str, folders: Sequence[Path], allowed: Sequence[Path]) -> tuple[Any, dict[str, Any]]:
     """Compile a model, without its files of meshes where MuJoCo cannot use one of them."""
     spec = _parsed(path)
-    assets = find_assets(spec, folders)
+    assets = find_assets(spec, folders, allowed)
     try:
         return _compiled(spec, assets, all_files=False)
     except Exception as error:
@@ -239,6 +263,7 @@ def _compiled(spec: Any, assets: Assets, *, all_files: bool) -> tuple[Any, dict[
         "name": "" if spec.modelname == "MuJoCo Model" else spec.modelname,
         "mesh_files": _mesh_files(spec, assets),
         "lost_geoms": {geom.id: uri for geom, uri in lost.geoms},
+        "outside": assets.outside,
         "meshes_refused": None,
         "unknown_masses": [body.id for body in lost.masses],
         "unknown_damping": [joint.id for joint in springs],

@@ -11,6 +11,7 @@ from pathlib import Path, PureWindowsPath
 from typing import Final, NamedTuple
 
 from dh2sim.errors import Dh2simError, ImportedFileError, Problem
+from dh2sim.formats.mesh_paths import is_inside, own_folders
 from dh2sim.formats.xml_read import MAX_BYTES, Element, XmlReport, parse_xml
 from dh2sim.messages import shown
 
@@ -86,6 +87,8 @@ class MjcfFiles:
     """What messages call it."""
     folders: tuple[Path, ...]
     """Of the file and of every model that it attaches; their meshes are looked for from there."""
+    allowed: tuple[Path, ...]
+    """Folders in and below which meshes are used, without links."""
     models: int
     """Number of models: the file itself and those that are attached."""
     places: Mapping[tuple[str, str], Place] = field(repr=False)
@@ -121,6 +124,10 @@ def scan_files(path: Path, *, file: str, root: Path | None = None) -> MjcfFiles:
         path=main,
         file=file,
         folders=tuple(search.folders),
+        allowed=(
+            Path(os.path.realpath(search.root)),
+            *(own for folder in search.folders for own in own_folders(folder)),
+        ),
         models=search.models,
         places=search.places,
     )
@@ -283,7 +290,9 @@ class _Model:
         folders = dict.fromkeys((self._path.parent, self._here[0]))
         paths = [Path(os.path.normpath(folder / given.replace("\\", "/"))) for folder in folders]
         there = [path for path in paths if os.path.lexists(path)]
-        outside = [path for path in there or paths if not path.is_relative_to(self._search.root)]
+        root = self._search.root
+        outside = [path for path in there or paths if not path.is_relative_to(root)]
+        outside += [path for path in there if not is_inside(path, [Path(os.path.realpath(root))])]  # by a link
         on_a_drive = os.name != "nt" and PureWindowsPath(given).drive
         if not given or outside or on_a_drive:
             hint = self._search.root_hint(outside[0]) if there and outside else ""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from dh2sim.formats.mesh_paths import OUTSIDE
 from dh2sim.formats.mjcf.compile import Compiled, MeshFile
 from dh2sim.formats.mjcf.tree import WORLD, MjcfBody, MjcfTree, pose
 from dh2sim.formats.serial_robot import Inertial, Look, SerialMesh, can_show, possible_inertial
@@ -134,6 +135,9 @@ def _mesh(
 
     model = compiled.model
     if geom in compiled.lost_geoms:
+        if compiled.lost_geoms[geom] in compiled.outside:
+            notes.group(OUTSIDE, name, compiled.lost_geoms[geom])
+            return None
         how = "used" if compiled.meshes_refused else "found"
         uri = PurePosixPath(compiled.lost_geoms[geom]).name or "a height field"
         notes.group(f"Meshes were not {how}, of links {{}}.", name, uri)

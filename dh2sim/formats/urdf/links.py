@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from dh2sim.formats.mesh_paths import FindMesh
+from dh2sim.formats.mesh_paths import OUTSIDE, FindMesh, MeshOutsideError
 from dh2sim.formats.serial_robot import Inertial, Look, SerialMesh, can_show, possible_inertial
 from dh2sim.formats.urdf.chain import Selection
 from dh2sim.formats.urdf.tree import UrdfJoint, UrdfTree, read_number, read_numbers, read_only_child, read_pose
@@ -250,11 +250,22 @@ def _mesh(
         notes.group("A link shows one mesh; further ones are not carried over, of links {}.", part.name)
     elif not can_show(PurePosixPath(uri).suffix, scale, part.name, notes):
         return None
-    elif (file := find_mesh(uri)) is None:
-        notes.group(f"Meshes were not found in {_folder(uri)}, of links {{}}.", part.name)
     else:
-        return SerialMesh(uri=uri, path=file, scale=scale[0], T_link_mesh=_unturned(file, T, part.name, notes))
+        return _found(uri, scale[0], T, part.name, find_mesh, notes)
     return None
+
+
+def _found(uri: str, scale: float, T: Array, name: str, find_mesh: FindMesh, notes: Notes) -> SerialMesh | None:
+    """Return a mesh that can be shown, if its file is there and may be used."""
+    try:
+        file = find_mesh(uri)
+    except MeshOutsideError:
+        notes.group(OUTSIDE, name, uri)
+        return None
+    if file is None:
+        notes.group(f"Meshes were not found in {_folder(uri)}, of links {{}}.", name)
+        return None
+    return SerialMesh(uri=uri, path=file, scale=scale, T_link_mesh=_unturned(file, T, name, notes))
 
 
 def _unturned(file: Path, T: Array, name: str, notes: Notes) -> Array:

@@ -218,6 +218,41 @@ def test_a_huge_picture_of_a_height_field_is_not_opened(tmp_path: Path) -> None:
     assert not any("MuJoCo cannot use" in note for note in robot.notes)  # as it would, had it opened the file
 
 
+BOX = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.mark.parametrize("how", ["up", "meshdir", "absolute", "link"])
+def test_meshes_outside_of_the_models_own_folders_are_used_only_with_root(tmp_path: Path, how: str) -> None:
+    folder = tmp_path / "home" / "downloads" / "arm"
+    folder.mkdir(parents=True)
+    secret = tmp_path / "home" / "secret.obj"
+    secret.write_text(BOX)
+    name = {"up": "../../secret.obj", "absolute": str(secret)}.get(how, "secret.obj")
+    if how == "link":
+        (folder / "secret.obj").symlink_to(secret)
+    compiler = f'<compiler meshdir="{secret.parent}"/>' if how == "meshdir" else ""
+    asset = f'{compiler}<asset><mesh name="m" file="{name}"/></asset>'
+    geom = '<geom type="mesh" mesh="m" contype="0" conaffinity="0" mass="0"/>'
+    text = model_text(ARM.replace(BALL, BALL + geom), asset)
+    robot = read_text(folder, text)
+    assert robot.links[0].mesh is None
+    noted = "Meshes outside of the file's own folders are used only with root, a folder that holds them: 'one'"
+    assert any(note.startswith(noted) for note in robot.notes)
+    again = read_mjcf(folder / "robot.xml", file="robot.xml", root=tmp_path / "home")
+    assert again.links[0].mesh is not None
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights there")
+def test_a_link_to_another_folder_is_not_included(tmp_path: Path) -> None:
+    folder = tmp_path / "model"
+    folder.mkdir()
+    (tmp_path / "secret.xml").write_text("<x/>")
+    (folder / "link.xml").symlink_to(tmp_path / "secret.xml")
+    assert "only files in the model's folder and those below it are read" in refused(
+        folder, '<mujoco><include file="link.xml"/></mujoco>'
+    )
+
+
 @pytest.mark.parametrize(
     ("request_", "reason"),
     [("loop", "it takes longer than 1 seconds"), ("abort", "it ended the process that read it (signal 6)")],
