@@ -155,13 +155,9 @@ def tool_pose(mechanism: Mechanism, q: Sequence[Token], trace: Trace) -> list[li
         point = mechanism.tool_offset
     axes = [_in_base(mechanism, groups, axis) for axis in _AXES]
     ways = [axes, *([*axes[:i], cross(axes[i - 2], axes[i - 1]), *axes[i + 1 :]] for i in range(3))]
-    x, y, z = min(ways, key=lambda way: _cost(trace, [*way[0], *way[1], *way[2], *point]))
+    costs = [count_operations(trace, [*way[0], *way[1], *way[2], *point]).arithmetic for way in ways]
+    x, y, z = ways[costs.index(min(costs))]
     return [[x[i], y[i], z[i], point[i]] for i in range(3)] + [[0.0, 0.0, 0.0, 1.0]]
-
-
-def _cost(trace: Trace, outputs: Sequence[Number]) -> int:
-    operations = count_operations(trace, outputs)
-    return operations.multiplications + operations.additions
 
 
 def _in_base(mechanism: Mechanism, groups: Sequence[_Group], v: Vector) -> Vector:

@@ -13,10 +13,10 @@ from dh2sim.codegen.check import force_error, jacobian_error, pose_error
 from dh2sim.codegen.forward import joint_turns, tool_jacobian, tool_pose
 from dh2sim.codegen.languages import Language, program_text
 from dh2sim.codegen.lengths import length_constants
-from dh2sim.codegen.mechanism import Mechanism, build_mechanism
+from dh2sim.codegen.mechanism import Mechanism, build_mechanism, origin_moved
 from dh2sim.codegen.newton_euler import inverse_dynamics
 from dh2sim.codegen.program import Function, Listing, Program, What
-from dh2sim.codegen.trace import Number, Operations, Trace
+from dh2sim.codegen.trace import Number, Operations, Trace, count_operations
 from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.chain import spec_of
 from dh2sim.messages import member
@@ -128,20 +128,23 @@ def _function(
 
 
 def _forces(model: RobotModel, mechanism: Mechanism, trace: Trace) -> list[Number]:
+    """Return the forces on the joints, with frames on the joints' axes where that takes the fewest operations."""
+    forces = _forces_of(model, mechanism, trace)
+    for i in range(len(mechanism.joints) - 1):
+        other = origin_moved(mechanism, i, trace)
+        if other is not None:
+            found = _forces_of(model, other, trace)
+            if count_operations(trace, found).arithmetic < count_operations(trace, forces).arithmetic:
+                mechanism, forces = other, found
+    return forces
+
+
+def _forces_of(model: RobotModel, mechanism: Mechanism, trace: Trace) -> list[Number]:
     n = len(mechanism.joints)
     q, qd, qdd = (trace.variables(argument, n) for argument in ("q", "qd", "qdd"))
-    x, y, z = (
-        trace.constant(f"g{axis}", float(g), "m/s^2") for axis, g in zip("xyz", model.spec.gravity, strict=True)
-    )
-    forces = inverse_dynamics(
-        mechanism,
-        base_parameters(model, mechanism, trace),
-        joint_turns(mechanism, q, trace),
-        q,
-        qd,
-        qdd,
-        (x, y, z),
-    )
+    x, y, z = (trace.constant(f"g{'xyz'[i]}", float(model.spec.gravity[i]), "m/s^2") for i in range(3))
+    links = base_parameters(model, mechanism, trace)
+    forces = inverse_dynamics(mechanism, links, joint_turns(mechanism, q, trace), q, qd, qdd, (x, y, z))
     armatures = [
         trace.constant(f"armature{joint.row}", model.joints[joint.row - 1].dynamics.armature, "kg m^2 or kg")
         for joint in mechanism.joints

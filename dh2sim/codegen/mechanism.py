@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple, TypeAlias, cast
 
 from dh2sim.codegen.trace import Number, Trace
@@ -163,6 +163,25 @@ def build_mechanism(spec: RobotSpec, trace: Trace, length: Lengths) -> Mechanism
         tool_twist=last.twist,
         tool_angle=constants.turn(last.theta, "tool"),
     )
+
+
+def origin_moved(mechanism: Mechanism, i: int, trace: Trace) -> Mechanism | None:
+    """Return the same mechanism with the frame of joint i elsewhere on its axis: where the next offset begins.
+
+    A length along the axis of joint i may be in front of the joint or behind it. None where there is none, or where
+    it would make two lengths of it.
+    """
+    joint, following = mechanism.joints[i : i + 2]
+    x, y, along = following.offset
+    if trace.value(along) == 0.0 or (joint.twist.cosine != 0.0 and joint.twist.sine != 0.0):
+        return None
+    moved = replace(
+        joint,
+        offset=added(joint.offset, about_x(joint.twist, (0.0, 0.0, along))),
+        chain_offset=joint.chain_offset - trace.value(along),
+    )
+    rest = (moved, replace(following, offset=(x, y, 0.0)))
+    return replace(mechanism, joints=(*mechanism.joints[:i], *rest, *mechanism.joints[i + 2 :]))
 
 
 class _Step(NamedTuple):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final, TypeAlias, Union
+from typing import Final, NamedTuple, TypeAlias, Union
 
 Number: TypeAlias = Union[float, "Token"]
 """A number that is known, or a token."""
@@ -25,8 +25,7 @@ CONSTANT: Final = "constant"
 LITERAL: Final = "literal"
 
 
-@dataclass(frozen=True, slots=True)
-class Node:
+class Node(NamedTuple):
     """An operation of a trace, or one of its leaves."""
 
     kind: str
@@ -75,8 +74,11 @@ class Trace:
 
     def record(self, kind: str, *operands: int) -> int:
         """Return the index of an operation on nodes, a new one or the one recorded before."""
-        constant = all(self.nodes[i].is_constant for i in operands)
-        return self._index((kind, operands), Node(kind, operands, is_constant=constant))
+        index = self._known.get((kind, operands))
+        if index is None:
+            constant = all(self.nodes[i].is_constant for i in operands)
+            index = self._index((kind, operands), Node(kind, operands, is_constant=constant))
+        return index
 
     def value(self, number: Number) -> float:
         """Return the value of a number that no variable enters."""
@@ -148,8 +150,9 @@ class Token:
                 return 0.0
             if abs(other) == 1:
                 return self if other > 0 else -self
-        index, sign = self.trace.split(other)
-        product = self.trace.record(PRODUCT, *sorted((self.index, index)))
+        left = self.index
+        right, sign = (other.index, other.sign) if isinstance(other, Token) else self.trace.split(other)
+        product = self.trace.record(PRODUCT, left, right) if left < right else self.trace.record(PRODUCT, right, left)
         return Token(self.trace, product, self.sign * sign)
 
     __rmul__ = __mul__
@@ -186,6 +189,11 @@ class Operations:
     """And subtractions."""
     functions: int
     """Sines and cosines."""
+
+    @property
+    def arithmetic(self) -> int:
+        """Multiplications and additions together."""
+        return self.multiplications + self.additions
 
     def __str__(self) -> str:
         """Return it in words."""
