@@ -24,7 +24,9 @@ from dh2sim.typing import Array
 CONVERGED = 1e-12
 """Error, in lengths of the arm and rad, up to which a configuration of six joints reaches a pose."""
 REACHED = 1e-10
-"""Error up to which one of fewer does, whose pose may have been rounded."""
+"""Error up to which one of fewer joints does, whose pose may have been rounded, and a singular one."""
+_BLUNT = 1e-8
+"""Least singular value below which a solution cannot be determined better."""
 SAME = 1e-6
 """Configurations that differ by less, in rad and lengths of the arm, are the same..."""
 SAME_IF_SINGULAR = 1e-4
@@ -170,10 +172,13 @@ class Method:
         """Return the distinct solutions that configurations lead to, if their errors are below the gate."""
         q, error = polish(self.arm, q, T[pose], self.moving, gate=gate)
         extent = 1.0 + np.abs(q[:, np.logical_not(self.arm.turns)]).max(axis=1, initial=0.0)  # rounding grows with it
-        reached = error < extent * (REACHED if self.virtual else CONVERGED)
-        pose, q = pose[reached], q[reached]
+        reached = error < extent * REACHED
+        pose, q, error, extent = pose[reached], q[reached], error[reached], extent[reached]
         J = pose_and_jacobian(self.arm, q)[1][:, :, self.moving]
         sigma = np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1], dtype=np.float64)
+        if not self.virtual:
+            sharp = (error < extent * CONVERGED) | (sigma < _BLUNT)
+            pose, q, sigma = pose[sharp], q[sharp], sigma[sharp]
         return self.distinct(Found(pose=pose, q=q, sigma=sigma))
 
     def distinct(self, found: Found) -> Found:

@@ -15,12 +15,14 @@ from numpy.typing import ArrayLike
 from dh2sim.errors import ConfigurationError
 from dh2sim.inverse.branches import branch_names
 from dh2sim.inverse.elimination import Found, Method, choose_method
+from dh2sim.inverse.families import family_kind, moving_joints, split_families
 from dh2sim.inverse.goals import Free, read_goals, require_free
 from dh2sim.inverse.loop import Arm, Flags, Indices, build_arm, joint_rank
 from dh2sim.inverse.nearest import goal_residuals, goal_sigma_min, miss_text, no_solutions, numeric_solutions
 from dh2sim.inverse.numeric import NumericSolver, arm_size
 from dh2sim.inverse.reach import limits_reason, position_limits, why_unreachable
 from dh2sim.inverse.redundancy import SAMPLES, curves_and_nearest, joints_to_lock, self_motions
+from dh2sim.inverse.self_motion import Path
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.turns import Turns
 from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, spec_of
@@ -103,8 +105,8 @@ class InverseSolver:
                 track a moving pose, and as good for one out of reach, to which ``nearest`` is the way.
 
         Returns:
-            The :class:`Solutions` of one pose, or a list of those of N poses. Branches are named, and how far a pose
-            is out of reach is found out, for one pose alone.
+            The :class:`Solutions` of one pose, or a list of those of N poses. For one pose alone branches are named,
+            families of solutions at a singularity are followed, and how far a pose is out of reach is found out.
 
         Raises:
             ConfigurationError: A pose is no rigid transform, ``q0`` has the wrong shape, or a joint to lock is
@@ -126,8 +128,14 @@ class InverseSolver:
             ]
         else:
             method = self._method(free, tuple(sorted(locked)))
-            found = method.solve(method.arm.scaled_poses(poses), _scaled_locks(method.arm, locked))
+            arm, scaled = method.arm, method.arm.scaled_poses(poses)
+            found = method.solve(scaled, _scaled_locks(arm, locked))
+            paths: list[Path] = []
+            if goals.ndim == 2:
+                found, paths = split_families(arm, scaled[0], method.moving, found)
             results = self._results(method, found, poses, near, free, limits=limits)
+            if paths:
+                results = [self._with_families(results[0], arm, paths, poses[0], near, free, limits=limits)]
         if goals.ndim == 3:
             return results
         [alone] = results
@@ -231,12 +239,20 @@ class InverseSolver:
         for joint, value in fixed.items():
             near_scaled[joint] = value[0]
         paths = self_motions(arm, arm.scaled_poses(T), moving, ranges, near_scaled, solve_locked)
+        none = replace(no_solutions(len(self.names)), complete=min(shares) == 1.0, found_share=min(shares))
+        note = f"Self-motions were looked for at {SAMPLES} values each of {listed(sampled, ' and ')}."
+        result = self._of_paths(none, arm, paths, T, q0, free, limits=limits)
+        return replace(result, notes=(note,)) if paths else result
+
+    def _of_paths(
+        self, none: Solutions, arm: Arm, paths: list[Path], T: Array, q0: Array, free: Free | None, *, limits: bool
+    ) -> Solutions:
+        """Return what limits leave of curves, and the configuration of each that is nearest to ``q0``."""
         curves, q, same = curves_and_nearest(arm, paths, *self._bounds(limits=limits), q0)
-        goals = np.broadcast_to(T, (len(q), 4, 4))
-        none = replace(no_solutions(len(self.names)), complete=min(shares) == 1.0)
         if paths and not curves:
             ends = np.concatenate([arm.unscaled(path.q)[:, : len(q0)] for path in paths])
             return replace(none, reason=limits_reason(self._spec, self._turns.placed(ends, q0)))
+        goals = np.broadcast_to(T, (len(q), 4, 4))
         return replace(
             none,
             q=read_only(q),
@@ -245,9 +261,44 @@ class InverseSolver:
             within_limits=self._turns.inside(q),
             same=np.array(same, dtype=np.intp),
             branch=("",) * len(q),
-            found_share=min(shares),
             curves=tuple(curves),
-            notes=(f"Self-motions were looked for at {SAMPLES} values each of {listed(sampled, ' and ')}.",),
+        )
+
+    def _with_families(
+        self,
+        isolated: Solutions,
+        arm: Arm,
+        paths: list[Path],
+        T: Array,
+        q0: Array,
+        free: Free | None,
+        *,
+        limits: bool,
+    ) -> Solutions:
+        """Add families at a singularity to the isolated solutions of a pose."""
+        families = self._of_paths(no_solutions(len(q0)), arm, paths, T, q0, free, limits=limits)
+        if not len(families):
+            return isolated if len(isolated) else replace(isolated, reason=isolated.reason or families.reason)
+        kinds = [family_kind(paths[number], len(q0)) for number in families.same]
+        notes = []
+        for path in paths:
+            *names, last = (self.names[joint] for joint in moving_joints(path, len(q0)))
+            joints = f"{', '.join(names)} and {last} move" if names else f"{last} moves"
+            notes.append(f"{family_kind(path, len(q0)).capitalize()}: {joints}, tool0 does not.")
+        order = np.argsort(self._turns.distance(np.concatenate([isolated.q, families.q]), q0), kind="stable")
+        same = np.concatenate([isolated.same, families.same + isolated.same.max(initial=-1) + 1])[order]
+        curves = tuple(replace(curve, kind=kind) for curve, kind in zip(families.curves, kinds, strict=True))
+        return replace(
+            isolated,
+            q=read_only(np.concatenate([isolated.q, families.q])[order]),
+            residual=read_only(np.concatenate([isolated.residual, families.residual])[order]),
+            sigma_min=read_only(np.concatenate([isolated.sigma_min, families.sigma_min])[order]),
+            within_limits=np.concatenate([isolated.within_limits, families.within_limits])[order],
+            same=same,
+            branch=("",) * len(order),
+            curves=curves,
+            notes=(*isolated.notes, *dict.fromkeys(notes)),
+            reason="",
         )
 
     def _results(

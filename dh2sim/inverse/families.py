@@ -1,0 +1,87 @@
+"""Solutions that are not isolated: at some singularities joints move against each other while the tool stands still.
+
+A regular solution is isolated. A singular one may be, too, as that of a stretched arm, where two solutions meet. Or
+it belongs to a family, as where two axes of a wrist are in line. A step along its null vector tells which: from there
+one comes back to the pose nearby, or only where the step began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from dh2sim.inverse.elimination import CONVERGED, Found
+from dh2sim.inverse.loop import Arm, Flags, pose_and_jacobian
+from dh2sim.inverse.polish import polish
+from dh2sim.inverse.self_motion import SELF_MOTION, Path, follow, lies_on
+from dh2sim.typing import Array
+
+SINGULAR: Final = 1e-7
+"""Least singular value, in the arm's units, below which a solution may belong to a family."""
+STEP: Final = 0.02
+"""Along a null vector, in rad and lengths of the arm."""
+MOVES: Final = 1e-6
+"""Joints that move by less along a family stand still."""
+MOST: Final = 16
+"""Families that are followed of one pose: where they have two parameters, there are endless ones."""
+
+
+def split_families(arm: Arm, T: Array, moving: Flags, found: Found) -> tuple[Found, list[Path]]:
+    """Separate the isolated solutions of a pose from the families, and follow these.
+
+    Args:
+        arm: The arm.
+        T: The pose, its position in units of the arm's length, shape (4, 4).
+        moving: Which joints are not locked, bool, shape (n,).
+        found: The solutions of the pose.
+
+    Returns:
+        The isolated ones, and the families' curves.
+    """
+    turns = np.array(arm.turns)
+    isolated = np.ones(len(found.q), dtype=np.bool_)
+    paths: list[Path] = []
+    flat = False
+    for i in np.argsort(found.sigma, kind="stable"):
+        if found.sigma[i] > SINGULAR:
+            break
+        values = np.linalg.svd(pose_and_jacobian(arm, found.q[i : i + 1])[1][0][:, moving], compute_uv=False)
+        several = int((values < SINGULAR).sum()) > 1
+        if (several and flat) or any(lies_on(path.q, found.q[i], turns, closed=path.closed) for path in paths):
+            isolated[i] = False
+        elif len(paths) < MOST and _goes_on(arm, found.q[i], T, moving):
+            isolated[i] = False
+            paths.append(follow(arm, found.q[i], T, moving))
+            flat |= several
+    return found.of(isolated), paths
+
+
+def _goes_on(arm: Arm, q: Array, T: Array, moving: Flags) -> bool:
+    """Return whether there are other configurations near a singular one that reach its pose."""
+    J = pose_and_jacobian(arm, q[None])[1][0][:, moving]
+    there = q.copy()
+    there[moving] += STEP * np.linalg.svd(J)[2][-1]
+    back, error = polish(arm, there[None], T[None], moving)
+    return float(error[0]) < CONVERGED and float(np.linalg.norm(back[0] - q)) > 0.5 * STEP
+
+
+def family_kind(path: Path, joints: int) -> str:
+    """Return what textbooks call the singularity at which a family of six joints is found.
+
+    Args:
+        path: The family.
+        joints: How many joints the robot has.
+    """
+    moves = moving_joints(path, joints)
+    if joints != 6 or not moves:
+        return SELF_MOTION
+    if 0 in moves:
+        return "shoulder singularity"
+    return "wrist singularity" if 5 in moves and 4 not in moves else SELF_MOTION
+
+
+def moving_joints(path: Path, joints: int) -> Sequence[int]:
+    """Return the indices of the robot's joints that move along a family."""
+    return [int(joint) for joint in np.flatnonzero(np.ptp(path.q[:, :joints], axis=0) > MOVES)]
