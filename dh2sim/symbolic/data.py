@@ -72,4 +72,5 @@ def form_data(form: Form) -> dict[str, Any]:
             for condition in form.conditions
         ],
         "notes": list(form.notes),
+        "error": form.error,
     }

@@ -113,8 +113,7 @@ def dynamics_form(
         notes=tuple(_notes(table, letters, n, not any(g))),
         joint_names=joint_names,
     )
-    _check(form, bodies, masses, gravity, letters)
-    return form
+    return replace(form, error=_error(form, bodies, masses, gravity, letters))
 
 
 # ---------------------------------------------------------------------------- what bodies are
@@ -446,14 +445,21 @@ def _notes(table: SymbolicTable, letters: Mapping[str, Letter], n: int, weightle
 # ---------------------------------------------------------------------------- check
 
 
-def _check(
+def _error(
     form: Form,
     bodies: Bodies | None,
     symbolic: Sequence[_SymbolicBody],
     gravity: Sequence[Polynomial],
     letters: Mapping[str, Letter],
-) -> None:
-    """Compare M, C and g with sums over bodies at random configurations, for random values of letters."""
+) -> float:
+    """Compare M, C and g with sums over bodies at random configurations, for random values of letters.
+
+    Returns:
+        The largest difference, as a share of the size of what they are made of.
+
+    Raises:
+        MismatchError: It is larger than 1e-13.
+    """
     table = form.table
     configurations = SampledConfigurations(table)
     count = len(configurations.q)
@@ -500,7 +506,7 @@ def _check(
     size = max(1.0, float(np.abs(slope).max()), float(np.abs(M).max()))
     expected = {"M": M, "C": C, "g": g[:, :, None]}
     scales = {"M": size, "C": size, "g": max(1.0, float(np.abs(g).max()))}
-    check_form(form, expected, configurations, extra, scales)
+    return check_form(form, expected, configurations, extra, scales)
 
 
 def _values(matrix: Matrix, value: Callable[[Polynomial], float]) -> Array:

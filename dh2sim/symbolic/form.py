@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -59,6 +60,8 @@ class Form:
     """Where the Jacobian is singular."""
     notes: tuple[str, ...] = ()
     """Sentences to print below."""
+    error: float = math.nan
+    """Largest difference from numbers at random configurations, as a share of their size."""
     joint_names: str = "theta"
     """What coordinates of turning rows are called: ``theta`` or ``q``."""
 

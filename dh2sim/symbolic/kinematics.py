@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -62,8 +63,8 @@ def pose_form(
     equations, named = with_names([pose], names=names)
     form = Form(what="pose", table=table, equations=equations, named=named, joint_names=joint_names)
     configurations = SampledConfigurations(table)
-    check_form(form, {pose.name: configurations.pose(source, target)}, configurations)
-    return form
+    expected = {pose.name: configurations.pose(source, target)}
+    return replace(form, error=check_form(form, expected, configurations))
 
 
 def matrices_form(
@@ -108,8 +109,7 @@ def matrices_form(
         add("T", "base_link", "tool0", "pose of tool0 in base_link")
     shown, named = with_names(equations, names=names)
     form = Form(what="matrices", table=table, equations=shown, named=named, joint_names=joint_names)
-    check_form(form, expected, configurations)
-    return form
+    return replace(form, error=check_form(form, expected, configurations))
 
 
 VELOCITIES: Final = ("vx", "vy", "vz", "wx", "wy", "wz")
@@ -196,8 +196,7 @@ def jacobian_form(
         notes=notes,
         joint_names=joint_names,
     )
-    check_form(form, expected, configurations, scales=scales)
-    return form
+    return replace(form, error=check_form(form, expected, configurations, scales=scales))
 
 
 def _signed(

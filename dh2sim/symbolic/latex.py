@@ -98,7 +98,10 @@ class LatexNotation:
 
 
 def latex_name(name: str) -> str:
-    """Return a letter with its number as an index: a2, alpha_2, base_x."""
+    """Return a letter with its number as an index: a2, alpha_2, base_x; lc2 and Ixx2 as dynamics has them."""
+    inertial = re.fullmatch(r"([lI])(c|xx|yy|zz)([0-9]+)", name)
+    if inertial is not None:
+        return f"{inertial[1]}_{{{inertial[2]}{inertial[3]}}}"
     found = re.fullmatch(r"([A-Za-z]+)_?([A-Za-z0-9_]*?)_*", name)
     if found is None:
         escaped = name.replace("_", r"\_")

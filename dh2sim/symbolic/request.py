@@ -7,8 +7,8 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any, TypedDict
 
 from dh2sim.errors import Dh2simError
+from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.messages import member
-from dh2sim.robot.spec import RobotSpec
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.form import Equation, Form
 from dh2sim.symbolic.kinematics import jacobian_form, matrices_form, pose_form
@@ -86,7 +86,7 @@ class SymbolicForm:
 
 
 def symbolic_form(
-    spec: RobotSpec,
+    robot: SpecLike,
     what: What | str = "pose",
     *,
     source: str = "base_link",
@@ -103,7 +103,7 @@ def symbolic_form(
     """Return the kinematics of a robot in symbols, compared with its table at random configurations.
 
     Args:
-        spec: The robot.
+        robot: The robot.
         what: 'pose': a frame in another one; 'matrices': the transform of every row and every DH frame in frame 0;
             'jacobian': the geometric Jacobian, and its determinant in factors; 'dynamics': mass matrix, Coriolis
             matrix and gravity vector of up to four joints.
@@ -133,7 +133,7 @@ def symbolic_form(
         numbers = not letters
         if numbers and bodies is None:
             raise Dh2simError("dynamics in numbers needs bodies; pass letters=True for letters")
-    table = symbolic_table(spec, letters=letters, numbers=numbers)
+    table = symbolic_table(spec_of(robot), letters=letters, numbers=numbers)
     style_ = member(Style, style, "style")
     lengths_ = None if lengths is None else member(Lengths, lengths, "lengths")
     fold_ = member(Fold, fold, "fold")

@@ -36,6 +36,7 @@ def test_expressions_of_the_data_evaluate_to_the_pose(name: str) -> None:
 def test_data_of_a_jacobian_says_where_it_is_singular() -> None:
     data = symbolic_form(spec_of("puma560"), "jacobian").data()
     assert data["what"] == "jacobian"
+    assert 0.0 < data["error"] <= 1e-13
     assert data["units"] == {"length": "m", "angle": "rad"}
     assert data["singular"][0] == {"zero": "s5", "name": "wrist", "angle": "theta_5", "degrees": [0.0, 180.0]}
     assert data["letters"]["a2"] == {"value": 0.4318, "kind": "length", "definition": ""}

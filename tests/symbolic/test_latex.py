@@ -88,6 +88,8 @@ def test_wide_matrices_are_broken_so_that_they_fit_the_page(style: str, tmp_path
         ("L2", "L_{2}"),
         ("alpha_2", r"\alpha_{2}"),
         ("bend2", r"\mathrm{bend}_{2}"),
+        ("lc2", "l_{c2}"),
+        ("Ixx12", "I_{xx12}"),
         ("base_x", r"\mathrm{base}_{\mathrm{x}}"),
         ("long_name_2", r"\mathrm{long}_{\mathrm{name\_2}}"),
         ("_", r"\mathrm{\_}"),
