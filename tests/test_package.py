@@ -132,6 +132,12 @@ def test_an_export_imports_neither_mesh_library_nor_other_engines(tmp_path: Path
     assert not _imported(RUN.format(arguments=arguments)) & {*RUNS, *TABLES, *PICTURES}
 
 
+@pytest.mark.slow
+def test_code_is_written_without_an_engine_and_without_what_draws(tmp_path: Path) -> None:
+    arguments = ["symbolic", "ur5e", "--what", "inverse-dynamics", "--as", "c", "-o", str(tmp_path / "ur5e.c")]
+    assert not _imported(RUN.format(arguments=arguments)) & {*RUNS, *TABLES, *PICTURES, *MODELS, "mujoco", "rich"}
+
+
 def test_a_rollout_imports_neither_tables_nor_pictures(tmp_path: Path) -> None:
     arguments = ["rollout", "rpr", "--out", str(tmp_path / "run.zarr"), "--rollouts", "2", "--steps", "5"]
     found = _imported(RUN.format(arguments=arguments))

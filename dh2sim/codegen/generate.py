@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -176,7 +177,7 @@ def _header(spec: RobotSpec, model: RobotModel | None) -> list[str]:
 def _wrapped(lines: Iterable[str]) -> list[str]:
     """Return lines that fit a page, in ASCII and without control characters."""
     wrapper = textwrap.TextWrapper(_WIDTH, break_on_hyphens=False, break_long_words=False)
-    return [part for line in lines for part in wrapper.wrap(line.encode("ascii", "replace").decode())]
+    return [part for line in lines for part in wrapper.wrap(re.sub(r"[^ -~]", "?", line))]
 
 
 def _measured(program: Program, spec: RobotSpec, model: RobotModel | None) -> list[str]:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -94,6 +95,20 @@ def test_the_header_says_what_the_code_is() -> None:
     assert "Inverse dynamics: links, tool, gravity and armature; no friction, damping or payload." in header
     assert "made by dh2sim from a robot made in code" in Robot([Revolute()]).code()
     assert "Inverse dynamics" not in generate_code(spec, "pose", "python")
+
+
+@pytest.mark.parametrize("language", ["python", "numpy", "c", "cpp", "matlab", "javascript"])
+def test_a_comment_holds_whatever_a_file_is_called(language: str) -> None:
+    text = "name: odd\nconvention: standard\njoints: [{type: revolute, a: 0.3}]"
+    file = '*/ int x; /* \n"""\n%}\x1b[31m é \\'
+    code = generate_code(parse_robot(text, file=file), "pose", language)
+    plain = generate_code(parse_robot(text, file="odd.yaml"), "pose", language)
+    assert code.isascii()
+    assert "\x1b" not in code
+    assert len(code.splitlines()) == len(plain.splitlines())
+    assert code.splitlines()[4:] == plain.splitlines()[4:]
+    if language in ("c", "cpp"):
+        assert re.findall(r"/\*|\*/", code) == re.findall(r"/\*|\*/", plain)
 
 
 @pytest.mark.parametrize("language", ["python", "numpy", "c", "cpp", "matlab", "javascript"])
