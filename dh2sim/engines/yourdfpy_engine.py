@@ -46,12 +46,11 @@ class YourdfpyEngine:
     def frame_poses(self, q: Array) -> Array:
         """Return the poses of ``frames`` in base_link; see ``PoseEngine``."""
         poses = np.empty((len(q), len(self.frames), 4, 4))
-        previous = np.full(q.shape[1], np.inf)
         for k, row in enumerate(q):
-            if (np.abs(row - previous) < NOTICED).any():
-                self._urdf.update_cfg(np.array(row[self._order] + 1.0, dtype=np.float64))
-            self._urdf.update_cfg(np.array(row[self._order], dtype=np.float64))
-            previous = row
+            new = np.array(row[self._order], dtype=np.float64)
+            if (np.abs(new - self._urdf.cfg) < NOTICED).any():
+                self._urdf.update_cfg(new + 1.0)
+            self._urdf.update_cfg(new)
             T, before = np.eye(4), "base_link"
             for i, frame in enumerate(self.frames):
                 # from frame to frame: the time for a path through its scene graph grows with the cube of its length

@@ -28,7 +28,7 @@ from dh2sim.kinematics.frame_assignment.result import Step, Tolerances
 from dh2sim.kinematics.frame_assignment.rounding import simple_angles, simple_length, simple_turn, simple_vector
 from dh2sim.kinematics.transforms import invert, pose_from_rpy, rotate_tensor, rpy_from_rotation
 from dh2sim.messages import Notes, listed, shown
-from dh2sim.model.mass import is_possible, made_possible
+from dh2sim.model.mass import is_possible, made_possible, substantial
 from dh2sim.robot.fields import LONGEST_NAME, is_reserved, name_problem
 from dh2sim.robot.magnitudes import (
     ANGLE,
@@ -275,7 +275,7 @@ def _rounded(tensor: Array, tolerances: Tolerances) -> Array:
         rounded = read_only([[_fewest_digits(value, allowed) for value in row] for row in tensor.tolist()])
         if is_possible(rounded):  # that of a flat body may not be once it is rounded
             return rounded
-    return tensor if is_possible(tensor) else made_possible(tensor)  # turning it has passed the limit
+    return tensor if is_possible(tensor) else made_possible(substantial(tensor))  # turning it has passed the limit
 
 
 def _fewest_digits(value: float, allowed: float) -> float:

@@ -124,7 +124,7 @@ def shift_inertia(inertia: Array, mass: float, offset: list[float]) -> Array:
 
 
 def is_possible(inertia: Array) -> bool:
-    """Whether a body can have an inertia, shape (3, 3): positive definite, no two moments less than the third.
+    """Whether a body can have an inertia, shape (3, 3): not too small for simulators, no two moments less than the third.
 
     As a robot file allows it: two moments may fall short of the third by 1e-9 of it.
     """
@@ -166,10 +166,13 @@ def thickened(inertia: Array) -> Array | None:
         return None
     trace = float(inertia[0, 0]) + float(inertia[1, 1]) + float(inertia[2, 2])
     least = float(np.linalg.eigvalsh(inertia / scale)[0]) * scale
-    if abs(least) <= THIN * trace:
+    if least < -THIN * trace:
+        return None
+    if least <= THIN * trace:
         extra = THICKNESS * trace
         inertia = read_only([[float(inertia[i, j]) + (extra if i == j else 0.0) for j in range(3)] for i in range(3)])
-    return substantial(inertia) if is_possible(inertia) else None
+    inertia = substantial(inertia)
+    return inertia if is_possible(inertia) else None
 
 
 def substantial(inertia: Array) -> Array:

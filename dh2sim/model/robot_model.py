@@ -233,7 +233,8 @@ class RobotModel:
     @property
     def longest_lever(self) -> float:
         """The extent, or how far a centre of mass is from its joint, whichever is greater, m."""
-        return max(self.extent, *(math.hypot(*body.com.tolist()) for body in self.bodies if body is not None), 0.0)
+        bodies = [link.inertial for link in self.moving_links]
+        return max(self.extent, *(math.hypot(*body.com.tolist()) for body in bodies if body is not None), 0.0)
 
     @property
     def estimates(self) -> tuple[FilledIn, ...]:

@@ -146,7 +146,7 @@ class Inertia(Kind):
         matrix = self._named(value, loc, scope) if scope.in_file else self._matrix(value, loc, scope)
         if matrix is WRONG:
             return WRONG
-        problem = inertia_problem(np.array(matrix)) or _small(np.array(matrix))
+        problem = inertia_problem(np.array(matrix))
         return matrix if problem is None else scope.wrong(loc, problem)
 
     def _named(self, value: object, loc: Loc, scope: Scope) -> Any:
@@ -180,7 +180,7 @@ class Inertia(Kind):
 
 
 def inertia_problem(matrix: Array) -> str | None:
-    """Return why no body has an inertia of shape (3, 3), or None."""
+    """Return why no body has an inertia of shape (3, 3), or one too small for simulators; or None."""
     scale = float(np.abs(matrix).max())
     if math.isnan(scale):
         return None
@@ -190,18 +190,9 @@ def inertia_problem(matrix: Array) -> str | None:
         return f"not positive definite: the principal moments are {moments}"
     if a + b < c * (1 - _TRIANGLE_TOLERANCE):
         return f"no body has the principal moments {moments}: two make less than the third"
+    if a * scale < INERTIA.least * (1 - _TRIANGLE_TOLERANCE):
+        return f"the principal moments must be at least {shown_size(INERTIA.least)} kg·m², found {moments}"
     return None
-
-
-def _small(matrix: Array) -> str | None:
-    """Return that a principal moment of a possible inertia is too small for simulators, or None."""
-    scale = float(np.abs(matrix).max())
-    if math.isnan(scale):
-        return None
-    least = float(np.linalg.eigvalsh(matrix / scale)[0]) * scale
-    if least >= INERTIA.least * (1 - _TRIANGLE_TOLERANCE):
-        return None
-    return f"the principal moments must be at least {shown_size(INERTIA.least)} kg·m², found {least:.6g}"
 
 
 def _article(part: type) -> str:
