@@ -124,9 +124,9 @@ def shift_inertia(inertia: Array, mass: float, offset: list[float]) -> Array:
 
 
 def is_possible(inertia: Array) -> bool:
-    """Whether a body can have an inertia, shape (3, 3): not too small for simulators, no two moments less than the third.
+    """Whether a body can have an inertia, shape (3, 3), that simulators read.
 
-    As a robot file allows it: two moments may fall short of the third by 1e-9 of it.
+    As a robot file allows it: all moments are large enough; two may fall short of the third by 1e-9 of it.
     """
     return inertia_problem(inertia) is None
 

@@ -64,6 +64,9 @@ class RandomFiles:
 
     def _extreme(self, of: Magnitude) -> float:
         least = of.least or self._chance.choice((0.0, 1e-9, 1e-17, 1e-60))
+        if of is magnitudes.LENGTH:  # several of them may add up to one that is too long to be imported again
+            most = of.most * self._chance.choice((1.0, 0.1, 0.02, 0.02))
+            return self._chance.choice((of.least, most, self._usual(of), self._usual(of), self._wide(of)))
         ends = (least, of.most, math.nextafter(of.most, 0.0), self._usual(of), self._usual(of), self._wide(of))
         return self._chance.choice(ends)
 

@@ -270,7 +270,8 @@ def test_inertias_of_any_size_are_checked_without_overflow() -> None:
     tiny = huge.replace("e50", "e-13").replace("e49", "e-14")
     assert complaints(with_joint(tiny)) == []
     assert complaints(with_joint(tiny.replace("1e-13", "1e-20").replace("1e-14", "0"))) == [
-        "r.yaml:4:33: joints[0].link.inertia: the principal moments must be at least 2e-14 kg·m², found 1e-20, 1e-20, 1e-20"
+        "r.yaml:4:33: joints[0].link.inertia: the principal moments must be at least 2e-14 kg·m², "
+        "found 1e-20, 1e-20, 1e-20"
     ]
 
 
