@@ -8,7 +8,10 @@ import pytest
 from dh2sim.errors import ConfigurationError
 from dh2sim.inverse.branches import branch_names
 from dh2sim.inverse.textbook import explain
+from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.spec import BaseSpec, Convention, Pose
+from dh2sim.typing import read_only
 from tests.inverse.disguised_arms import CLASSES, disguised, random_configuration, textbook_table
 from tests.sample_robots import ODD_ROBOT, robot
 
@@ -70,3 +73,30 @@ def test_a_calibrated_arm_has_the_names_of_its_class() -> None:
 def test_a_joint_vector_of_the_wrong_length_is_refused() -> None:
     with pytest.raises(ConfigurationError, match="expected 6 joint coordinates"):
         branch_names(robot("puma560"), [[0.0, 0.0]])
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_names_are_the_same_in_both_conventions_for_any_size_and_from_any_base(name: str) -> None:
+    spec = textbook_table(name, 3)
+    q = np.array([random_configuration(spec, seed) for seed in range(5)])
+    names = branch_names(spec, q)
+    assert any(names)
+    assert branch_names(convert_rows(spec, Convention.MODIFIED).spec, q) == names
+    moved = replace(spec, base=BaseSpec(pose=Pose(xyz=read_only([0.3, -2.0, 0.7]), rpy=read_only([0.4, -1.0, 2.0]))))
+    assert branch_names(moved, q) == names
+    scale = np.array([1.0 if row.type.turns else 1e-3 for row in spec.rows])
+    small = replace(spec, rows=tuple(replace(row, a=1e-3 * row.a, d=1e-3 * row.d) for row in spec.rows))
+    assert branch_names(small, q * scale) == names
+
+
+@pytest.mark.parametrize("name", ["puma", "stanford", "cylindrical", "scara", "planar 3R", "offset wrist"])
+def test_another_zero_changes_no_name(name: str) -> None:
+    spec = textbook_table(name, 2)
+    rng = np.random.default_rng(6)
+    shift = rng.uniform(-0.3, 0.3, len(spec.rows))
+    rows = tuple(
+        replace(row, theta=row.theta + by) if row.type.turns else replace(row, d=row.d + by)
+        for row, by in zip(spec.rows, shift.tolist(), strict=True)
+    )
+    q = np.array([random_configuration(spec, seed) for seed in range(10)])
+    assert branch_names(replace(spec, rows=rows), q - shift) == branch_names(spec, q)
