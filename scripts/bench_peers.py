@@ -15,6 +15,7 @@ import time
 import venv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
@@ -154,18 +155,19 @@ def _answers(peer: str, problem: str) -> dict[str, Any]:
     worker = Path(__file__).with_name("bench_peer_worker.py")
     environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")}
     started = time.perf_counter()
-    try:
-        process = subprocess.run(
-            [_python(peer), str(worker), peer],
-            input=problem,
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-            check=False,
-            env=environment,
-        )
-    except subprocess.TimeoutExpired:
-        return {"error": f"no answer in {PATIENCE} s"}
+    with TemporaryDirectory() as cache:  # what was derived in another run is derived again
+        try:
+            process = subprocess.run(
+                [_python(peer), str(worker), peer],
+                input=problem,
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE,
+                check=False,
+                env=environment | {"XDG_CACHE_HOME": cache},
+            )
+        except subprocess.TimeoutExpired:
+            return {"error": f"no answer in {PATIENCE} s"}
     if process.returncode or not process.stdout:
         print(process.stderr[-2000:], file=sys.stderr)
         return {"error": f"ended with exit status {process.returncode} after {time.perf_counter() - started:.0f} s"}
