@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from dh2sim.codegen.mechanism import (
+    AXES,
     HALF_TURN,
     NO_TURN,
+    Frame,
     Mechanism,
     MovingJoint,
     Turn,
@@ -21,12 +23,13 @@ from dh2sim.codegen.mechanism import (
     about_x,
     about_z,
     added,
+    turned_about_x,
+    turned_about_z,
 )
 from dh2sim.codegen.trace import Number, Token, Trace, cosine, count_operations, sine
 from dh2sim.kinematics.trig import sin_cos
 
 _HALF_PI: Final = math.pi / 2
-_AXES: Final[tuple[Vector, Vector, Vector]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def cross(a: Sequence[Number], b: Sequence[Number]) -> Vector:
@@ -153,7 +156,7 @@ def tool_pose(mechanism: Mechanism, q: Sequence[Token], trace: Trace) -> list[li
         point = _to_the_group_before(mechanism, group, _levers(group, point)[0])
     if not groups:
         point = mechanism.tool_offset
-    axes = [_in_base(mechanism, groups, axis) for axis in _AXES]
+    axes = [_in_base(mechanism, groups, axis) for axis in AXES]
     ways = [axes, *([*axes[:i], cross(axes[i - 2], axes[i - 1]), *axes[i + 1 :]] for i in range(3))]
     costs = [count_operations(trace, [*way[0], *way[1], *way[2], *point]).arithmetic for way in ways]
     x, y, z = ways[costs.index(min(costs))]
@@ -187,9 +190,9 @@ def tool_jacobian(mechanism: Mechanism, q: Sequence[Token], trace: Trace) -> lis
         tips.insert(0, point)
         point = _to_the_group_before(mechanism, group, _levers(group, point)[0])
     columns: list[list[Number]] = []
-    frame: tuple[Vector, Vector, Vector] = _turned_about_z(_AXES, mechanism.base)
+    frame: Frame = turned_about_z(AXES, mechanism.base)
     for group, tip in zip(groups, tips, strict=True):
-        frame = _turned_about_x(frame, group[0].joint.twist)
+        frame = turned_about_x(frame, group[0].joint.twist)
         X, Y, Z = frame
         for member, (x, y, _) in zip(group, _levers(group, tip), strict=True):
             sense = member.axis * member.joint.sign
@@ -199,30 +202,7 @@ def tool_jacobian(mechanism: Mechanism, q: Sequence[Token], trace: Trace) -> lis
             else:
                 columns.append([*axis, 0.0, 0.0, 0.0])
         last = group[-1]
-        frame = _turned_about_z(frame, last.turn)
+        frame = turned_about_z(frame, last.turn)
         if last.axis < 0:
-            frame = _turned_about_x(frame, HALF_TURN)
+            frame = turned_about_x(frame, HALF_TURN)
     return [[column[i] for column in columns] for i in range(6)]
-
-
-_Frame = tuple[Vector, Vector, Vector]
-
-
-def _turned_about_z(frame: _Frame, turn: Turn) -> _Frame:
-    """Return a frame, three axes, turned about its own z."""
-    X, Y, Z = frame
-    x, y = _turned_pair(X, Y, turn)
-    return x, y, Z
-
-
-def _turned_about_x(frame: _Frame, turn: Turn) -> _Frame:
-    X, Y, Z = frame
-    y, z = _turned_pair(Y, Z, turn)
-    return X, y, z
-
-
-def _turned_pair(a: Vector, b: Vector, turn: Turn) -> tuple[Vector, Vector]:
-    c, s = turn
-    first = (c * a[0] + s * b[0], c * a[1] + s * b[1], c * a[2] + s * b[2])
-    second = (c * b[0] - s * a[0], c * b[1] - s * a[1], c * b[2] - s * a[2])
-    return first, second

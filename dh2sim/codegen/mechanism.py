@@ -45,16 +45,47 @@ def about_x(turn: Turn, v: Sequence[Number]) -> Vector:
     return x, c * y - s * z, s * y + c * z
 
 
-def about_y(turn: Turn, v: Sequence[Number]) -> Vector:
-    """Rotate a vector: Ry v."""
-    (c, s), (x, y, z) = turn, v
-    return c * x + s * z, y, c * z - s * x
-
-
 def about_z(turn: Turn, v: Sequence[Number]) -> Vector:
     """Rotate a vector: Rz v."""
     (c, s), (x, y, z) = turn, v
     return c * x - s * y, s * x + c * y, z
+
+
+Frame: TypeAlias = tuple[Vector, Vector, Vector]
+"""Axes x, y and z: the columns of a rotation matrix."""
+AXES: Final[Frame] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def turned_about_x(frame: Frame, turn: Turn) -> Frame:
+    """Return a frame turned about its own x."""
+    X, Y, Z = frame
+    return X, *_turned_pair(Y, Z, turn)
+
+
+def turned_about_y(frame: Frame, turn: Turn) -> Frame:
+    """Return a frame turned about its own y."""
+    X, Y, Z = frame
+    z, x = _turned_pair(Z, X, turn)
+    return x, Y, z
+
+
+def turned_about_z(frame: Frame, turn: Turn) -> Frame:
+    """Return a frame turned about its own z."""
+    X, Y, Z = frame
+    return *_turned_pair(X, Y, turn), Z
+
+
+def _turned_pair(a: Vector, b: Vector, turn: Turn) -> tuple[Vector, Vector]:
+    c, s = turn
+    first = (c * a[0] + s * b[0], c * a[1] + s * b[1], c * a[2] + s * b[2])
+    second = (c * b[0] - s * a[0], c * b[1] - s * a[1], c * b[2] - s * a[2])
+    return first, second
+
+
+def in_frame_before(frame: Frame, v: Sequence[Number]) -> Vector:
+    """Return a vector along a frame's axes along those that the axes are given in."""
+    x, y, z = ((a * v[0] + b * v[1] + c * v[2]) for a, b, c in zip(*frame, strict=True))
+    return x, y, z
 
 
 def added(v: Sequence[Number], w: Sequence[Number]) -> Vector:
@@ -215,12 +246,15 @@ class _Constants:
     def __init__(self, trace: Trace) -> None:
         self._trace = trace
         self._known: dict[float, Number] = {}
+        self._turns: dict[float, Turn] = {}
 
     def turn(self, angle: float, name: str) -> Turn:
         """Return a constant rotation by an angle, rad."""
-        s, c = sin_cos(angle)
-        note = f"of {angle!r} rad"
-        return Turn(self._shared(c, f"cos_{name}", note), self._shared(s, f"sin_{name}", note))
+        if angle not in self._turns:
+            s, c = sin_cos(angle)
+            note = f"of {angle!r} rad"
+            self._turns[angle] = Turn(self._shared(c, f"cos_{name}", note), self._shared(s, f"sin_{name}", note))
+        return self._turns[angle]
 
     def _shared(self, value: float, name: str, note: str) -> Number:
         size = abs(value)
@@ -260,7 +294,7 @@ def _row_steps(number: int, row: Row, length: Lengths) -> tuple[list[_Step], lis
             return [turn], [slide, *link, _Step("y", row.beta, f"beta{number}")]
 
 
-_ROTATE: Final = {"x": about_x, "y": about_y, "z": about_z}
+_TURNED: Final = {"x": turned_about_x, "y": turned_about_y, "z": turned_about_z}
 
 
 def _reduced(
@@ -278,25 +312,21 @@ def _reduced(
     offset: Vector = ORIGIN
     lift: Number = 0.0
     rotations: list[_Step] = []
-
-    def turned(v: Vector) -> Vector:
-        for step in reversed(rotations):
-            v = _ROTATE[step.axis](constants.turn(step.angle, step.name), v)
-        return v
-
+    frame = AXES
     for step in steps:
         if step.axis == "t":
             x, y, z = step.offset
-            offset, lift = added(offset, turned((x, y, 0.0))), lift + z
+            offset, lift = added(offset, in_frame_before(frame, (x, y, 0.0))), lift + z
         elif not _is_nothing(step.angle):
             if step.axis != "z":
-                offset, lift = added(offset, turned((0.0, 0.0, lift))), 0.0
+                offset, lift = added(offset, in_frame_before(frame, (0.0, 0.0, lift))), 0.0
+            frame = _TURNED[step.axis](frame, constants.turn(step.angle, step.name))
             if rotations and rotations[-1].axis == step.axis:
                 step = step._replace(angle=rotations.pop().angle + step.angle)
             if not _is_nothing(step.angle):
                 rotations.append(step)
     if last:
-        offset, lift = added(offset, turned((0.0, 0.0, lift))), 0.0
+        offset, lift = added(offset, in_frame_before(frame, (0.0, 0.0, lift))), 0.0
     gamma, alpha, theta = _zxz_angles(rotations)
     if not first:
         offset = about_z(constants.turn(-gamma, f"gamma{name}"), offset)
@@ -318,11 +348,11 @@ def _zxz_angles(rotations: Sequence[_Step]) -> tuple[float, float, float]:
         gamma = angles.pop(0) if axes.startswith("zx") else 0.0
         theta = angles.pop() if axes.endswith("z") else 0.0
         return gamma, sum(angles), theta
-    columns: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
-    for step in reversed(rotations):
+    frame = AXES
+    for step in rotations:
         s, c = sin_cos(step.angle)
-        columns = [_ROTATE[step.axis](Turn(c, s), column) for column in columns]
-    (r11, r21, _), (r12, r22, _), (r13, r23, r33) = cast("list[tuple[float, float, float]]", columns)
+        frame = _TURNED[step.axis](frame, Turn(c, s))
+    (r11, r21, _), (r12, r22, _), (r13, r23, r33) = cast("tuple[tuple[float, float, float], ...]", frame)
     if math.sqrt(r13 * r13 + r23 * r23) <= _NO_TILT:
         return 0.0, 0.0 if r33 > 0 else math.pi, atan2(-r12, r11)
     # near no tilt gamma is badly determined, and what remains makes up for its error

@@ -174,19 +174,23 @@ class _Names:
         self._prefix = prefix
         self._texts: dict[int, tuple[str, str, int]] = {}
         """Text, kind of operation (empty for a name) and number of operands."""
+        self._next: dict[str, int] = {}
+        """Number that the next name with a letter has at least."""
         self._angles = {node.operands[0] for node in trace.nodes if node.kind in (COSINE, SINE)}
 
     def copy(self) -> _Names:
         """Return names to which others can be added."""
         other = _Names(self._trace, set(self._taken), self._prefix)
-        other._texts = dict(self._texts)
+        other._texts, other._next = dict(self._texts), dict(self._next)
         return other
 
     def name(self, index: int, wanted: str) -> str:
         """Give a node a name: the one that is wanted, or one like it that is free."""
-        name = identifier(wanted)
+        name = start = identifier(wanted)
         while name in self._taken:
-            name += "_"
+            number = self._next.get(start, 1)
+            self._next[start] = number + 1
+            name = f"{start}_" if number == 1 else f"{start}_{number}"
         self._taken.add(name)
         self._texts[index] = name, "", 1
         return name
@@ -223,9 +227,10 @@ class _Names:
         if index in self._angles:
             return self.name(index, "q" + self._joints(index))
         letter = "k" if self._trace.nodes[index].is_constant else "x"
-        number = 1
+        number = self._next.get(letter, 1)
         while f"{letter}{number}" in self._taken:
             number += 1
+        self._next[letter] = number + 1
         return self.name(index, f"{letter}{number}")
 
     def _joints(self, index: int) -> str:

@@ -35,7 +35,7 @@ class Node(NamedTuple):
     name: str = ""
     """Of a constant; of a variable, the argument of the program that it is an entry of."""
     value: float = 0.0
-    """Of a constant or a literal; of a variable, its place in the argument, from 0."""
+    """Of what no variable enters; of a variable, its place in the argument, from 0."""
     note: str = ""
     """What a constant is."""
     is_constant: bool = False
@@ -76,8 +76,10 @@ class Trace:
         """Return the index of an operation on nodes, a new one or the one recorded before."""
         index = self._known.get((kind, operands))
         if index is None:
-            constant = all(self.nodes[i].is_constant for i in operands)
-            index = self._index((kind, operands), Node(kind, operands, is_constant=constant))
+            nodes = [self.nodes[i] for i in operands]
+            constant = all(node.is_constant for node in nodes)
+            value = _computed(kind, *(node.value for node in nodes)) if constant else 0.0
+            index = self._index((kind, operands), Node(kind, operands, value=value, is_constant=constant))
         return index
 
     def value(self, number: Number) -> float:
@@ -85,21 +87,25 @@ class Trace:
         if not isinstance(number, Token):
             return number
         node = self.nodes[number.index]
-        match node.kind:
-            case "+" | "-" | "*":
-                left, right = (self.value(Token(self, index)) for index in node.operands)
-                found = {SUM: left + right, DIFFERENCE: left - right, PRODUCT: left * right}[node.kind]
-            case "constant" | "literal":
-                found = node.value
-            case _:
-                raise ValueError(f"{node.kind} {node.name} has no value before the program runs")
-        return number.sign * found
+        if not node.is_constant:
+            raise ValueError("what depends on variables has no value before the program runs")
+        return number.sign * node.value
 
     def split(self, value: Number) -> tuple[int, int]:
         """Return the index of a number's node and its sign; a number without token becomes a literal."""
         if isinstance(value, Token):
             return value.index, value.sign
         return self._literal(abs(float(value))), -1 if value < 0 else 1
+
+
+def _computed(kind: str, left: float, right: float) -> float:
+    match kind:
+        case "+":
+            return left + right
+        case "-":
+            return left - right
+        case _:
+            return left * right
 
 
 class Token:

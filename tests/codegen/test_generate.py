@@ -204,3 +204,13 @@ def test_a_table_that_leads_far_from_the_arm_and_back_has_code() -> None:
     q = np.random.default_rng(15).uniform(-3, 3, (20, 4))
     functions = python_functions(arm.code("numpy", ALL))
     np.testing.assert_allclose(functions["fk"](q), table_tool_pose(arm.spec, q), rtol=0, atol=1e-12 * 600)
+
+
+def test_long_chains_and_many_fixed_rows_take_no_longer_than_they_must() -> None:
+    fixed = [Fixed(a=0.1, alpha=0.3, d=0.1, theta=0.2)] * 60
+    twisted = Robot([Revolute(), *fixed, Revolute(), *fixed])
+    snake = Robot([Revolute(a=0.05, d=0.01)] * 100)
+    for arm in (twisted, snake):
+        q = np.random.default_rng(16).uniform(-3, 3, (3, arm.n))
+        fk = python_functions(arm.code("numpy"))["fk"]
+        np.testing.assert_allclose(fk(q), table_tool_pose(arm.spec, q), rtol=0, atol=1e-12 * size(arm.spec, q))
