@@ -131,7 +131,7 @@ def symbolic(
 
 
 def _require_few_joints(spec: RobotSpec) -> None:
-    from dh2sim.symbolic.dynamics import MOST_JOINTS
+    from dh2sim.symbolic.motion_form import MOST_JOINTS
 
     if len(spec.moving_rows) > MOST_JOINTS:
         raise Dh2simError(

@@ -46,6 +46,11 @@ class Sum:
         """A value by which sums with the same terms in any order are equal."""
         return tuple(sorted(term.key for term in self.terms))
 
+    @cached_property
+    def opposite_key(self) -> tuple[Any, ...]:
+        """The key of the same sum with all signs changed."""
+        return tuple(sorted((factors, -number) for factors, number in self.key))
+
     def __neg__(self) -> Sum:
         return Sum(tuple(-term for term in self.terms))
 
@@ -63,7 +68,7 @@ class Term:
         number, factors = self.number, []
         for base, power in self.factors:
             if isinstance(base, Sum):
-                own, opposite = base.key, (-base).key
+                own, opposite = base.key, base.opposite_key
                 if opposite < own and power % 2:
                     number = -number
                 factors.append((1, min(own, opposite), power))
@@ -257,7 +262,7 @@ def name_sums(sums: Sequence[Sum], *, least: int = 2, prefix: str = "#") -> tupl
         for term in sum_.terms:
             for base, _ in term.factors:
                 if isinstance(base, Sum):
-                    key = min(base.key, (-base).key)
+                    key = min(base.key, base.opposite_key)
                     count[key] = count.get(key, 0) + 1
                     if count[key] == 1:
                         visit(base)
@@ -276,7 +281,7 @@ def name_sums(sums: Sequence[Sum], *, least: int = 2, prefix: str = "#") -> tupl
             if not isinstance(base, Sum):
                 factors.append(Factor(base, power))
                 continue
-            own, opposite = base.key, (-base).key
+            own, opposite = base.key, base.opposite_key
             key = min(own, opposite)
             if count[key] < least or _is_short(base):
                 factors.append(Factor(replaced(base), power))

@@ -28,6 +28,8 @@ MOST_DETERMINANT_TERMS: Final = 400
 """Of the entries of a block, multiplied out: what has more is not a factor anybody could read."""
 _ZERO: Final = 1e-12
 """Below this, as a share of the largest one, a number at random configurations is taken for a zero."""
+_LARGEST_BLOCK: Final = 4
+"""Rows of a block whose determinant somebody could read."""
 _TRIED: Final = 2
 """Frames and points in which a determinant is computed: the most promising ones."""
 
@@ -123,15 +125,17 @@ def _promising(table: SymbolicTable, configurations: SampledConfigurations) -> l
     """Return frames and points for which the Jacobian falls into the smallest blocks, going by numbers."""
     n = len(table.spec.rows)
 
-    def difficulty(choice: tuple[str, str]) -> tuple[int, int]:
+    def difficulty(choice: tuple[str, str]) -> tuple[int, int, int]:
         J = np.abs(configurations.jacobian(*choice)).max(axis=0)
         pattern = _ZERO * J.max() < J
-        blocks = _blocks(pattern)
-        return sum(len(rows) ** 4 for rows, _ in blocks) if blocks else 10**6, int(pattern.sum())
+        sizes = [len(rows) for rows, _ in _blocks(pattern) or []]
+        return max(sizes, default=0), sum(size**4 for size in sizes), int(pattern.sum())
 
     points = [f"dh_{m}" for m in range(n, max(n - 4, 0), -1)]
     choices = [(f"dh_{k}", point) for k in range(n + 1) for point in points]
-    return sorted(choices, key=difficulty)[:_TRIED]
+    hardness = {choice: difficulty(choice) for choice in choices}
+    best = sorted(choices, key=lambda choice: hardness[choice])[:_TRIED]
+    return [choice for choice in best if hardness[choice][0] <= _LARGEST_BLOCK]
 
 
 def _in_frame(table: SymbolicTable, frame: str, point: str, fold: Fold) -> Matrix:

@@ -139,7 +139,7 @@ def symbolic_form(
     fold_ = member(Fold, fold, "fold")
     match wanted:
         case What.DYNAMICS:
-            from dh2sim.symbolic.dynamics import dynamics_form
+            from dh2sim.symbolic.motion_form import dynamics_form
 
             form = dynamics_form(table, None if letters else bodies, names=names, joint_names=joint_names)
         case What.POSE:

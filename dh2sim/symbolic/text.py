@@ -133,6 +133,10 @@ def legend_lines(form: Form, notation: TextNotation, width: int = WIDTH) -> Iter
     items += [
         f"{notation.coordinate(row, turns=False)}: coordinate of {form.table.spec.rows[row - 1].name}" for row in rows
     ]
+    rates = sorted(row for atom in atoms if (row := rate_row(atom)) is not None)
+    if rates:
+        name = notation.coordinate(rates[0], turns=form.table.spec.rows[rates[0] - 1].type.turns)
+        items.append(f"d{name}: velocity of {name}")
     items += [text for letter in used_letters(form.table, atoms) if (text := letter_text(letter, form.table))]
     yield from _listed(items, width)
 
