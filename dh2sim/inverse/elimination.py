@@ -136,6 +136,15 @@ class Method:
         even = (counts % 2 == 0) | bool(self.virtual)  # only some solutions of a ring with virtual joints count
         return np.asarray((counts == 0) | ~even | singular)
 
+    def lacking(self, found: Found, poses: int) -> Flags:
+        """Whether solutions of a pose are missing for certain, bool (N,).
+
+        Solutions of a ring of six joints that are not real come in pairs, so there is an even number of real ones.
+        """
+        regular = np.bincount(found.pose[found.sigma > _DOUBTFUL], minlength=poses)
+        all_of_them = np.bincount(found.pose, minlength=poses)
+        return np.asarray((regular % 2 == 1) & (regular == all_of_them) & (not self.virtual))
+
     def _ill(self, again: Indices, found: Found, T: Array, locked: Mapping[int, Array]) -> Indices:
         """Return doubtful poses, without those that are well-conditioned and have no solution: out of reach."""
         none = again[np.bincount(found.pose, minlength=len(T))[again] == 0]

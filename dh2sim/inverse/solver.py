@@ -32,6 +32,7 @@ from dh2sim.typing import Array, read_only
 
 VERIFIED: Final = 1e-10
 """Residual up to which a configuration is a solution."""
+ODD: Final = "Solutions come in pairs, but an odd number was found: at least one is missing."
 _EQUAL: Final = 1e-6
 """Distance of configurations below which they are the same."""
 _GOAL_JOINTS: Final[Mapping[str | None, int]] = {None: 0, "roll": 1, "rotation": 3}
@@ -130,10 +131,13 @@ class InverseSolver:
             method = self._method(free, tuple(sorted(locked)))
             arm, scaled = method.arm, method.arm.scaled_poses(poses)
             found = method.solve(scaled, _scaled_locks(arm, locked))
+            lacking = method.lacking(found, len(poses))
             paths: list[Path] = []
             if goals.ndim == 2:
                 found, paths = split_families(arm, scaled[0], method.moving, found)
             results = self._results(method, found, poses, near, free, limits=limits)
+            for i in np.flatnonzero(lacking):
+                results[i] = replace(results[i], complete=False, notes=(*results[i].notes, ODD))
             if paths:
                 results = [self._with_families(results[0], arm, paths, poses[0], near, free, limits=limits)]
         if goals.ndim == 3:

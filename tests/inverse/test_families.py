@@ -1,0 +1,55 @@
+"""Singular poses: families of solutions are curves, isolated solutions stay points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dh2sim.inverse.solutions import Solutions
+from dh2sim.inverse.solver import InverseSolver
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from tests.sample_robots import robot
+
+
+def solved(name: str, q: list[float]) -> Solutions:
+    solutions = InverseSolver(robot(name)).solve(table_tool_pose(robot(name), np.array(q)), np.array(q), limits=False)
+    assert isinstance(solutions, Solutions)
+    return solutions
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "staubli_tx2_60"])
+def test_a_wrist_in_line_is_a_closed_curve_on_which_two_joints_turn(name: str) -> None:
+    q = [0.3, -0.6, 0.5, 0.9, 0.0, -0.4]
+    solutions = solved(name, q)
+    curve = solutions.curves[0]
+    assert curve.kind == "wrist singularity"
+    assert curve.closed
+    moves = np.ptp(curve.q, axis=0) > 1e-6
+    assert moves.tolist() == [False, False, False, True, False, True]
+    T = table_tool_pose(robot(name), np.array(q))
+    assert np.abs(table_tool_pose(robot(name), curve.q) - T).max() < 1e-12
+    assert np.abs(curve.q[:, 3] + curve.q[:, 5] - 0.5).min() < 0.05  # the given configuration is on it
+
+
+def test_a_wrist_in_line_leaves_the_other_solutions_isolated() -> None:
+    solutions = solved("puma560", [0.3, -0.6, 0.5, 0.9, 0.0, -0.4])
+    assert len(solutions.curves) == 1
+    assert (solutions.sigma_min > 1e-3).sum() == 6
+    assert len(solutions) == 7  # and the nearest of the curve
+
+
+def test_a_wrist_centre_on_the_first_axis_is_a_shoulder_singularity() -> None:
+    solutions = solved("cylindrical_wrist", [0.0, 0.0, 0.0, 0.4, 0.7, -0.2])  # the arm's slide is drawn in
+    assert {curve.kind for curve in solutions.curves} == {"shoulder singularity"}
+
+
+def test_a_stretched_elbow_is_one_isolated_solution() -> None:
+    solutions = solved("scara", [0.4, 0.0, 0.1, 0.3])
+    assert solutions.curves == ()
+    assert len(solutions) == 1
+    assert solutions.sigma_min[0] < 1e-6
+
+
+def test_a_note_says_which_joints_move() -> None:
+    solutions = solved("puma560", [0.3, -0.6, 0.5, 0.9, 0.0, -0.4])
+    assert solutions.notes == ("Wrist singularity: joint_4 and joint_6 move, tool0 does not.",)
