@@ -110,7 +110,8 @@ def ik(
         if explanation:
             print("\n".join([*explanation, ""]))
         print_solutions(asked.spec, asked.robot, solutions, frame=asked.frame, given=asked.given, behind=asked.behind)
-    return DONE if solutions.within_limits.any() or (no_limits and len(solutions)) else FELL_SHORT
+    reached = bool(solutions.within_limits.any() or solutions.curves or (no_limits and len(solutions)))
+    return DONE if reached else FELL_SHORT
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,11 +302,12 @@ def _solved(asked: _Asked, *, limits: bool, numeric: bool) -> Solutions:
 
     import numpy as np
 
+    from dh2sim.inverse.self_motion import SELF_MOTION
     from dh2sim.inverse.solver import InverseSolver
 
     solver = InverseSolver(asked.spec)
     solutions: Solutions = solver.solve(asked.T, asked.near, limits, asked.lock, asked.free, numeric)
-    if not limits or numeric or solutions.curves:
+    if not limits or numeric or any(curve.kind == SELF_MOTION for curve in solutions.curves):
         return solutions
     # what limits rule out is printed, too
     anywhere: Solutions = solver.solve(asked.T, asked.near, False, asked.lock, asked.free)

@@ -42,29 +42,37 @@ def solution_lines(
     import numpy as np
 
     what = "the pose" if frame == "tool0" else f"the pose with {frame}"
-    count = len(solutions)
-    inside = int(solutions.within_limits.sum())
+    # the nearest of those that differ by whole turns stands for all
+    _, first, counts = np.unique(solutions.same, return_index=True, return_counts=True)
+    order = np.argsort(first)
+    first, counts = first[order], counts[order]
+    count, turned = len(first), len(solutions) - len(first)
+    inside = int(solutions.within_limits[first].sum())
     if solutions.reason:
         lines = _filled(f"{robot.name}: no joint vector reaches {what}: {solutions.reason}")
     else:
-        vectors = "1 joint vector reaches" if count == 1 else f"{count} joint vectors reach"
-        lines = [f"{robot.name}: {vectors} {what}" + (f", {inside} within limits" if inside < count else "")]
+        text = "1 joint vector reaches" if count == 1 else f"{count} joint vectors reach"
+        text += f" {what}" + (f", {inside} within limits" if inside < count else "")
+        text += f"; {turned} more by whole turns" if turned else ""
+        lines = _filled(f"{robot.name}: {text}")
     if solutions.nearest is not None and not count:
         lines += ["", "The nearest that was found:", *_table(spec, solutions.nearest[None], [""])]
     if count:
-        beyond = beyond_limits(spec.moving_rows, solutions.q[:MOST])
+        shown = first[:MOST]
+        beyond = beyond_limits(spec.moving_rows, solutions.q[shown])
         remarks = []
-        for k in range(min(count, MOST)):
+        for k, by, turns in zip(shown.tolist(), beyond, counts, strict=False):
             same = given is not None and bool(np.abs(_turned(spec, solutions.q[k] - given)).max() < 1e-6)
             parts = [
                 printable(solutions.branch[k]),
                 f"sigma_min {solutions.sigma_min[k]:.3g}",
                 f"residual {solutions.residual[k]:.1e}",
-                _outside(spec, beyond[k]),
+                _outside(spec, by),
                 "as given" if same else "",
+                f"{turns - 1} more by whole turns" if turns > 1 else "",
             ]
             remarks.append(" · ".join(part for part in parts if part))
-        lines += ["", *_table(spec, solutions.q[:MOST], remarks, marked=beyond)]
+        lines += ["", *_table(spec, solutions.q[shown], remarks, marked=beyond)]
         if count > MOST:
             lines.append(f"and {count - MOST} more, which --json lists")
     for number, curve in enumerate(solutions.curves, start=1):

@@ -162,7 +162,7 @@ def test_what_exceeds_limits_is_printed_behind_what_keeps_them() -> None:
     assert inside == sorted(inside, reverse=True)
     assert len({solution["branch"] for solution in answer["solutions"]}) == 8
     text = dh2sim("ik", "puma560", "--at", "10", "-20", "30", "40", "50", "60").out
-    assert "puma560: 9 joint vectors reach the pose, 4 within limits\n" in text
+    assert "puma560: 8 joint vectors reach the pose, 3 within limits; 1 more by whole turns\n" in text
     assert "outside limits: joint_4 by 30 degrees" in " ".join(text.split())
     assert "left, above, no flip · sigma_min 0.266 · residual" in text
 
