@@ -26,6 +26,8 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import RobotSpec
 
 _WIDTH: Final = 100
+_MOST_TRIED: Final = 12
+"""Joints whose frames may be moved along their axes; each try takes as long as the whole."""
 
 
 def generate_code(
@@ -131,7 +133,7 @@ def _function(
 def _forces(model: RobotModel, mechanism: Mechanism, trace: Trace) -> list[Number]:
     """Return the forces on the joints, with frames on the joints' axes where that takes the fewest operations."""
     forces = _forces_of(model, mechanism, trace)
-    for i in range(len(mechanism.joints) - 1):
+    for i in range(min(len(mechanism.joints) - 1, _MOST_TRIED)):
         other = origin_moved(mechanism, i, trace)
         if other is not None:
             found = _forces_of(model, other, trace)

@@ -121,7 +121,7 @@ def _c(program: Program) -> str:
         body = listing.body(function)
         lines += ["", f"/* {_first_upper(function.text)}, {_layout(function)}. */", heads[function.name], "{"]
         lines += _loaded(body, "    const double {} = {}[{}];", 0)
-        lines += [f"    (void){name};" for name in _unused(function, body)]
+        lines += [f"    (void){name};" for name in _unused(body) + ([] if body.results else [function.result])]
         lines += _assigned(body.statements, "    const double {} = {};", "")
         lines += [f"    {function.result}[{i}] = {value};" for i, value in enumerate(body.results)]
         lines.append("}")
@@ -157,7 +157,7 @@ def _cpp(program: Program) -> str:
             f"inline std::array<double, {size}> {function.name}({arguments})",
             "{",
             *_loaded(body, "    const double {} = {}[{}];", 0),
-            *(f"    (void){name};" for name in _unused(function, body)),
+            *(f"    (void){name};" for name in _unused(body)),
             *_assigned(body.statements, "    const double {} = {};", ""),
         ]
         if size:
@@ -284,10 +284,9 @@ def _loaded(body: Body, form: str, first: int) -> list[str]:
     ]
 
 
-def _unused(function: Function, body: Body) -> list[str]:
-    """Return the arguments, and the result, that nothing is read from or written to."""
-    unused = [name for name, entries in body.arguments.items() if not any(entries)]
-    return unused if function.values else [*unused, function.result]
+def _unused(body: Body) -> list[str]:
+    """Return the arguments that nothing is read from."""
+    return [name for name, entries in body.arguments.items() if not any(entries)]
 
 
 def _indices(shape: Sequence[int]) -> list[tuple[int, ...]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim import Continuous, Fixed, Prismatic, Revolute, Robot
+from dh2sim import Continuous, Fixed, LinkSpec, Prismatic, Revolute, Robot
 from dh2sim.codegen.generate import generate_code
 from dh2sim.codegen.languages import Language, program_text
 from dh2sim.codegen.program import Function, Program, identifier
@@ -30,7 +30,7 @@ from tests.codegen.running import (
 from tests.sample_robots import model
 
 ALL = ("pose", "jacobian", "inverse-dynamics")
-ROBOTS = ("puma560", "stanford", "franka_panda", "arm_5r", "scara", "ssrms", "odd", "return", "std")
+ROBOTS = ("puma560", "stanford", "franka_panda", "arm_5r", "scara", "ssrms", "odd", "return", "std", "still")
 
 SLIDE = Robot([Prismatic(theta=0.7, alpha=1.1, flip=True)], name="return", base=(0.1, 0.2, 0.3))
 """Its pose does not depend on much, and its name is a word of most languages."""
@@ -44,10 +44,13 @@ PARALLEL = Robot(
     ],
     name="std",
 )
+STILL = Robot([Fixed(a=0.3, alpha=0.4), Fixed(d=0.2, link=LinkSpec(mass=1.0))], name="still", base=(1.0, 2.0, 3.0))
+"""Without a joint."""
 
 
 def built(name: str) -> RobotModel:
-    return {"return": SLIDE, "std": PARALLEL}[name].model if name in ("return", "std") else model(name)
+    own = {"return": SLIDE, "std": PARALLEL, "still": STILL}
+    return own[name].model if name in own else model(name)
 
 
 def results(language: Language, text: str, prefix: str, call: Call) -> list[Array]:
@@ -81,7 +84,7 @@ def test_code_compiles_without_a_warning_and_equals_the_table(name: str, languag
     np.testing.assert_allclose(T, table_tool_pose(robot.spec, q), rtol=0, atol=1e-12 * reach)
     np.testing.assert_allclose(J, geometric_jacobian(robot.spec, q), rtol=0, atol=1e-12 * reach)
     numpy = python_functions(generate_code(robot, "inverse-dynamics", "numpy"))["inverse_dynamics"](q, qd, qdd)
-    np.testing.assert_allclose(tau, numpy, rtol=0, atol=1e-12 * max(1.0, float(np.abs(numpy).max())))
+    np.testing.assert_allclose(tau, numpy, rtol=0, atol=1e-12 * max(1.0, float(np.abs(numpy).max(initial=0.0))))
 
 
 # Parameters that a robot file may have, and that mean something in a language, in a library, or in the file itself.
