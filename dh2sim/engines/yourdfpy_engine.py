@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from dh2sim.engines.engine import present_frames, require_joints
-from dh2sim.errors import EngineError
+from dh2sim.errors import EngineCapacityError, EngineError
 from dh2sim.typing import Array
 
+ROUNDING = 1e-15
+"""m and rad: less is of no account."""
 NOTICED = 1e-7
 """rad or m: its scene graph keeps a transform that differs by less than 1e-8 from the one before."""
 
@@ -44,7 +46,15 @@ class YourdfpyEngine:
         self.frames = present_frames(str(path), list(self._urdf.link_map), rows, dh_frames_required=False)
 
     def frame_poses(self, q: Array) -> Array:
-        """Return the poses of ``frames`` in base_link; see ``PoseEngine``."""
+        """Return the poses of ``frames`` in base_link; see ``PoseEngine``.
+
+        Raises:
+            EngineCapacityError: Something is displaced so little that yourdfpy does not notice.
+        """
+        if self._leaves_out(q):
+            raise EngineCapacityError(
+                "yourdfpy leaves out displacements of less than 1e-8 m or rad, as there are here"
+            )
         poses = np.empty((len(q), len(self.frames), 4, 4))
         for k, row in enumerate(q):
             new = np.array(row[self._order], dtype=np.float64)
@@ -57,3 +67,12 @@ class YourdfpyEngine:
                 T = T @ self._urdf.get_transform(frame, before)
                 poses[k, i], before = T, frame
         return poses
+
+    def _leaves_out(self, q: Array) -> bool:
+        """Whether some transform from link to link is so near the identity that it is taken for that."""
+        joints = self._urdf.robot.joints
+        gaps = {j.name: 0.0 if j.origin is None else float(np.abs(j.origin - np.eye(4)).max()) for j in joints}
+        near = [gaps[name] < NOTICED for name in self._urdf.actuated_joint_names]
+        moved = np.abs(q[:, self._order][:, near])
+        still = [gap for name, gap in gaps.items() if name not in self._urdf.actuated_joint_names]
+        return any(ROUNDING < gap < NOTICED for gap in still) or bool(((moved > ROUNDING) & (moved < NOTICED)).any())

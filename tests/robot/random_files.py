@@ -94,7 +94,10 @@ class RandomFiles:
         return self._signed(magnitudes.ANGLE, self._degrees)
 
     def _distance(self) -> float | str:
-        return 0.0 if self._chance.random() < 0.2 else self._signed(magnitudes.LENGTH, self._length)
+        kind = self._chance.random()
+        if kind < 0.03:  # what rounding may leave of nothing
+            return float(10 ** self._chance.uniform(-20, -6))
+        return 0.0 if kind < 0.2 else self._signed(magnitudes.LENGTH, self._length)
 
     def _vector(self) -> list[float | str]:
         return [self._distance() for _ in range(3)]
