@@ -34,6 +34,15 @@ def test_frames_and_styles_are_options() -> None:
     assert "d6*(c1*s2*c5 + s5*(c1*c2*c4 - s1*s4)) - d2*s1 + d3*c1*s2" in tool
 
 
+def test_letters_numbers_folding_and_names_of_coordinates_are_options() -> None:
+    assert "a2 = -0.425 m" in dh2sim("symbolic", "ur5e", "--letters").out
+    assert "0.4*c2" in dh2sim("symbolic", "arm_5r", "--numbers", "--to", "dh_4").out
+    assert "c(1+2-4)" in dh2sim("symbolic", "scara", "--fold", "all").out
+    assert "c1*c2 - s1*s2" in dh2sim("symbolic", "planar_2r", "--no-fold").out
+    assert "c12 = cos(q1 + q2)" in dh2sim("symbolic", "planar_2r", "--q").out
+    assert "d6*c2*c5" in dh2sim("symbolic", "stanford", "--style", "expanded", "--lengths", "last").out
+
+
 def test_json_goes_to_a_file_whole(tmp_path: Path) -> None:
     out = tmp_path / "form.json"
     run = dh2sim("symbolic", "scara", "--what", "jacobian", "--as", "json", "-o", out)

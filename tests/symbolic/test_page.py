@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import re
 import shlex
+import time
 from pathlib import Path
 
 import pytest
 
 from dh2sim.robot.read import load_robot
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.symbolic.expression import operation_count
 from dh2sim.symbolic.request import symbolic_form
 from tests.program import dh2sim
+from tests.sample_robots import NAMES
+from tests.sample_robots import robot as spec_of
+from tests.symbolic.test_dynamics import ELBOW
 
 PAGE = (Path(__file__).parents[2] / "docs" / "symbolic.md").read_text(encoding="utf-8")
 CONSOLE = re.findall(r"```console\n\$ dh2sim ([^\n]+)\n(.*?)```", PAGE, flags=re.DOTALL)
@@ -43,3 +48,19 @@ def test_the_puma_takes_no_more_operations_than_the_best_known_nesting() -> None
     multiplications, additions = operation_count([*form.named.values(), *form.sums])
     assert multiplications <= 54
     assert additions <= 22
+
+
+@pytest.mark.slow
+def test_forms_of_every_robot_take_the_time_that_is_promised() -> None:
+    def least(what: str, robot: RobotSpec, letters: bool = False) -> float:
+        times = []
+        for _ in range(3):
+            start = time.process_time()
+            str(symbolic_form(robot, what, letters=letters))
+            times.append(time.process_time() - start)
+        return min(times)
+
+    for name in NAMES:
+        assert least("pose", spec_of(name)) < 0.1
+        assert least("jacobian", spec_of(name)) < 0.3
+    assert least("dynamics", ELBOW, letters=True) < 0.3
