@@ -20,13 +20,21 @@ class _DataNotation(TextNotation):
     def __init__(self, form: Form) -> None:
         super().__init__(form.table, form.joint_names)
         self._angles = moving_angles(form.atoms)
+        self._sum = "k"
+        while any(name.startswith(self._sum) for name in form.table.letters):
+            self._sum += "_"
 
     def atom(self, atom: Atom) -> str:
-        return f"k{atom[1:]}" if atom.startswith("#") else super().atom(atom)
+        return f"{self._sum}{atom[1:]}" if atom.startswith("#") else super().atom(atom)
 
     def short(self, letter: str, angle: Angle) -> str:
         name = super().short(letter, angle)
-        return name if name.isidentifier() else f"{letter}_{self._angles.index(angle) + 1}"
+        if name.isidentifier():
+            return name
+        name = f"{letter}_{self._angles.index(angle) + 1}"
+        while name in self._taken:
+            name += "_"
+        return name
 
     def power(self, base: str, exponent: int) -> str:
         return f"{base}**{exponent}"

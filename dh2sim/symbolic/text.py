@@ -67,9 +67,9 @@ class TextNotation:
 
     def coordinate(self, row: int, *, turns: bool) -> str:
         """Return what the coordinate of a row is called."""
-        if turns and self._joint == "theta":
-            return f"theta_{row}"
-        name = f"d{row}" if self._joint == "theta" else f"q{row}"
+        name = f"q{row}"
+        if self._joint == "theta":
+            name = f"theta_{row}" if turns else f"d{row}"
         for candidate in (name, f"q{row}", f"q_{row}"):
             if candidate not in self._taken:
                 return candidate

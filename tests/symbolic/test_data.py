@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
 
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import forward_kinematics
+from dh2sim.robot.read import parse_robot
 from dh2sim.symbolic.request import symbolic_form
 from tests.sample_robots import NAMES
 from tests.sample_robots import robot as spec_of
@@ -40,3 +42,20 @@ def test_data_of_a_jacobian_says_where_it_is_singular() -> None:
     assert data["units"] == {"length": "m", "angle": "rad"}
     assert data["singular"][0] == {"zero": "s5", "name": "wrist", "angle": "theta_5", "degrees": [0.0, 180.0]}
     assert data["letters"]["a2"] == {"value": 0.4318, "kind": "length", "definition": ""}
+
+
+def test_names_of_the_data_are_apart_from_parameters() -> None:
+    file = """
+name: x
+convention: standard
+parameters: {k1: 0.1, c1: 0.2, theta_1: 0.3, c_1: 0.4, d3: 0.5}
+joints:
+  - {type: revolute, a: k1, d: c1, alpha: 0.4}
+  - {type: revolute, a: theta_1, d: c_1, alpha: 0.5}
+  - {type: prismatic, d: d3, a: 0.2}
+"""
+    data = symbolic_form(parse_robot(file)).data()
+    names = [*data["letters"], *data["cosines"], *data["sums"]]
+    assert len(names) == len(set(names))
+    assert "k_1" in data["sums"]
+    assert not {"theta_1", "d3"} & {word for text in data["cosines"].values() for word in re.findall(r"\w+", text)}
