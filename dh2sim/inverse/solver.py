@@ -22,7 +22,7 @@ from dh2sim.inverse.nearest import goal_residuals, goal_sigma_min, miss_text, no
 from dh2sim.inverse.numeric import NumericSolver, arm_size
 from dh2sim.inverse.reach import limits_reason, position_limits, why_unreachable
 from dh2sim.inverse.redundancy import SAMPLES, curves_and_nearest, joints_to_lock, self_motions
-from dh2sim.inverse.self_motion import Path
+from dh2sim.inverse.self_motion import LONGEST, Path
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.turns import Turns
 from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, spec_of
@@ -50,7 +50,10 @@ class InverseSolver:
 
         Raises:
             TypeError: It is not a robot.
+            ConfigurationError: None of its joints moves.
         """
+        if not spec_of(robot).moving_rows:
+            raise ConfigurationError(f"{spec_of(robot).name} has no joint that moves")
         self._prepare(_bare(spec_of(robot)))
 
     def _prepare(self, spec: RobotSpec) -> None:
@@ -256,6 +259,9 @@ class InverseSolver:
         if paths and not curves:
             ends = np.concatenate([arm.unscaled(path.q)[:, : len(q0)] for path in paths])
             return replace(none, reason=limits_reason(self._spec, self._turns.placed(ends, q0)))
+        reached = goal_residuals(self._spec, q0[None], T[None], free=free, size=self.size)[0] <= VERIFIED
+        if reached and len(q) and self._turns.distance(q[:1], q0)[0] < 2.0 * LONGEST:
+            q[0] = q0  # between two points of the first curve
         goals = np.broadcast_to(T, (len(q), 4, 4))
         return replace(
             none,

@@ -335,6 +335,21 @@ def test_wrong_options_are_all_reported(arguments: list[str], messages: list[str
     assert refused("stanford", *arguments).splitlines() == [f"dh2sim: {message}" for message in messages]
 
 
+def test_a_robot_without_moving_joints_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "stick.yaml"
+    file.write_text("{name: stick, convention: standard, joints: [{type: fixed, a: 0.5}]}\n", encoding="utf-8")
+    for goal in (["--at", "home"], ["--xyz", "0.5", "0", "0"], ["--xyz", "0.5", "0", "0", "--numeric"]):
+        run = dh2sim("ik", file, *goal)
+        assert (run.status, run.err) == (2, "dh2sim: stick has no joint that moves\n")
+
+
+def test_at_a_singular_pose_the_given_joint_vector_comes_first() -> None:
+    answer = found("puma560", "--at", "10", "20", "30", "40", "0", "60")
+    assert np.rad2deg(answer["solutions"][0]["q"]) == pytest.approx([10, 20, 30, 40, 0, 60], abs=1e-9)
+    assert [curve["kind"] for curve in answer["curves"]] == ["wrist singularity"]
+    assert_reached(answer, "puma560")
+
+
 def test_a_file_that_is_not_there_is_reported_beside_wrong_options() -> None:
     assert dh2sim("ik", "stanford", "--pose", "missing.json", "--free", "x") == Outcome(
         status=2,
