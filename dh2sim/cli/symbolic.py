@@ -12,9 +12,6 @@ from dh2sim.cli.common import RobotArgument, choice, load_all
 from dh2sim.cli.output import hand_over, json_text, require_free
 from dh2sim.cli.symbolic_code import LANGUAGES, is_about_code, print_code
 from dh2sim.errors import Dh2simError
-from dh2sim.symbolic.expression import Lengths, Style
-from dh2sim.symbolic.request import What, symbolic_form
-from dh2sim.symbolic.table import Fold
 
 if TYPE_CHECKING:
     from dh2sim.robot.spec import RobotSpec
@@ -31,7 +28,9 @@ class Format(StrEnum):
 
 def symbolic(
     robot: RobotArgument,
-    what: Annotated[str, typer.Option(metavar="WHAT", help=f"{', '.join(What)}, inverse-dynamics.")] = "pose",
+    what: Annotated[
+        str, typer.Option(metavar="WHAT", help="pose, matrices, jacobian, dynamics, inverse-dynamics.")
+    ] = "pose",
     source: Annotated[
         str, typer.Option("--from", metavar="FRAME", help="Frame that the pose is given in.")
     ] = "base_link",
@@ -87,6 +86,11 @@ def symbolic(
         }
         print_code(robot, what, as_, out, force=force, others=others)
         return
+    # imported here: code needs none of it
+    from dh2sim.symbolic.expression import Lengths, Style
+    from dh2sim.symbolic.request import What, symbolic_form
+    from dh2sim.symbolic.table import Fold
+
     wanted = choice(what, What, "--what")
     format_ = choice(as_, Format, "--as")
     nested = choice(style, Style, "--style")
