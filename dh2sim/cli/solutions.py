@@ -77,7 +77,7 @@ def solution_lines(
             lines.append(f"and {count - MOST} more, which --json lists")
     for number, curve in enumerate(solutions.curves, start=1):
         lines += _filled(f"curve {number}: {_curve_text(spec, curve)}")
-    if not solutions.complete and not solutions.notes:
+    if solutions.found_share < 1.0:
         lines += _filled(f"There may be more: in trials {solutions.found_share:.1%} of all solutions were found.")
     if len(behind):
         names = ", ".join(row.name for row in robot.moving_rows[len(spec.moving_rows) :])
