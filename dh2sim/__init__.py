@@ -12,6 +12,7 @@ _HOMES = {
     "Continuous": "robot_facade",
     "Dh2simError": "errors",
     "Dynamics": "robot.spec",
+    "Explanation": "inverse.textbook",
     "Fixed": "robot_facade",
     "ImportOptions": "importing.sources",
     "InverseSolver": "inverse.solver",
@@ -37,6 +38,7 @@ _HOMES = {
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
     "convert_robot": "importing.convert",
+    "explain_inverse_kinematics": "inverse.textbook",
     "find_slips": "model.slips",
     "forward_kinematics": "kinematics.forward",
     "frame_poses": "kinematics.forward",
@@ -71,6 +73,8 @@ if TYPE_CHECKING:
     from dh2sim.inverse.solutions import Solutions as Solutions
     from dh2sim.inverse.solver import InverseSolver as InverseSolver
     from dh2sim.inverse.solver import inverse_kinematics as inverse_kinematics
+    from dh2sim.inverse.textbook import Explanation as Explanation
+    from dh2sim.inverse.textbook import explain_inverse_kinematics as explain_inverse_kinematics
     from dh2sim.kinematics.chain import KinematicChain as KinematicChain
     from dh2sim.kinematics.chain import build_chain as build_chain
     from dh2sim.kinematics.forward import forward_kinematics as forward_kinematics

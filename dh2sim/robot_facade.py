@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from dh2sim.export import ExportReport, Format
     from dh2sim.importing.sources import ImportOptions
     from dh2sim.inverse.goals import Free
+    from dh2sim.inverse.textbook import Explanation
     from dh2sim.kinematics.chain import KinematicChain, SpecLike
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.model.slips import Slip
@@ -508,6 +509,22 @@ class Robot:
 
         near = None if q0 is None else self._vectors(q0)
         return inverse_kinematics(self, T, near, limits, lock, free, numeric)
+
+    def explain_ik(self, T: ArrayLike) -> Explanation:
+        """Derive the configurations that reach a pose as a textbook does, in steps with the numbers.
+
+        Args:
+            T: Pose of tool0 in base_link, shape (4, 4).
+
+        Returns:
+            The :class:`Explanation`: it prints as text, and is false where textbooks have no closed form for the arm.
+
+        Raises:
+            ConfigurationError: ``T`` is no pose.
+        """
+        from dh2sim.inverse.textbook import explain_inverse_kinematics
+
+        return explain_inverse_kinematics(self, T)
 
     def _vectors(self, q: ArrayLike) -> ArrayLike:
         if not isinstance(q, str):

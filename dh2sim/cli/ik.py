@@ -321,9 +321,9 @@ def _solved(asked: _Asked, *, limits: bool, numeric: bool) -> Solutions:
 
 
 def _explained(asked: _Asked) -> list[str]:
-    from dh2sim.inverse.textbook import explain
+    from dh2sim.inverse.textbook import explain_inverse_kinematics
 
-    return list(explain(asked.spec, asked.T).lines)
+    return list(explain_inverse_kinematics(asked.spec, asked.T).lines)
 
 
 def _as_json(asked: _Asked, solutions: Solutions, explanation: Sequence[str]) -> dict[str, Any]:

@@ -78,6 +78,10 @@ class Explanation:
     """Singular cases, and what is out of reach, in whole sentences."""
     _table: tuple[str, ...] = field(default=(), repr=False)
 
+    def __str__(self) -> str:
+        """Return the derivation as one text."""
+        return self.text
+
     def __bool__(self) -> bool:
         """Return whether there is a closed form."""
         return bool(self.form)
@@ -115,7 +119,7 @@ class Explanation:
         return "\n".join(self.lines)
 
 
-def explain(robot: SpecLike, T: ArrayLike) -> Explanation:
+def explain_inverse_kinematics(robot: SpecLike, T: ArrayLike) -> Explanation:
     """Derive the inverse kinematics of an arm for one pose as a textbook does.
 
     Args:

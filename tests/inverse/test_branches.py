@@ -7,7 +7,7 @@ import pytest
 
 from dh2sim.errors import ConfigurationError
 from dh2sim.inverse.branches import branch_names
-from dh2sim.inverse.textbook import explain
+from dh2sim.inverse.textbook import explain_inverse_kinematics
 from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import BaseSpec, Convention, Pose
@@ -19,7 +19,7 @@ from tests.sample_robots import ODD_ROBOT, robot
 @pytest.mark.parametrize("name", CLASSES)
 def test_names_of_closed_forms_branches_are_those_of_their_configurations(name: str) -> None:
     spec = disguised(textbook_table(name, 2), 7)
-    explanation = explain(spec, table_tool_pose(spec, random_configuration(spec, 2)))
+    explanation = explain_inverse_kinematics(spec, table_tool_pose(spec, random_configuration(spec, 2)))
     found = np.array([branch.q for branch in explanation.branches])
     assert branch_names(spec, found) == tuple(branch.name for branch in explanation.branches)
 

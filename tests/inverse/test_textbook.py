@@ -10,9 +10,10 @@ import pytest
 
 from dh2sim.errors import ConfigurationError
 from dh2sim.inverse.solver import inverse_kinematics
-from dh2sim.inverse.textbook import Explanation, explain
+from dh2sim.inverse.textbook import Explanation, explain_inverse_kinematics
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot_facade import Robot
 from dh2sim.typing import Array
 from tests.inverse.disguised_arms import CLASSES, disguised, random_configuration, textbook_table
 from tests.robots import closed_forms
@@ -53,7 +54,7 @@ def test_an_arm_in_any_disguise_is_recognised_and_its_own_configuration_is_among
         for spec in (plain, disguised(plain, seed)):
             q = random_configuration(spec, seed)
             T = table_tool_pose(spec, q)
-            explanation = explain(spec, T)
+            explanation = explain_inverse_kinematics(spec, T)
             assert explanation.form, explanation.reason
             assert min(angle_between(spec, branch.q, q) for branch in explanation.branches) < 1e-7
             for branch in explanation.branches:
@@ -65,7 +66,7 @@ def test_branches_differ_from_each_other_in_signs_names_and_coordinates(name: st
     most = 0
     for seed in range(20):
         spec = disguised(textbook_table(name, seed), seed + 100)
-        branches = explain(spec, table_tool_pose(spec, random_configuration(spec, seed))).branches
+        branches = explain_inverse_kinematics(spec, table_tool_pose(spec, random_configuration(spec, seed))).branches
         most = max(most, len(branches))
         assert len({branch.signs for branch in branches}) == len(branches)
         assert len({branch.name for branch in branches}) == len(branches)
@@ -80,7 +81,7 @@ def test_all_branches_of_stanford_and_scara_reach_the_pose_by_the_courses_closed
     for seed in range(20):
         q = random_configuration(spec, seed)
         T = closed_form_pose(name, q)
-        branches = explain(spec, T).branches
+        branches = explain_inverse_kinematics(spec, T).branches
         assert len(branches) == count
         assert min(angle_between(spec, branch.q, q) for branch in branches) < 1e-9
         for branch in branches:
@@ -94,7 +95,7 @@ def test_all_branches_of_the_courses_other_arms_reach_the_pose_by_its_closed_for
     spec = robot(name)
     q = random_configuration(spec, 3)
     T = closed_form_pose(name, q)
-    branches = explain(spec, T).branches
+    branches = explain_inverse_kinematics(spec, T).branches
     assert min(angle_between(spec, branch.q, q) for branch in branches) < 1e-9
     for branch in branches:
         np.testing.assert_allclose(closed_form_pose(name, branch.q), T, rtol=0.0, atol=1e-13)
@@ -111,7 +112,7 @@ def test_the_scara_branches_are_those_of_the_textbooks_formulas() -> None:
         q2 = math.atan2(sign * math.sqrt(1 - cosine * cosine), cosine)
         q1 = math.atan2(y, x) - math.atan2(a2 * math.sin(q2), a1 + a2 * math.cos(q2))
         expected.append([q1, q2, -z - d4, q1 + q2 - math.atan2(T[1, 0], T[0, 0])])
-    for branch, by_hand in zip(explain(spec, T).branches, expected, strict=True):
+    for branch, by_hand in zip(explain_inverse_kinematics(spec, T).branches, expected, strict=True):
         assert angle_between(spec, branch.q, np.array(by_hand)) < 1e-12
 
 
@@ -119,7 +120,7 @@ def test_the_scara_branches_are_those_of_the_textbooks_formulas() -> None:
 def test_a_stretched_wrist_is_called_singular_and_only_the_sum_of_its_outer_joints_is_determined(name: str) -> None:
     spec = robot(name)
     q = np.array([0.4, -0.7, 0.5, 0.3, 0.0, 0.8])
-    explanation = explain(spec, table_tool_pose(spec, q))
+    explanation = explain_inverse_kinematics(spec, table_tool_pose(spec, q))
     own = [branch for branch in explanation.branches if abs(branch.q[4]) < 1e-9]
     assert len(own) == 1
     assert own[0].q[3] == 0.0
@@ -139,7 +140,7 @@ def test_a_wrist_centre_on_axis_1_is_called_shoulder_singular() -> None:
     q = np.array([0.6, -math.pi / 2 - over, q3 if signs[0] == signs[1] else q3 + math.pi])
     T = table_tool_pose(spec, q)
     assert np.abs(T[:2, 3]).max() < 1e-12
-    explanation = explain(spec, T)
+    explanation = explain_inverse_kinematics(spec, T)
     assert any(note.startswith("Shoulder singular") for note in explanation.notes)
     for found in (*explanation.branches, *explanation.position_only):
         assert np.abs(table_tool_pose(spec, found.q)[:3, 3] - T[:3, 3]).max() < 1e-12
@@ -153,7 +154,7 @@ def test_wherever_an_arm_is_singular_some_branch_reaches_the_pose(name: str) -> 
         spec = textbook_table(name, seed % 5)
         q = np.array([rng.choice(angles if row.type.turns else slides) for row in spec.rows])
         T = table_tool_pose(spec, q)
-        branches = explain(spec, T).branches
+        branches = explain_inverse_kinematics(spec, T).branches
         assert branches
         assert max(missed_by(spec, branch.q, T) for branch in branches) < 1e-8
 
@@ -162,7 +163,7 @@ def test_a_singular_offset_wrist_keeps_axis_4_within_reach() -> None:
     spec = robot("ur5e")
     q = np.array([0.3, -1.2, 1.1, 0.4, 0.0, 0.7])
     T = table_tool_pose(spec, q)
-    explanation = explain(spec, T)
+    explanation = explain_inverse_kinematics(spec, T)
     assert any("Wrist singular" in note and "q6 is free within reach" in note for note in explanation.notes)
     singular = [branch for branch in explanation.branches if abs(branch.q[4]) < 1e-9]
     assert len(singular) == 2
@@ -172,7 +173,7 @@ def test_a_singular_offset_wrist_keeps_axis_4_within_reach() -> None:
 def test_a_straight_elbow_gives_one_branch_where_it_bends_to_two() -> None:
     spec = robot("scara")
     q = np.array([0.3, 0.0, 0.1, 0.2])
-    explanation = explain(spec, table_tool_pose(spec, q))
+    explanation = explain_inverse_kinematics(spec, table_tool_pose(spec, q))
     assert len(explanation.branches) == 1
     assert any(note.startswith("Elbow straight") for note in explanation.notes)
     assert angle_between(spec, explanation.branches[0].q, q) < 1e-6
@@ -188,7 +189,7 @@ def test_a_straight_elbow_gives_one_branch_where_it_bends_to_two() -> None:
 def test_out_of_reach_is_said_with_the_distance(name: str, x: float, note: str) -> None:
     T = np.array(table_tool_pose(robot(name), np.zeros(len(robot(name).moving_rows))))
     T[0, 3] = x
-    explanation = explain(robot(name), T)
+    explanation = explain_inverse_kinematics(robot(name), T)
     assert explanation.branches == ()
     assert note in explanation.notes
 
@@ -196,7 +197,7 @@ def test_out_of_reach_is_said_with_the_distance(name: str, x: float, note: str) 
 def test_a_point_nearer_to_axis_1_than_the_shoulders_offset_is_out_of_reach() -> None:
     T = np.eye(4)
     T[:3, 3] = [0.05, 0.0, 0.9]
-    explanation = explain(robot("puma560"), T)
+    explanation = explain_inverse_kinematics(robot("puma560"), T)
     assert explanation.branches == ()
     assert explanation.notes == (
         "Out of reach: the wrist centre is 0.0500 m from axis 1, the arm's plane never nearer than 0.1500 m: "
@@ -207,7 +208,7 @@ def test_a_point_nearer_to_axis_1_than_the_shoulders_offset_is_out_of_reach() ->
 def test_the_other_elbow_of_a_planar_arm_reaches_the_position_alone() -> None:
     spec = robot("planar_2r")
     q = np.array([0.4, 1.1])
-    explanation = explain(spec, table_tool_pose(spec, q))
+    explanation = explain_inverse_kinematics(spec, table_tool_pose(spec, q))
     assert [branch.name for branch in explanation.branches] == ["elbow down"]
     assert [branch.name for branch in explanation.position_only] == ["elbow up"]
     assert explanation.position_only[0].position_error < 1e-12
@@ -225,7 +226,7 @@ def test_the_other_elbow_of_a_planar_arm_reaches_the_position_alone() -> None:
     ],
 )
 def test_an_arm_without_a_closed_form_gives_the_reason(name: str, reason: str) -> None:
-    explanation = explain(robot(name), np.eye(4))
+    explanation = explain_inverse_kinematics(robot(name), np.eye(4))
     assert not explanation
     assert explanation.steps == ()
     assert explanation.branches == ()
@@ -234,14 +235,14 @@ def test_an_arm_without_a_closed_form_gives_the_reason(name: str, reason: str) -
 
 
 def test_odd_twists_have_no_closed_form() -> None:
-    assert not explain(ODD_ROBOT, np.eye(4))
+    assert not explain_inverse_kinematics(ODD_ROBOT, np.eye(4))
 
 
 def test_rounded_right_angles_are_taken_for_right_and_what_they_cost_is_said() -> None:
     spec = robot("puma560")
     rounded = replace(spec, rows=tuple(replace(row, alpha=round(row.alpha, 6)) for row in spec.rows))
     T = table_tool_pose(rounded, [0.3, -0.7, 0.5, 1.1, 0.6, -0.4])
-    explanation = explain(rounded, T)
+    explanation = explain_inverse_kinematics(rounded, T)
     assert len(explanation.branches) == 8
     assert 1e-9 < max(branch.rotation_error for branch in explanation.branches) < 1e-5
     assert any("as rounded numbers do" in note for note in explanation.notes)
@@ -250,18 +251,20 @@ def test_rounded_right_angles_are_taken_for_right_and_what_they_cost_is_said() -
 @pytest.mark.parametrize("goal", [np.eye(3), np.full((4, 4), np.nan)])
 def test_what_is_no_pose_is_refused(goal: Array) -> None:
     with pytest.raises(ConfigurationError, match="a pose must be an array of finite numbers of shape"):
-        explain(robot("scara"), goal)
+        explain_inverse_kinematics(robot("scara"), goal)
 
 
 def the_stanford_explanation() -> Explanation:
-    return explain(robot("stanford"), closed_form_pose("stanford", np.array([0.3, -0.7, 0.5, 1.1, 0.6, -0.4])))
+    return explain_inverse_kinematics(
+        robot("stanford"), closed_form_pose("stanford", np.array([0.3, -0.7, 0.5, 1.1, 0.6, -0.4]))
+    )
 
 
 @pytest.mark.parametrize("name", [*CLASSES])
 def test_text_fits_into_80_columns(name: str) -> None:
     spec = disguised(textbook_table(name, 4), 4)
     spec = replace(spec, base=textbook_table(name, 4).base)
-    explanation = explain(spec, table_tool_pose(spec, random_configuration(spec, 4)))
+    explanation = explain_inverse_kinematics(spec, table_tool_pose(spec, random_configuration(spec, 4)))
     assert max(len(line) for line in explanation.lines) <= 80
 
 
@@ -270,7 +273,7 @@ def test_the_closed_form_has_the_branches_that_the_complete_solver_finds(name: s
     for seed in range(3):
         spec = disguised(textbook_table(name, seed), seed + 20)
         T = table_tool_pose(spec, random_configuration(spec, seed))
-        by_hand = [branch.q for branch in explain(spec, T).branches]
+        by_hand = [branch.q for branch in explain_inverse_kinematics(spec, T).branches]
         solved = inverse_kinematics(spec, T, limits=False)
         assert len(solved) == len(by_hand)
         for q in solved:
@@ -313,3 +316,9 @@ def test_every_coordinate_of_a_branch_is_the_last_line_that_its_signs_lead_to() 
             ]
             assert len(values) == 1
             assert values[0] == pytest.approx(coordinate, abs=1e-12)
+
+
+def test_a_robot_explains_itself_as_the_function_does() -> None:
+    arm = Robot.load("stanford")
+    T = arm.fk("home")
+    assert str(arm.explain_ik(T)) == explain_inverse_kinematics(robot("stanford"), T).text
