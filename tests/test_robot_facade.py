@@ -379,3 +379,19 @@ def test_a_viewer_is_started_and_returned(arm: Robot) -> None:
         assert viewer.url.startswith("http://127.0.0.1:180")
     finally:
         viewer.stop()
+
+
+def test_inverse_kinematics_takes_poses_names_locks_and_what_is_free() -> None:
+    puma = Robot.load("puma560")
+    T = puma.fk("home")
+    found = puma.ik(T, "home")
+    assert found.best == pytest.approx(puma.configurations["home"], abs=1e-9)
+    batch = puma.ik(np.stack([T, T]), limits=False)
+    assert [len(one) for one in batch] == [8, 8]
+    assert np.abs(puma.fk(batch[1].q) - T).max() <= 1e-12
+    tracked = puma.ik(T, puma.configurations["home"] + 0.01, numeric=True)
+    assert np.abs(puma.fk(tracked.best) - T).max() <= 1e-9
+    held = puma.ik(T, lock={"joint_6": float(found.best[5])})
+    assert set(held.q[:, 5]) == {found.best[5]}
+    wrist = puma.ik(T, "home", free="rotation")
+    assert np.abs(puma.fk(wrist.q)[:, :3, 3] - T[:3, 3]).max() <= 1e-12
