@@ -117,13 +117,16 @@ def _mesh_files(spec: Any, assets: Assets) -> dict[int, dict[str, Any]]:
 
 
 def drop_pictures(spec: Any) -> None:
-    """Remove textures, skins and keyframes: a serial arm does not need them, and their files may be missing."""
+    """Remove textures, skins and what keyframes hold: an arm does not need them, and their files may be missing."""
     for texture in list(spec.textures):
         spec.delete(texture)
     for material in spec.materials:
         material.textures = [""] * len(material.textures)
-    for left_out in [*spec.skins, *spec.keys]:
-        spec.delete(left_out)
+    for skin in list(spec.skins):
+        spec.delete(skin)
+    for key in spec.keys:  # which takes MuJoCo no time, as deleting them would
+        for what in ("qpos", "qvel", "act", "ctrl", "mpos", "mquat"):
+            setattr(key, what, [])
     spec.nkey = 0
 
 
@@ -215,7 +218,7 @@ def answer(request: bytes) -> bytes:
 def _text(error: Exception) -> str:
     """Return MuJoCo's message; an error by lack of memory goes on as such."""
     text = str(error)
-    if isinstance(error, MemoryError) or any(sign in text for sign in _NO_MEMORY):
+    if isinstance(error, MemoryError) or any(sign in text.lower() for sign in _NO_MEMORY):
         raise MemoryError from error
     return text or type(error).__name__
 

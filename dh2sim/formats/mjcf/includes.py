@@ -234,9 +234,8 @@ class _Model:
             case "flexcomp" if "file" in element.attributes:
                 self._check_inside(element)  # MuJoCo opens it while it reads the text
             case "hfield":
-                rows, columns = (_whole(element.attributes.get(name, "0")) for name in ("nrow", "ncol"))
-                if rows * columns > MAX_POINTS:
-                    message = f"a height field of {rows} x {columns} points; at most {MAX_POINTS} are read"
+                if (points := _points(element)) > MAX_POINTS:
+                    message = f"a height field of {points} points; at most {MAX_POINTS} are read"
                     raise self._failure(element, message)
         for child in element.children:
             total += self._count(child)
@@ -305,7 +304,7 @@ def _own_count(element: Element) -> int:
     """Return how many elements MuJoCo's work on an element itself is worth.
 
     A node of a soft body is a body with three joints; a chain of n bodies costs as much as n² / 16 elements side by
-    side, and so does a built-in mesh of n by n vertices.
+    side, a built-in mesh of n by n vertices as n² / 8, and a height field of as many points as n² / 1000.
     """
     match element.tag:
         case "flexcomp":
@@ -315,9 +314,16 @@ def _own_count(element: Element) -> int:
             return count + count * count // 16
         case "mesh" if "builtin" in element.attributes:
             sizes = element.attributes.get("params", "1").split()[:2]
-            return 1 + max([_whole(size) ** 2 // 16 for size in sizes], default=0)
+            return 1 + max([_whole(size) ** 2 // 8 for size in sizes], default=0)
+        case "hfield":
+            return 1 + _points(element) // 1000
         case _:
             return 1
+
+
+def _points(field: Element) -> int:
+    """Return the number of points that a height field without a file has."""
+    return _whole(field.attributes.get("nrow", "0")) * _whole(field.attributes.get("ncol", "0"))
 
 
 def _product(text: str) -> int:

@@ -167,9 +167,14 @@ GRID = '<flexcomp name="f" type="grid" count="{0} {0} {0}" dim="3" radius=".01" 
         (
             FIELD.format(46341),
             IN_THE_WORLD,
-            "hfield: a height field of 46341 x 46341 points; at most 4000000 are read",
+            "hfield: a height field of 2147488281 points; at most 4000000 are read",
         ),
-        (FIELD.format(2001), IN_THE_WORLD, "hfield: a height field of 2001 x 2001 points; at most 4000000 are read"),
+        (FIELD.format(2001), IN_THE_WORLD, "hfield: a height field of 4004001 points; at most 4000000 are read"),
+        (
+            "".join(FIELD.format(1900).replace('"h"', f'"{name}"') for name in "hgf"),
+            IN_THE_WORLD,
+            "this makes more than 10000 elements once it is expanded",
+        ),
         ("", GRID.format(40), "flexcomp: this makes more than 10000 elements once it is expanded"),
         ("", GRID.format(14), "flexcomp: this makes more than 10000 elements once it is expanded"),
         ("", CABLE.format(1000), "composite: this makes more than 10000 elements once it is expanded"),
