@@ -14,6 +14,8 @@ from dh2sim.typing import Array
 
 ROUNDING = 1e-15
 """m and rad: less is of no account."""
+NEAR = 1e-3
+"""m and rad: of an origin that a small motion may take back."""
 NOTICED = 1e-7
 """rad or m: its scene graph keeps a transform that differs by less than 1e-8 from the one before."""
 
@@ -72,7 +74,8 @@ class YourdfpyEngine:
         """Whether some transform from link to link is so near the identity that it is taken for that."""
         joints = self._urdf.robot.joints
         gaps = {j.name: 0.0 if j.origin is None else float(np.abs(j.origin - np.eye(4)).max()) for j in joints}
-        near = [gaps[name] < NOTICED for name in self._urdf.actuated_joint_names]
-        moved = np.abs(q[:, self._order][:, near])
-        still = [gap for name, gap in gaps.items() if name not in self._urdf.actuated_joint_names]
-        return any(ROUNDING < gap < NOTICED for gap in still) or bool(((moved > ROUNDING) & (moved < NOTICED)).any())
+        moving = self._urdf.actuated_joint_names
+        own, moved = np.array([gaps[name] for name in moving]), np.abs(q[:, self._order])
+        left = np.minimum(moved, np.abs(moved - own))[:, own < NEAR]  # a slide may take back its origin
+        still = [gap for name, gap in gaps.items() if name not in moving]
+        return any(ROUNDING < gap < NOTICED for gap in still) or bool(((left > ROUNDING) & (left < NOTICED)).any())
