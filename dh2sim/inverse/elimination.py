@@ -14,7 +14,17 @@ from typing import Protocol
 
 import numpy as np
 
-from dh2sim.inverse.loop import Arm, Candidates, Flags, Indices, Loop, close_loop, inverse_poses, pose_and_jacobian
+from dh2sim.inverse.loop import (
+    Arm,
+    Candidates,
+    Flags,
+    Indices,
+    Loop,
+    close_loop,
+    inverse_poses,
+    pose_and_jacobian,
+    pose_error,
+)
 from dh2sim.inverse.pencil import build_pencil
 from dh2sim.inverse.polish import polish
 from dh2sim.inverse.slides import OppositeSlides, ThreeSlides
@@ -107,6 +117,8 @@ class Method:
             T: Poses, positions in units of the arm's length, shape (N, 4, 4).
             locked: Coordinates of the locked joints in the arm's units, by index, each of shape (N,) or (1,).
         """
+        if not self.moving.any():
+            return self._held(T, locked)
         blocks = []
         for start in range(0, len(T), _BLOCK):
             block = slice(start, start + _BLOCK)
@@ -114,6 +126,13 @@ class Method:
             found = self._solve_block(T[block], values)
             blocks.append(Found(pose=found.pose + start, q=found.q, sigma=found.sigma))
         return _joined(blocks, self.arm.n)
+
+    def _held(self, T: Array, locked: Mapping[int, Array]) -> Found:
+        """Return the configuration in which all joints are locked, for the poses that it reaches."""
+        q = np.stack([np.broadcast_to(locked[joint], (len(T),)) for joint in range(self.arm.n)], axis=1)
+        error = np.linalg.norm(pose_error(pose_and_jacobian(self.arm, q)[0], T), axis=1)
+        (reached,) = np.nonzero(error < REACHED)
+        return Found(pose=reached, q=q[reached], sigma=np.ones(len(reached)))
 
     def _solve_block(self, T: Array, locked: Mapping[int, Array]) -> Found:
         found = self.solve_by(self.eliminations[0], T, locked) if self.eliminations else _joined([], self.arm.n)
@@ -143,7 +162,9 @@ class Method:
         """
         regular = np.bincount(found.pose[found.sigma > _DOUBTFUL], minlength=poses)
         all_of_them = np.bincount(found.pose, minlength=poses)
-        return np.asarray((regular % 2 == 1) & (regular == all_of_them) & (not self.virtual))
+        return np.asarray(
+            (regular % 2 == 1) & (regular == all_of_them) & (bool(self.eliminations) and not self.virtual)
+        )
 
     def _ill(self, again: Indices, found: Found, T: Array, locked: Mapping[int, Array]) -> Indices:
         """Return doubtful poses, without those that are well-conditioned and have no solution: out of reach."""
@@ -214,6 +235,8 @@ def choose_method(arm: Arm, moving: Flags, ranges: Array) -> Method:
         moving: Which joints are not locked, bool, shape (n,): at most six.
         ranges: Where trial configurations are drawn from, in the arm's units, shape (n, 2).
     """
+    if not moving.any():
+        return Method(arm=arm, moving=moving, ranges=ranges, virtual=(), eliminations=(), found_share=1.0)
     rng = np.random.default_rng(_SEED)
     missing = 6 - int(moving.sum())
     q = rng.uniform(ranges[:, 0], ranges[:, 1], (2 * TRIALS, arm.n))

@@ -13,6 +13,7 @@ from dh2sim.errors import ConfigurationError
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.solver import InverseSolver
 from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.spec import JointType, RobotSpec, Row
 from dh2sim.typing import Array
 from tests.sample_robots import robot
 
@@ -87,3 +88,17 @@ def test_one_pose_has_its_solutions_and_many_poses_a_list() -> None:
 def test_a_pose_that_is_no_rigid_transform_is_refused() -> None:
     with pytest.raises(ConfigurationError, match="must be a pose"):
         solver("scara").solve(2.0 * np.eye(4))
+
+
+def test_with_all_joints_locked_the_pose_is_reached_or_not() -> None:
+    T = table_tool_pose(robot("planar_2r"), np.array([0.2, 0.4]))
+    reached = solver("planar_2r").solve(T, lock={"joint_1": 0.2, "joint_2": 0.4})
+    assert np.allclose(reached.q, [[0.2, 0.4]])
+    missed = solver("planar_2r").solve(T, lock={"joint_1": 0.2, "joint_2": 0.5})
+    assert len(missed) == 0
+    assert "locked" in missed.reason
+
+
+def test_a_robot_without_joints_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match="still has no joint that moves"):
+        InverseSolver(RobotSpec(name="still", rows=(Row(type=JointType.FIXED, a=0.3),)))
