@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dh2sim.cli.common import DONE, FELL_SHORT, MANY, RobotArgument, complain, load_all
+from dh2sim.cli.output import json_text
 from dh2sim.errors import ConfigurationError, Dh2simError, SettingsError
 from dh2sim.messages import did_you_mean, listed, shown
 
@@ -103,7 +103,7 @@ def ik(
     solutions = _solved(asked, limits=not no_limits, numeric=numeric)
     explanation = _explained(asked) if explain else []
     if as_json:
-        print(json.dumps(_as_json(asked, solutions, explanation)))
+        print(json_text(_as_json(asked, solutions, explanation), indent=None))
     else:
         from dh2sim.cli.solutions import print_solutions
 
