@@ -38,6 +38,7 @@ _HOMES = {
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
     "convert_robot": "importing.convert",
+    "draw_robot": "draw.diagram.drawing",
     "explain_inverse_kinematics": "inverse.textbook",
     "find_slips": "model.slips",
     "forward_kinematics": "kinematics.forward",
@@ -61,6 +62,7 @@ __all__ = [*_HOMES]
 
 if TYPE_CHECKING:
     from dh2sim.codegen.generate import generate_code as generate_code
+    from dh2sim.draw.diagram.drawing import draw_robot as draw_robot
     from dh2sim.errors import Dh2simError as Dh2simError
     from dh2sim.errors import RobotError as RobotError
     from dh2sim.errors import RobotFileError as RobotFileError

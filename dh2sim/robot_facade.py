@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from dh2sim.codegen.languages import Language
+    from dh2sim.draw.diagram.drawing import DrawingStyle, RobotDrawing
     from dh2sim.export import ExportReport, Format
     from dh2sim.importing.sources import ImportOptions
     from dh2sim.inverse.goals import Free
@@ -721,6 +722,34 @@ class Robot:
         )
         with atomic_file(file) as draft:
             draft.write_text(text, encoding="utf-8")
+
+    def draw(
+        self,
+        q: ArrayLike | str | None = None,
+        *,
+        style: DrawingStyle | str = "kinematic",
+        workspace: Sequence[float] | None = None,
+        reach: float | None = None,
+    ) -> RobotDrawing:
+        """Draw the robot as textbooks do; a notebook shows the drawing.
+
+        Args:
+            q: Joint vector, rad and m, or the name of a configuration; by default home.
+            style: 'kinematic': joints as cylinders and boxes, axes, frames and lengths; 'frames': all axes of the
+                frames; 'stick': a stick plot in the box of the workspace, with base line and shadow.
+            workspace: Of a stick plot: least and greatest x, y and z, m; by default a cube around the arm.
+            reach: Of a stick plot: length that joints and axes are measured by, m; by default the arm's.
+
+        Returns:
+            The drawing: ``svg`` and ``tikz`` are texts, ``save("arm.pdf")`` writes a file.
+
+        Raises:
+            PictureError: The style is unknown, or the workspace is no box.
+            ConfigurationError: ``q`` is no joint vector or configuration of the robot.
+        """
+        from dh2sim.draw.diagram.drawing import draw_robot
+
+        return draw_robot(self, q, style=style, workspace=workspace, reach=reach)
 
     def view(
         self, *, host: str = "127.0.0.1", port: int = 8080, browser: bool = True, allow_hosts: Iterable[str] = ()

@@ -16,6 +16,7 @@ import pytest
 
 import dh2sim
 from dh2sim import Continuous, Fixed, Pose, Prismatic, Revolute, Robot
+from dh2sim.draw.diagram.drawing import draw_robot
 from dh2sim.errors import ConfigurationError, Dh2simError, OutputError, UnknownFrameError
 from dh2sim.kinematics.singularity import manipulability, singular_values
 from dh2sim.robot.spec import Convention, JointType
@@ -371,6 +372,12 @@ def test_a_notebook_is_offered_the_table_as_latex() -> None:
     lines = MIXED._repr_latex_().splitlines()[1:-1]
     assert {line.count("&") for line in lines} == {6}
     assert lines[2] == r"1 & \text{standard} & 0.1 & 37.2996 &  & 0 & 90 - \theta_{1}^{*} \\"
+
+
+def test_a_robot_is_drawn(arm: Robot) -> None:
+    drawing = arm.draw("zero", style="stick", workspace=(-1, 1, -1, 1, -1, 1), reach=0.5)
+    assert drawing.svg == draw_robot(arm.spec, "zero", style="stick", workspace=(-1, 1, -1, 1, -1, 1), reach=0.5).svg
+    assert arm.draw().svg == draw_robot(arm, "home", style="kinematic").svg
 
 
 def test_a_viewer_is_started_and_returned(arm: Robot) -> None:

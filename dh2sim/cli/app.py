@@ -42,6 +42,13 @@ COMMANDS: Final = {
     "frames": Command("importing", "frames", "Assign DH frames to joint axes, step by step."),
     "rollout": Command("rollout", "rollout", "Simulate many rollouts into a dataset."),
     "render": Command("pictures", "render", "Render a rollout as a video, or a robot as an image."),
+    "draw": Command(
+        "draw",
+        "draw",
+        "Draw a robot as textbooks do, as SVG, TikZ, PNG or PDF.",
+        NEGATIVE_NUMBERS,
+        many=("--workspace",),
+    ),
     "plot": Command("pictures", "plot", "Plot joints, tool, energy or tracking."),
     "runs": Command("runs", "runs", "Describe a run, or convert it to Parquet or HDF5."),
     "list": Command("robots", "list_robots", "List the robots that come with dh2sim."),

@@ -34,6 +34,7 @@ COMMANDS = (
     "frames",
     "rollout",
     "render",
+    "draw",
     "plot",
     "runs",
     "list",

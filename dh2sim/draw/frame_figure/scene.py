@@ -97,8 +97,8 @@ def make_scene(imported: Imported) -> Scene:
         spec=placed.spec,
         segments=segments,
         axes=tuple(_axes(placed, segments, least)),
-        pointers=tuple(_pointers(placed, least)),
-        origins=tuple(_distinct([T[:3, 3] for T in placed.frames], least)),
+        pointers=tuple(pointers_of(placed.frames, least)),
+        origins=tuple(distinct([T[:3, 3] for T in placed.frames], least)),
         tip=placed.T_base_tip[:3, 3],
         last_origin=placed.frames[-1][:3, 3],
         extended=tuple((i, float(value)) for i, value in enumerate(q, start=1) if value != 0.0),
@@ -166,10 +166,11 @@ def _middle(placed: PlacedFrames, joint: int, point: Array, direction: Array) ->
     return round(float(sum((end - point) @ direction for end in ends)) / placed.reach, 5)
 
 
-def _pointers(placed: PlacedFrames, least: float) -> Iterator[Pointer]:
+def pointers_of(frames: Array, least: float) -> Iterator[Pointer]:
+    """Yield the axes of frames, shape (count, 4, 4); those that coincide within ``least``, m, are one."""
     found: list[tuple[str, Array, Array, list[int]]] = []
     for column, letter in enumerate("xyz"):
-        for index, T in enumerate(placed.frames):
+        for index, T in enumerate(frames):
             for other, origin, direction, indices in found:
                 if (
                     other == letter
@@ -184,7 +185,8 @@ def _pointers(placed: PlacedFrames, least: float) -> Iterator[Pointer]:
         yield Pointer(letter=letter, indices=tuple(indices), origin=origin, direction=direction)
 
 
-def _distinct(points: Sequence[Array], least: float) -> list[Array]:
+def distinct(points: Sequence[Array], least: float) -> list[Array]:
+    """Return points without those that are within ``least`` of an earlier one."""
     kept: list[Array] = []
     for point in points:
         if all(np.linalg.norm(point - other) > least for other in kept):
