@@ -6,6 +6,7 @@ import itertools
 import math
 import shutil
 import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from dh2sim.errors import ConfigurationError, PictureError
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.robot.spec import Convention, JointType, RobotSpec
 from dh2sim.typing import Array
-from tests.program import dh2sim
+from tests.program import dh2sim, environment
 from tests.sample_robots import COSTLY_NAMES, robot
 from tests.strategies import robots_with_joint_vectors
 
@@ -269,3 +270,21 @@ def test_the_pictures_of_the_page_are_what_the_command_draws() -> None:
     for name, drawing in drawings().items():
         assert (FOLDER / name).read_text(encoding="utf-8") == drawing.svg, "run python scripts/draw_robots.py"
         assert f"images/{name}" in (FOLDER.parent / "drawings.md").read_text(encoding="utf-8")
+
+
+def test_only_png_and_pdf_need_matplotlib(tmp_path: Path) -> None:
+    code = "import sys; sys.modules['matplotlib'] = None; from dh2sim.cli.main import main; main()"
+
+    def run(*options: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-c", code, "draw", "scara", *options],
+            cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=60, check=False,
+        )  # fmt: skip
+
+    for ending in ("svg", "tex"):
+        done = run("-o", f"a.{ending}")
+        assert (done.returncode, done.stderr) == (0, "")
+    done = run("-o", "a.png")
+    message = "dh2sim: a drawing as PNG needs the extra 'plot': pip install 'dh2sim[plot]'\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", message)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.svg", "a.tex"]
