@@ -9,7 +9,9 @@ Planning and Control, 2009, section 3.3).
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -50,13 +52,12 @@ def geometric_jacobian_matrix(
     """
     position = [row[3] for row in table.pose(source, target, fold=fold)[:3]]
     forward = table.frames[source] <= table.frames[target]
-    first, last = sorted((table.frames[source], table.frames[target]))
     columns = []
-    for i in table.moving:
+    for i, moves in zip(table.moving, moving_between(table, source, target), strict=True):
         row = table.spec.rows[i - 1]
         linear = [entry.derivative(partial(derivative_by, i)) for entry in position]
         angular = [ZERO, ZERO, ZERO]
-        if row.type.turns and first < table.frames[f"link_{i}"] <= last:
+        if row.type.turns and moves:
             sign = (-1 if row.flip else 1) * (1 if forward else -1)
             turns = [motion for motion in table.path(source, f"link_{i}") if motion.kind != "T"]
             axis = transform(turns, fold)
@@ -77,6 +78,12 @@ class Determinant:
     """Atoms come first; empty, with number 0, where the determinant is zero everywhere."""
 
 
+def moving_between(table: SymbolicTable, source: str, target: str) -> list[bool]:
+    """Return for each coordinate whether it moves one frame in the other."""
+    first, last = sorted((table.frames[source], table.frames[target]))
+    return [first < table.frames[f"link_{i}"] <= last for i in table.moving]
+
+
 def square_rows(J: Matrix) -> tuple[int, ...] | None:
     """Return rows that make a Jacobian square: all that are not zero, the linear or the angular ones; else None."""
     n = len(J[0])
@@ -93,20 +100,27 @@ def _vanishes(square: Matrix) -> bool:
 
 
 def factored_determinant(
-    table: SymbolicTable, J: Matrix, rows: tuple[int, ...], configurations: SampledConfigurations, *, fold: Fold
+    table: SymbolicTable,
+    J: Matrix,
+    rows: tuple[int, ...],
+    moves: Sequence[bool],
+    configurations: SampledConfigurations,
+    *,
+    fold: Fold,
 ) -> Determinant | None:
     """Return the determinant of a square Jacobian up to its sign; None where it has no readable factors.
 
     Args:
         table: The robot.
-        J: The Jacobian of a frame behind all joints in one before them.
+        J: The Jacobian, with the columns of the coordinates that move its frame.
         rows: Those of ``J`` that are taken.
+        moves: For each coordinate of the robot, whether it has a column.
         configurations: Random ones, at which zeros are looked for.
         fold: Across which axes angles are added up.
     """
     squares = [[J[i] for i in rows]]
     if len(rows) == 6:
-        squares = [_in_frame(table, *choice, fold) for choice in _promising(table, configurations)]
+        squares = [_in_frame(table, *choice, moves, fold) for choice in _promising(table, moves, configurations)]
     best: Determinant | None = None
     for square in squares:
         found = _determinant(square)
@@ -121,12 +135,14 @@ def _cost(determinant: Determinant) -> tuple[int, int]:
     return sum(len(factor.terms) for factor in determinant.factors), -len(determinant.factors)
 
 
-def _promising(table: SymbolicTable, configurations: SampledConfigurations) -> list[tuple[str, str]]:
+def _promising(
+    table: SymbolicTable, moves: Sequence[bool], configurations: SampledConfigurations
+) -> list[tuple[str, str]]:
     """Return frames and points for which the Jacobian falls into the smallest blocks, going by numbers."""
     n = len(table.spec.rows)
 
     def difficulty(choice: tuple[str, str]) -> tuple[int, int, int]:
-        J = np.abs(configurations.jacobian(*choice)).max(axis=0)
+        J = np.abs(configurations.jacobian(*choice)).max(axis=0)[:, moves]
         pattern = _ZERO * J.max() < J
         sizes = [len(rows) for rows, _ in _blocks(pattern) or []]
         return max(sizes, default=0), sum(size**4 for size in sizes), int(pattern.sum())
@@ -138,10 +154,10 @@ def _promising(table: SymbolicTable, configurations: SampledConfigurations) -> l
     return [choice for choice in best if hardness[choice][0] <= _LARGEST_BLOCK]
 
 
-def _in_frame(table: SymbolicTable, frame: str, point: str, fold: Fold) -> Matrix:
+def _in_frame(table: SymbolicTable, frame: str, point: str, moves: Sequence[bool], fold: Fold) -> Matrix:
     """Return the Jacobian in the axes of ``frame``, of the origin of ``point`` as a point of the last body."""
     columns = []
-    for i in table.moving:
+    for i in itertools.compress(table.moving, moves):
         row = table.spec.rows[i - 1]
         link = f"link_{i}"
         R = table.pose(frame, link, fold=fold)

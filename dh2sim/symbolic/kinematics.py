@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
+from dh2sim.errors import Dh2simError
 from dh2sim.symbolic.check import SampledConfigurations, check_form
 from dh2sim.symbolic.expression import Factor, Lengths, Nesting, Style, Sum, Term, evaluated
 from dh2sim.symbolic.form import Condition, Equation, Form, equation, with_names
@@ -14,6 +16,7 @@ from dh2sim.symbolic.jacobian import (
     Determinant,
     factored_determinant,
     geometric_jacobian_matrix,
+    moving_between,
     singularities,
     square_rows,
 )
@@ -128,8 +131,8 @@ def jacobian_form(
 ) -> Form:
     """Return the geometric Jacobian of a frame in another one, and its determinant in factors.
 
-    The determinant is given for a square Jacobian; for fewer than six joints that of the rows that are not zero, of
-    the linear rows or of the angular ones, if they make it square.
+    The determinant is that of the joints that move the frame. If they are fewer than six, it is that of the rows that
+    are not zero, of the linear rows or of the angular ones, if they make it square.
 
     Args:
         table: The robot.
@@ -144,12 +147,14 @@ def jacobian_form(
     Raises:
         UnknownFrameError: There is no such frame.
         MismatchError: It differs from the table's oracle.
+        Dh2simError: No row moves.
     """
+    if not table.moving:
+        raise Dh2simError(f"{table.spec.name}: has no joint that moves, and so no Jacobian")
     configurations = SampledConfigurations(table)
     J = geometric_jacobian_matrix(table, source, target, fold=fold)
     numbers = configurations.jacobian(source, target)
-    within = sorted((table.frames[source], table.frames[target]))
-    moves = [within[0] < table.frames[f"link_{i}"] <= within[1] for i in table.moving]
+    moves = moving_between(table, source, target)
     forward = table.frames[source] <= table.frames[target]
     numbers = numbers * np.array(moves, dtype=np.float64) * (1.0 if forward else -1.0)
     nesting = Nesting([entry for row in J for entry in row], style, lengths)
@@ -168,13 +173,14 @@ def jacobian_form(
     scales: dict[str, Array | float] = {"J": np.array([[length]] * 3 + [[1.0]] * 3)}
     conditions: tuple[Condition, ...] = ()
     notes: tuple[str, ...] = ()
-    rows = square_rows(J)
-    if rows is not None and table.frames[source] < table.frames[target]:
-        found = factored_determinant(table, J, rows, configurations, fold=fold)
+    own = [list(itertools.compress(row, moves)) for row in J]
+    rows = square_rows(own)
+    if rows is not None:
+        found = factored_determinant(table, own, rows, moves, configurations, fold=fold)
         if found is None:
             notes = ("The determinant has no factors that its structure shows; it is left out.",)
         else:
-            determinant = np.linalg.det(numbers[:, list(rows), :])
+            determinant = np.linalg.det(numbers[:, list(rows)][:, :, moves])
             term = _signed(found, nesting, determinant, configurations)
             of = "" if len(rows) == 6 else "(" + ", ".join(VELOCITIES[i] for i in rows) + ")"
             equations = (*equations, Equation(name=f"det J{of}", entries=((Sum((term,) if term.number else ()),),)))
@@ -187,6 +193,8 @@ def jacobian_form(
             )
             if not term.number:
                 notes = ("The Jacobian is singular at all configurations.",)
+        if not all(moves):
+            notes = (*notes, f"The determinant is that of the joints between {source} and {target}.")
     form = Form(
         what="jacobian",
         table=table,

@@ -18,6 +18,8 @@ from dh2sim.symbolic.table import Letter, SymbolicTable
 WIDTH: Final = 80
 _TALLEST: Final = 4
 """Lines that a row of a matrix may take in columns."""
+_FACTORS: Final = re.compile(r"(?:(?:cos|sin)\([^()]*\)|\*\*|[^*])+\*?")
+"""Factors of a term, with the signs behind them; cosines of constants are whole."""
 
 
 class TextNotation:
@@ -47,7 +49,7 @@ class TextNotation:
         if trig is None:
             return atom
         if trig.angle.is_constant:
-            return f"{trig.function}({self.angle(trig.angle)})"
+            return f"{trig.function}({self.angle(trig.angle).replace(' ', '')})"
         return self.short(trig.function[0], trig.angle)
 
     def short(self, letter: str, angle: Angle) -> str:
@@ -248,7 +250,7 @@ def _filled_cell(text: str, width: int) -> list[str]:
 
 def _cut(term: str, width: int) -> list[str]:
     lines = [""]
-    for factor in re.split(r"(?<=[^*]\*)(?!\*)", term):
+    for factor in _FACTORS.findall(term):
         if lines[-1] and len(lines[-1]) + len(factor) > width:
             lines.append("")
         lines[-1] += factor
@@ -268,12 +270,15 @@ def _wrapped(head: str, text: str, width: int, indent: str = "  ") -> Iterator[s
 
 
 def _listed(items: Sequence[str], width: int) -> Iterator[str]:
-    """Yield items in lines, separated by commas and broken between them where that is possible."""
+    """Yield items in lines, separated by commas and broken between them; what is longer than a line is wrapped."""
     line = ""
     for item in items:
         if line and len(line) + len(item) + 3 > width:
             yield line + ","
             line = ""
+        if len(item) >= width:
+            *whole, item = textwrap.wrap(item, width - 1, subsequent_indent="  ", break_on_hyphens=False)
+            yield from whole
         line += f", {item}" if line else item
     if line:
         yield line

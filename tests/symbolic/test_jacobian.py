@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -10,9 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import frame_pose, geometric_jacobian
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import JointType, RobotSpec
 from dh2sim.symbolic.check import SampledConfigurations, check_form
 from dh2sim.symbolic.expression import evaluated
 from dh2sim.symbolic.request import symbolic_form
@@ -45,8 +47,9 @@ def test_determinant_of_every_six_axis_arm_has_factors_equal_to_that_of_the_chai
     assert len(determinant.flat[0].terms) == 1
 
 
-def lines(spec: RobotSpec, what: str = "jacobian") -> list[str]:
-    return [" ".join(line.split()) for line in str(symbolic_form(spec, what)).splitlines()]
+def lines(spec: RobotSpec, source: str = "base_link", target: str = "tool0") -> list[str]:
+    text = str(symbolic_form(spec, "jacobian", source=source, target=target))
+    return [" ".join(line.split()) for line in text.splitlines()]
 
 
 def test_determinant_of_the_puma_is_elbow_shoulder_and_wrist() -> None:
@@ -55,6 +58,36 @@ def test_determinant_of_the_puma_is_elbow_shoulder_and_wrist() -> None:
     assert "s5 = 0 (wrist): theta_5 = 0° or 180°" in text
     assert "a3*s3 + d4*c3 = 0 (elbow): theta_3 = -87.3084° or 92.6916°" in text
     assert "a2*c2 + a3*c23 - d4*s23 = 0 (shoulder)" in text
+
+
+def test_determinant_of_part_of_an_arm_is_that_of_its_own_joints() -> None:
+    text = lines(spec_of("stanford"), source="dh_0", target="dh_3")
+    assert "det J(vx, vy, vz) = -d3^2*s2" in text
+    assert "The determinant is that of the joints between dh_0 and dh_3." in text
+    assert "det J(wx, wy, wz) = -s5" in lines(spec_of("puma560"), source="dh_3", target="dh_6")
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "cylindrical_wrist"])
+def test_jacobian_between_any_two_frames_equals_the_table(name: str) -> None:
+    frames = ["base_link", "dh_1", "dh_2", "dh_4", "tool0"]
+    for source, target in itertools.product(frames, frames):
+        assert symbolic_form(spec_of(name), "jacobian", source=source, target=target).form.error <= 1e-13
+
+
+def test_six_of_seven_joints_have_a_determinant_forwards_and_backwards() -> None:
+    spec = spec_of("franka_panda")
+    configurations = SampledConfigurations(symbolic_form(spec, "jacobian").form.table, seed=5)
+    numbers = np.abs(np.linalg.det(configurations.jacobian("dh_0", "dh_6")[:, :, :6]))
+    for frames in (("dh_0", "dh_6"), ("dh_6", "dh_0")):
+        form = symbolic_form(spec, "jacobian", source=frames[0], target=frames[1]).form
+        values = configurations.values(form.atoms)
+        [found] = evaluated(form.equations[1].flat, form.named, values)
+        np.testing.assert_allclose(np.abs(found), numbers, atol=1e-13)
+
+
+def test_robot_without_a_joint_that_moves_has_no_jacobian() -> None:
+    with pytest.raises(Dh2simError, match="has no joint that moves, and so no Jacobian"):
+        symbolic_form(RobotSpec(name="post", rows=(row("a", JointType.FIXED, a=1.0),)), "jacobian")
 
 
 def test_the_angles_of_a_singular_configuration_are_singular() -> None:

@@ -57,6 +57,22 @@ def test_text_of_any_style_fits_a_terminal_of_80_columns(name: str, style: str) 
             assert max(map(len, text.splitlines())) <= 80
 
 
+def test_the_legend_fits_a_terminal_of_80_columns() -> None:
+    text = str(symbolic_form(spec_of("so101"), numbers=True))
+    assert max(map(len, text.splitlines())) <= 80
+    assert "cos(theta_2 + theta_3 + theta_4 + phi_2 + phi_3 + phi_4)" in " ".join(text.split())
+
+
+def test_cosines_of_constants_are_not_broken_between_lines() -> None:
+    file = """{name: x, convention: standard, units: {angle: deg}, parameters: {elbow: 7},
+      base: {rpy: [elbow*3, elbow*2 + 45, elbow + 30]},
+      joints: [{type: revolute, a: 1, alpha: elbow*2}, {type: revolute, a: 2, theta: elbow}]}"""
+    text = str(symbolic_form(parse_robot(file), style="expanded"))
+    matrix = text[: text.index("elbow = 7")]
+    assert "cos(2*elbow+45°)" in matrix
+    assert all(line.count("(") == line.count(")") for line in matrix.splitlines() if "cos(theta" not in line)
+
+
 def test_sums_stay_in_place_without_names() -> None:
     text = str(symbolic_form(spec_of("puma560"), names=False))
     assert "r11 = c1*(c23*(c4*c5*c6 - s4*s6) - s23*s5*c6) + s1*(c4*s6 + s4*c5*c6)" in text
