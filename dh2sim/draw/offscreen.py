@@ -92,7 +92,7 @@ def _try(backend: str) -> str | None:
     """Render a picture in another process; return why that failed, or None."""
     try:
         done = subprocess.run(
-            [sys.executable, "-c", TRIAL],
+            [sys.executable, "-P", "-c", TRIAL],
             env={**os.environ, "MUJOCO_GL": backend},
             stdin=subprocess.DEVNULL,
             capture_output=True,

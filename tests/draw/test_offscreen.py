@@ -109,3 +109,11 @@ def test_a_choice_that_does_not_work_is_not_replaced_in_silence(folder: Path, ba
 def test_rendering_that_is_switched_off_is_reported(folder: Path) -> None:
     expected = "MUJOCO_GL=off switches rendering off; unset it, or set it to egl or osmesa\n"
     assert run(folder, "-c", PROGRAM, MUJOCO_GL="off").err == expected
+
+
+def test_modules_in_the_current_folder_are_not_run(folder: Path) -> None:
+    """Finding out what renders starts another Python, perhaps in a stranger's checkout."""
+    (folder / "mujoco.py").write_text("import pathlib; pathlib.Path('ran').touch()\n", encoding="utf-8")
+    code = "from dh2sim.draw import offscreen; offscreen._try('egl')"
+    subprocess.run([sys.executable, "-P", "-c", code], cwd=folder, env=environment(), timeout=120, check=True)
+    assert not (folder / "ran").exists()
