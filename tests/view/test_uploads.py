@@ -211,7 +211,11 @@ def test_a_robot_that_would_keep_this_machine_busy_for_long_is_not_built() -> No
     started = time.monotonic()
     assert_refused(
         HEAD + "  - {type: revolute}\n" * 3000,
-        "mine.yaml: the robot has 3000 joints; at most 200 are allowed in an uploaded file",
+        "mine.yaml:4:3: joints: the list has 3000 entries; at most 494 are allowed",
+    )
+    assert_refused(
+        HEAD + "  - {type: revolute}\n" * 300,
+        "mine.yaml: the robot has 300 joints; at most 200 are allowed in an uploaded file",
     )
     assert time.monotonic() - started < 30.0
     many = "".join(f"  c{i}: [0]\n" for i in range(201))
