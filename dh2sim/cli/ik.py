@@ -311,7 +311,7 @@ def _solved(asked: _Asked, *, limits: bool, numeric: bool) -> Solutions:
         return solutions
     # what limits rule out is printed, too
     anywhere: Solutions = solver.solve(asked.T, asked.near, False, asked.lock, asked.free)
-    outside = ~anywhere.within_limits
+    outside = ~anywhere.within_limits & ~np.isin(anywhere.same, solutions.same)
     both: dict[str, Any] = {
         name: np.concatenate([getattr(solutions, name), getattr(anywhere, name)[outside]])
         for name in ("q", "residual", "sigma_min", "within_limits", "same")

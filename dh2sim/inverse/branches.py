@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from dh2sim.inverse.textbook_axes import arm_axes
 from dh2sim.inverse.textbook_forms import TextbookForm, textbook_form
-from dh2sim.kinematics.chain import ChainLike, chain_of, joint_vectors
+from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vectors
 from dh2sim.typing import Array
 
 ABOUT: Final = 0.02
@@ -24,17 +25,27 @@ def branch_names(robot: ChainLike, q: ArrayLike) -> tuple[str, ...]:
         q: Joint vectors, rad and m, shape (k, n).
 
     Returns:
-        k names; '' where the arm is of no class that has them, or its shoulder, elbow and wrist are all singular.
+        k names; '' where the arm is of no class that has them. What is singular is told: ``left, elbow straight``.
 
     Raises:
         ConfigurationError: ``q`` has the wrong shape or is not finite.
     """
     chain = chain_of(robot)
     vectors, _ = joint_vectors(chain, q)
-    form = textbook_form(arm_axes(chain, ABOUT))
-    if isinstance(form, str):
+    form = _form(chain)
+    if isinstance(form, str) or not len(vectors):
         return ("",) * len(vectors)
-    return tuple(branch_name(form, np.asarray(vector)) for vector in vectors)
+    # those that differ by whole turns have the same name
+    turns = np.array([joint.type.turns for joint in chain.moving_joints])
+    places = np.round(np.where(turns, np.mod(vectors, 2.0 * np.pi), vectors), 9)
+    _, first, which = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    names = [branch_name(form, np.asarray(vector)) for vector in vectors[first]]
+    return tuple(names[i] for i in which.ravel())
+
+
+@lru_cache(maxsize=32)
+def _form(chain: KinematicChain) -> TextbookForm | str:
+    return textbook_form(arm_axes(chain, ABOUT))
 
 
 def branch_name(form: TextbookForm, q: Array) -> str:

@@ -12,6 +12,7 @@ from dh2sim.inverse.goals import Free
 from dh2sim.inverse.numeric import NumericSolver, goal_angles, goal_distances
 from dh2sim.inverse.reach import amount_text, beyond_limits
 from dh2sim.inverse.solutions import Solutions
+from dh2sim.kinematics.chain import ChainLike, chain_of
 from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
@@ -102,18 +103,19 @@ def goal_residuals(spec: RobotSpec, q: Array, T: Array, *, free: Free | None, si
     return np.asarray(np.maximum(goal_distances(found, T) / size, goal_angles(found, T, free)))
 
 
-def goal_sigma_min(spec: RobotSpec, q: Array, *, free: Free | None, size: float, rank: int) -> Array:
+def goal_sigma_min(robot: ChainLike, q: Array, *, free: Free | None, size: float, rank: int) -> Array:
     """Return the least singular values of a goal's Jacobian, lengths in units of ``size``, shape (N,).
 
     Its rows are the velocity of tool0's origin and, as far as the goal asks for it, its angular velocity in tool0.
     ``rank`` is that of a general configuration: further singular values are always zero.
     """
-    J = np.array(geometric_jacobian(spec, q))
+    chain = chain_of(robot)
+    J = np.array(geometric_jacobian(chain, q))
     J[:, :3] /= size
-    J[:, :, [i for i, row in enumerate(spec.moving_rows) if not row.type.turns]] *= size
+    J[:, :, [i for i, joint in enumerate(chain.moving_joints) if not joint.type.turns]] *= size
     if free == "rotation":
         J = J[:, :3]
     elif free == "roll":
-        axes = np.swapaxes(forward_kinematics(spec, q)[:, :3, :2], 1, 2)
+        axes = np.swapaxes(forward_kinematics(chain, q)[:, :3, :2], 1, 2)
         J = np.concatenate([J[:, :3], axes @ J[:, 3:]], axis=1)
     return np.asarray(np.linalg.svd(J, compute_uv=False)[:, rank - 1])

@@ -142,7 +142,8 @@ class InverseSolver:
             for i in np.flatnonzero(lacking):
                 results[i] = replace(results[i], complete=False, notes=(*results[i].notes, ODD))
             if paths:
-                results = [self._with_families(results[0], arm, paths, poses[0], near, free, limits=limits)]
+                count = len(found.q)
+                results = [self._with_families(results[0], count, arm, paths, poses[0], near, free, limits=limits)]
         if goals.ndim == 3:
             return results
         [alone] = results
@@ -267,7 +268,7 @@ class InverseSolver:
             none,
             q=read_only(q),
             residual=read_only(goal_residuals(self._spec, q, goals, free=free, size=self.size)),
-            sigma_min=read_only(goal_sigma_min(self._spec, q, free=free, size=self.size, rank=self._rank(free))),
+            sigma_min=read_only(goal_sigma_min(self._chain, q, free=free, size=self.size, rank=self._rank(free))),
             within_limits=self._turns.inside(q),
             same=np.array(same, dtype=np.intp),
             branch=("",) * len(q),
@@ -277,6 +278,7 @@ class InverseSolver:
     def _with_families(
         self,
         isolated: Solutions,
+        count: int,
         arm: Arm,
         paths: list[Path],
         T: Array,
@@ -285,7 +287,7 @@ class InverseSolver:
         *,
         limits: bool,
     ) -> Solutions:
-        """Add families at a singularity to the isolated solutions of a pose."""
+        """Add families at a singularity to the isolated solutions of a pose, of which there are so many in all."""
         families = self._of_paths(no_solutions(len(q0)), arm, paths, T, q0, free, limits=limits)
         if not len(families):
             return isolated if len(isolated) else replace(isolated, reason=isolated.reason or families.reason)
@@ -296,7 +298,7 @@ class InverseSolver:
             joints = f"{', '.join(names)} and {last} move" if names else f"{last} moves"
             notes.append(f"{family_kind(path, len(q0)).capitalize()}: {joints}, tool0 does not.")
         order = np.argsort(self._turns.distance(np.concatenate([isolated.q, families.q]), q0), kind="stable")
-        same = np.concatenate([isolated.same, families.same + isolated.same.max(initial=-1) + 1])[order]
+        same = np.concatenate([isolated.same, families.same + count])[order]
         curves = tuple(replace(curve, kind=kind) for curve, kind in zip(families.curves, kinds, strict=True))
         return replace(
             isolated,
@@ -322,7 +324,7 @@ class InverseSolver:
         if method.arm.goal_joints:
             true &= _first_of_equal(found.pose, q, self._turns)
         found, q, residual = found.of(true), q[true], residual[true]
-        sigma, all_q = goal_sigma_min(self._spec, q, free=free, size=self.size, rank=self._rank(free)), q
+        sigma, all_q = goal_sigma_min(self._chain, q, free=free, size=self.size, rank=self._rank(free)), q
         if limits:
             which, q = self._turns.allowed(q, q0)
         else:

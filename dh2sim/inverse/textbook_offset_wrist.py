@@ -26,6 +26,7 @@ from dh2sim.inverse.textbook_parts import (
     placed_point,
     shoulder_of,
     with_signs,
+    wrist_name,
 )
 from dh2sim.inverse.textbook_steps import METRE, RAD, Signs, Worksheet, number, term
 from dh2sim.typing import Array
@@ -217,11 +218,10 @@ class OffsetWristArm:
         ahead = self.shoulder.rho(float(q[0]), P4)[0] - self.a1
         gamma = self.bend.at_zero + self.bend.sense * float(q[2])
         sine = self.outwards * math.sin(self.tilt.at_zero + self.tilt.sense * float(q[4]))
-        wrist = () if abs(sine) <= 1e-6 else ("no flip",) if sine > 0.0 else ("flip",)
         return (
             *self.shoulder.name(rho),
             *elbow_name(gamma if ahead >= 0.0 else -gamma, ("below", "above")),
-            *wrist,
+            wrist_name(sine),
         )
 
 

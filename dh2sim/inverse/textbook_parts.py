@@ -24,6 +24,8 @@ DOUBLE: Final = 1e-7
 
 MEASURED: Final = "Measured on the mechanism at zero; f is the arm's direction, z up along axis 1."
 
+_STRAIGHT: Final = 1e-6
+"""Sine of a bend, or share of the arm's size, within which it is none: double solutions are known to about 1e-8."""
 UNDETERMINED: Final = 1e-11
 """Share of the arm's size, within which a point is on an axis."""
 
@@ -221,15 +223,15 @@ class Shoulder:
         return float(x * math.cos(angle) + y * math.sin(angle)), float(z)
 
     def name(self, rho: float) -> Iterator[str]:
-        """Yield the shoulder's name where it has one, given the point's coordinate along f, m.
+        """Yield the shoulder's name, given the point's coordinate along f, m.
 
         Seen from the base towards the point: the arm beside axis 1 is its left or right one. Where the plane holds
         axis 1, the arm reaches to its front or over its back, if joint 2 is before the axis; else axis 2 points
         left or right.
         """
-        if abs(rho) <= self.tolerance:
-            return
-        if abs(self.offset) > self.tolerance:
+        if abs(rho) <= _STRAIGHT * self.size:
+            yield "shoulder singular"
+        elif abs(self.offset) > self.tolerance:
             yield "left" if rho * self.offset > 0.0 else "right"
         elif abs(self.front) > self.tolerance:
             yield "front" if rho * self.front > 0.0 else "back"
@@ -300,9 +302,16 @@ def first_link_angle(
 
 
 def elbow_name(bend: float, names: tuple[str, str]) -> Iterator[str]:
-    """Yield the name of a bend, rad, for its positive and negative side; nothing where it is straight or folded."""
-    if abs(math.sin(bend)) > 1e-6:
+    """Yield the name of a bend, rad, for its positive and negative side, or that it is straight or folded."""
+    if abs(math.sin(bend)) > _STRAIGHT:
         yield names[0] if math.sin(bend) > 0.0 else names[1]
+    else:
+        yield "elbow straight" if math.cos(bend) > 0.0 else "elbow folded"
+
+
+def wrist_name(sine: float) -> str:
+    """Return the name of a wrist's branch, given the sine of its bend from where it is stretched."""
+    return "wrist singular" if abs(sine) <= _STRAIGHT else "no flip" if sine > 0.0 else "flip"
 
 
 def shoulder_of(axes: ArmAxes, W0: Array) -> tuple[Shoulder, Array, Array, Array]:

@@ -14,7 +14,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from dh2sim.inverse.textbook_axes import ArmAxes, rotation, turn_about
-from dh2sim.inverse.textbook_parts import FromAngle, PartialBranch, from_angle, with_signs
+from dh2sim.inverse.textbook_parts import FromAngle, PartialBranch, from_angle, with_signs, wrist_name
 from dh2sim.inverse.textbook_steps import RAD, Signs, Worksheet, number
 from dh2sim.typing import Array
 
@@ -116,7 +116,7 @@ class SphericalWrist(Wrist):
     def names(self, q: Array) -> tuple[str, ...]:
         """Return the names of a configuration's branch: which way the middle joint bends the stretched wrist."""
         sine = self.outwards * math.sin(self.bend.at_zero + float(q[self.first + 1]))
-        return () if abs(sine) <= 1e-6 else ("no flip",) if sine > 0.0 else ("flip",)
+        return (wrist_name(sine),)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -350,6 +350,15 @@ def test_at_a_singular_pose_the_given_joint_vector_comes_first() -> None:
     assert_reached(answer, "puma560")
 
 
+def test_what_exceeds_limits_is_printed_at_a_singular_pose_too() -> None:
+    goal = ("puma560", "--at", "10 20 30 40 0 60")
+    branches = [solution["branch"] for solution in found(*goal)["solutions"]]
+    anywhere = [solution["branch"] for solution in found(*goal, "--no-limits")["solutions"]]
+    assert set(branches) == set(anywhere)
+    assert len(anywhere) == 7
+    assert "left, below, flip" in branches
+
+
 def test_a_file_that_is_not_there_is_reported_beside_wrong_options() -> None:
     assert dh2sim("ik", "stanford", "--pose", "missing.json", "--free", "x") == Outcome(
         status=2,

@@ -51,9 +51,25 @@ def test_an_elbow_at_the_left_of_the_line_from_base_to_tool_is_a_left_scara() ->
     assert branch_names(robot("scara"), [[0.3, -0.7, 0.1, 0.0], [0.3, 0.7, 0.1, 0.0]]) == ("left", "right")
 
 
-def test_where_nothing_is_decided_no_name_is_given() -> None:
-    assert branch_names(robot("scara"), [[0.3, 0.0, 0.1, 0.0]]) == ("",)
+def test_an_arm_that_textbooks_do_not_name_has_no_names() -> None:
     assert branch_names(ODD_ROBOT, np.zeros((2, 5))) == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("name", "q", "words"),
+    [
+        ("scara", [0.3, 0.0, 0.1, 0.0], "elbow straight"),
+        ("scara", [0.3, np.pi, 0.1, 0.0], "elbow folded"),
+        ("planar_2r", [0.3, 0.0], "elbow straight"),
+        ("puma560", [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], "left, above, wrist singular"),
+        ("puma560", [0.0, 0.0, -np.arctan2(0.4318, 0.0203), 0.0, 0.5, 0.0], "left, elbow straight, no flip"),
+        ("ur5e", [0.0, -1.0, 0.0, -1.0, 0.0, 0.0], "left, elbow straight, wrist singular"),
+        ("stanford", [0.3, 0.2, 0.3, 0.4, 0.0, 0.5], "left, slide out, wrist singular"),
+        ("stanford", [0.3, 0.0, 0.3, 0.4, 0.5, 0.5], "shoulder singular, slide out, no flip"),
+    ],
+)
+def test_what_is_singular_is_told(name: str, q: list[float], words: str) -> None:
+    assert branch_names(robot(name), [q]) == (words,)
 
 
 def test_a_calibrated_arm_has_the_names_of_its_class() -> None:
