@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple, TypeAlias
 
 from dh2sim.symbolic.angles import rate_row, slide_row, trig_of
@@ -98,9 +98,20 @@ class Nesting:
     """Collects polynomials in one style; the order of atoms is that of all of them together."""
 
     def __init__(
-        self, polynomials: Iterable[Polynomial], style: Style = Style.BASE, lengths: Lengths | None = None
+        self,
+        polynomials: Iterable[Polynomial],
+        style: Style = Style.BASE,
+        lengths: Lengths | None = None,
+        outermost: Sequence[Sequence[Atom]] = (),
     ) -> None:
-        """``lengths`` is by default that of the style."""
+        """Find the order of atoms.
+
+        Args:
+            polynomials: All that will be collected.
+            style: Their nesting.
+            lengths: Where lengths are; by default as the style has them.
+            outermost: Cosines and sines of constant angles that go before those of all coordinates, angle by angle.
+        """
         atoms = {atom for polynomial in polynomials for atom in polynomial.atoms}
         by_angle: dict[Any, list[Atom]] = {}
         for atom in sorted(atoms):
@@ -109,7 +120,8 @@ class Nesting:
                 by_angle.setdefault(_place(atom), []).append(atom)
         groups = [by_angle[place] for place in sorted(by_angle)]
         order = {Style.BASE: groups, Style.TOOL: groups[::-1], Style.EXPANDED: []}
-        self._groups: Sequence[Sequence[Atom]] = order[style]
+        before = [] if style is Style.EXPANDED else outermost
+        self._groups: Sequence[Sequence[Atom]] = [*before, *order[style]]
         self._lengths = lengths or (Lengths.FIRST if style is Style.TOOL else Lengths.LAST)
 
     def __call__(self, polynomial: Polynomial) -> Sum:
@@ -159,8 +171,8 @@ def _by(polynomial: Polynomial, chosen: Any) -> list[tuple[Monomial, Polynomial]
     """Split a polynomial by the monomials of chosen atoms; what has none of them comes last."""
     parts: dict[Monomial, dict[Monomial, Rational]] = {}
     for monomial, number in polynomial.terms.items():
-        outside = tuple(pair for pair in monomial if chosen(pair[0]))
-        inside = tuple(pair for pair in monomial if not chosen(pair[0]))
+        outside = tuple([pair for pair in monomial if chosen(pair[0])])
+        inside = tuple([pair for pair in monomial if pair not in outside]) if outside else monomial
         parts.setdefault(outside, {})[inside] = number
     order = sorted(parts, key=lambda monomial: (not monomial, [(_atom_order(a), p) for a, p in monomial]))
     return [(monomial, Polynomial(parts[monomial])) for monomial in order]
@@ -228,6 +240,7 @@ def _place(atom: Atom) -> Any:
     return (trig.angle.coordinates, trig.angle.names, trig.angle.degrees)
 
 
+@lru_cache(maxsize=4096)
 def _atom_order(atom: Atom) -> tuple[Any, ...]:
     """Order atoms of a product: roots, letters, named cosines, slides, then cosines and sines by row."""
     if atom in ROOTS:

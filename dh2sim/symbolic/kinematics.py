@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from dh2sim.symbolic.jacobian import (
     singularities,
     square_rows,
 )
-from dh2sim.symbolic.polynomial import Matrix, identity
+from dh2sim.symbolic.polynomial import Atom, Matrix, identity
 from dh2sim.symbolic.table import Fold, SymbolicTable, transform
 from dh2sim.typing import Array
 
@@ -62,7 +63,8 @@ def pose_form(
     """
     matrix = table.pose(source, target, fold=fold)
     meaning = f"pose of {target} in {source}"
-    pose = _pose_equation(_name(table, source, target), matrix, style, lengths, meaning)
+    outermost = table.outermost(source, target, from_tool=style is Style.TOOL)
+    pose = _pose_equation(_name(table, source, target), matrix, style, lengths, outermost, meaning)
     equations, named = with_names([pose], names=names)
     form = Form(what="pose", table=table, equations=equations, named=named, joint_names=joint_names)
     configurations = SampledConfigurations(table)
@@ -97,7 +99,8 @@ def matrices_form(
 
     def add(name: str, source: str, target: str, meaning: str) -> None:
         matrix = table.pose(source, target, fold=fold)
-        equations.append(_pose_equation(name, matrix, style, lengths, meaning))
+        outermost = table.outermost(source, target, from_tool=style is Style.TOOL)
+        equations.append(_pose_equation(name, matrix, style, lengths, outermost, meaning))
         expected[name] = configurations.pose(source, target)
 
     n = len(table.spec.rows)
@@ -157,7 +160,8 @@ def jacobian_form(
     moves = moving_between(table, source, target)
     forward = table.frames[source] <= table.frames[target]
     numbers = numbers * np.array(moves, dtype=np.float64) * (1.0 if forward else -1.0)
-    nesting = Nesting([entry for row in J for entry in row], style, lengths)
+    outermost = table.outermost(source, target, from_tool=style is Style.TOOL)
+    nesting = Nesting([entry for row in J for entry in row], style, lengths, outermost)
     columns = tuple(f"q{i}" for i in table.moving)
     shown = equation(
         "J",
@@ -225,10 +229,15 @@ def _signed(
 
 
 def _pose_equation(
-    name: str, matrix: Matrix, style: Style, lengths: Lengths | None, meaning: str, **details: Any
+    name: str,
+    matrix: Matrix,
+    style: Style,
+    lengths: Lengths | None,
+    outermost: Sequence[Sequence[Atom]],
+    meaning: str,
 ) -> Equation:
-    nesting = Nesting([entry for row in matrix for entry in row], style, lengths)
-    return equation(name, matrix, nesting, meaning=meaning, entry_names=POSE_ENTRIES, **details)
+    nesting = Nesting([entry for row in matrix for entry in row], style, lengths, outermost)
+    return equation(name, matrix, nesting, meaning=meaning, entry_names=POSE_ENTRIES)
 
 
 def _name(table: SymbolicTable, source: str, target: str) -> str:

@@ -7,6 +7,7 @@ code or changed after it was read, is the exact decimal fraction that its double
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -143,6 +144,27 @@ class SymbolicTable:
                 f"{self.spec.name}: the pose of {target} in {source} has more than {MOST_TERMS} terms when it is "
                 "written out; ask for a shorter part of the arm"
             ) from None
+
+    def outermost(self, source: str, target: str, *, from_tool: bool = False) -> list[list[Atom]]:
+        """Return cosines and sines of constant angles before the first coordinate between two frames, angle by angle.
+
+        Nested outermost, they leave the entries of the matrix behind them whole, which rows then share.
+
+        Args:
+            source: The frame to begin with.
+            target: The frame to end with.
+            from_tool: Whether to begin with ``target``.
+
+        Raises:
+            UnknownFrameError: There is no such frame.
+        """
+        motions = self.path(source, target)
+        angles = [motion.angle for motion in (motions[::-1] if from_tool else motions) if motion.kind != "T"]
+        groups = []
+        for angle in itertools.takewhile(lambda angle: angle.is_constant, angles):
+            c, s = angle.cos_sin()
+            groups.append(sorted((c.atoms | s.atoms) - ROOTS.keys()))
+        return [group for group in groups if group]
 
     def _index(self, frame: str) -> int:
         if frame not in self.frames:

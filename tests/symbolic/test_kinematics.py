@@ -14,9 +14,9 @@ from dh2sim.errors import Dh2simError, MismatchError, UnknownFrameError
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import frame_pose
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import BaseSpec, Pose, RobotSpec, ToolSpec
 from dh2sim.symbolic.check import SampledConfigurations, check_form
-from dh2sim.symbolic.expression import Factor, Lengths, Style, Sum, Term, evaluated
+from dh2sim.symbolic.expression import Factor, Lengths, Style, Sum, Term, evaluated, operation_count
 from dh2sim.symbolic.form import Equation, Form
 from dh2sim.symbolic.request import symbolic_form
 from dh2sim.symbolic.table import Fold, symbolic_table
@@ -132,6 +132,21 @@ def test_right_angles_and_multiples_of_15_degrees_are_exact() -> None:
     text = str(symbolic_form(spec, "matrices"))
     assert "0.25*sqrt(2)*sqrt(3)" in text
     assert "0.5*sqrt(2)" in text
+
+
+@pytest.mark.parametrize("style", ["base", "tool"])
+def test_a_turned_base_or_tool_costs_no_more_than_its_own_three_rotations(style: str) -> None:
+    def operations(spec: RobotSpec) -> tuple[int, int]:
+        form = symbolic_form(spec, style=style, lengths="last").form
+        return operation_count([*form.sums, *form.named.values()])
+
+    puma = spec_of("puma560")
+    plain = operations(puma)
+    turn = Pose(rpy=np.array([0.1, 0.2, 0.37]))
+    turned = replace(puma, base=BaseSpec(pose=turn)) if style == "base" else replace(puma, tool=ToolSpec.at(turn))
+    found = operations(turned)
+    assert found[0] <= plain[0] + 3 * 4 * 4
+    assert found[1] <= plain[1] + 3 * 4 * 2
 
 
 def test_evaluation_uses_names() -> None:
