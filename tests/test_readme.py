@@ -51,6 +51,8 @@ def test_there_are_commands_to_check() -> None:
         "validate",
         "info",
         "fk",
+        "ik",
+        "symbolic",
         "import",
     ]
 
