@@ -22,7 +22,7 @@ from dh2sim.errors import ImportedFileError
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import compose, pose_from_rpy
 from dh2sim.messages import Loc, did_you_mean, listed, shown
-from dh2sim.robot.magnitudes import MOST_ROWS
+from dh2sim.robot.magnitudes import ANGLE, LENGTH, MOST_ROWS, shown_size
 from dh2sim.robot.spec import JointType, Pose
 from dh2sim.robot.yaml_tree import Entry, Node, Report, decode
 from dh2sim.robot.yaml_tree import compose as compose_yaml
@@ -240,11 +240,23 @@ def _pose(node: Node, loc: Loc, report: Report) -> Pose | None:
             continue
         given = node.value[key].value
         number = given.value
-        if isinstance(number, bool) or not isinstance(number, int | float) or not math.isfinite(number):
+        if isinstance(number, bool) or not isinstance(number, int | float):
             report.add(given.line, given.column, (*loc, key), f"expected a number, got {_found(given)}")
-            continue
-        values.append(float(number))
+        elif problem := _number_problem(number, turns=key in _RPY):
+            report.add(given.line, given.column, (*loc, key), f"{problem}, got {_found(given)}")
+        else:
+            values.append(float(number))
     return Pose(xyz=read_only(values[:3]), rpy=read_only(values[3:])) if len(values) == len(keys) else None
+
+
+def _number_problem(number: float, *, turns: bool) -> str | None:
+    """Return what is wrong with a number, perhaps an integer that no double holds; None if nothing is."""
+    if isinstance(number, float) and not math.isfinite(number):
+        return "expected a number"
+    bounds = ANGLE if turns else LENGTH
+    if abs(number) <= bounds.most:
+        return None
+    return f"must be from {shown_size(-bounds.most)} to {shown_size(bounds.most)} {bounds.unit}"
 
 
 def _found(node: Node) -> str:
@@ -318,8 +330,8 @@ def _numbers(text: str, key: str, value: str, start: int, report: Report) -> Ite
             number = float(item[0])
         except ValueError:
             number = math.nan
-        if not math.isfinite(number):
-            report.add(*_place(text, start + item.start()), (key, k), f"expected a number, got {shown(item[0])}")
+        if problem := _number_problem(number, turns=key in ("delta_theta", "delta_alpha")):
+            report.add(*_place(text, start + item.start()), (key, k), f"{problem}, got {shown(item[0])}")
         yield number
 
 

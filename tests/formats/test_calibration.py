@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from dh2sim.errors import ImportedFileError
@@ -175,6 +177,17 @@ def test_everything_wrong_with_deltas_is_reported_at_once() -> None:
         "f:3:1: expected as many numbers of each parameter, got 3 of delta_theta, 3 of delta_a, 2 of delta_d, "
         "3 of delta_alpha"
     ]
+
+
+@pytest.mark.parametrize("number", ["1e7", "-1e300", "9" * 400])
+def test_absurd_numbers_are_refused_at_their_places(number: str) -> None:
+    shown = repr(number if len(number) <= 60 else number[:57] + "...")
+    one = POSE.replace("-2.5", number)
+    assert wrong(f"joint1: {one}\njoint2: {POSE}\n") == [
+        f"f:1:{9 + one.index(number)}: joint1.yaw: must be from -1e6 to 1e6 rad, got {shown}"
+    ]
+    problem = "must be from -1e6 to 1e6 m" if float(number) != math.inf else "expected a number"
+    assert wrong(CONF.replace("11.5", number)) == [f"f:6:21: delta_d[1]: {problem}, got {shown}"]
 
 
 def test_broken_yaml_is_an_error_at_its_place() -> None:
