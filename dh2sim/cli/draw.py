@@ -10,6 +10,7 @@ import typer
 
 from dh2sim.cli.common import MANY, RobotArgument, load_all
 from dh2sim.cli.joint_vector import DegreesOption, QArgument, RadiansOption, read_joint_vector
+from dh2sim.messages import printable
 
 
 def draw(
@@ -85,7 +86,7 @@ def draw(
         sys.stdout.write(drawing.svg if format_ is DrawingFormat.SVG else drawing.tikz)
         return
     drawing.save(path, format_)
-    print(f"{path}: {spec.name}, {style}, {vector}")
+    print(printable(f"{path}: {spec.name}, {style}, {vector}"))
 
 
 def _numbers(text: str) -> list[float]:

@@ -12,6 +12,7 @@ import typer
 
 from dh2sim.cli.common import DONE, FELL_SHORT, RobotsArgument, StrictOption, build_all, complain
 from dh2sim.errors import Dh2simError, OutputError
+from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.export import ExportReport, Format
@@ -84,7 +85,7 @@ def export(
 
 
 def _report_waiting(folder: Path) -> None:
-    print(f"dh2sim: waiting for another process that is writing to '{folder}'", file=sys.stderr)
+    print(printable(f"dh2sim: waiting for another process that is writing to '{folder}'"), file=sys.stderr)
 
 
 def _formats(names: list[str] | None) -> list[Format]:
@@ -108,7 +109,7 @@ def _check(models: list[RobotModel], out: Path, formats: list[Format], *, dh_fra
             print(f"{model.name}: up to date")
         for entry in found:
             status = FELL_SHORT
-            print(f"{model.name}: {entry.path}: {entry.what}")
+            print(printable(f"{model.name}: {entry.path}: {entry.what}"))
     if status:
         print(
             "dh2sim: some files are not what the robot files say; write them with 'dh2sim export'",
@@ -131,7 +132,7 @@ def _print_report(report: ExportReport, out: Path, model: RobotModel) -> None:
             worst = f"{check.position_error:.1e} m, {check.rotation_error:.1e} rad"
         lines.append((name, f"{file.size:,} B", worst, "" if file.changed else "unchanged"))
     widths = [max(len(line[i]) for line in lines) for i in range(3)]
-    print(f"{report.name}: {folder}")
+    print(printable(f"{report.name}: {folder}"))
     for name, size, worst, state in lines:
         print(f"  {name:{widths[0]}}  {size:>{widths[1]}}  {worst:{widths[2]}}  {state}".rstrip())
     _list("not carried over", map(str, report.losses))

@@ -16,6 +16,7 @@ import typer
 from dh2sim.cli.common import RobotArgument, choice, complete_robot, load_all, other_format, tolerance_of
 from dh2sim.cli.output import hand_over, json_text, require_free
 from dh2sim.errors import Dh2simError, ImportedFileError, MissingExtraError
+from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.importing.result import Imported
@@ -306,7 +307,7 @@ def frames(
 
         draw_assignment(imported, drawing)
         if not quiet:
-            print(f"{drawing}: axes and frames", file=sys.stderr if out is None or as_json else sys.stdout)
+            print(printable(f"{drawing}: axes and frames"), file=sys.stderr if out is None or as_json else sys.stdout)
 
 
 def _require_frame_figure(path: Path) -> None:

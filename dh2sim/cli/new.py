@@ -12,6 +12,7 @@ import typer
 from dh2sim.cli.common import choice, complete_robot, load_all
 from dh2sim.cli.output import hand_over, require_free
 from dh2sim.errors import Dh2simError
+from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.robot.spec import Convention
@@ -94,7 +95,7 @@ def new(
     width = max(len(command) for command, _ in commands)
     print("Next:")
     for command, purpose in commands:
-        print(f"  {command:{width}}  {purpose}")
+        print(printable(f"  {command:{width}}  {purpose}"))
 
 
 def _types(letters: str) -> list[str]:

@@ -158,4 +158,4 @@ def hand_over(text: str, out: Path | None, *, summary: str, notes: Iterable[str]
         text = textwrap.fill(f"dh2sim: note: {printable(note)}", 80, subsequent_indent="  ", break_on_hyphens=False)
         print(text, file=sys.stderr)
     where = "" if out is None else f"{out}: "
-    print(f"{where}{summary}", file=sys.stderr if out is None else sys.stdout)
+    print(printable(f"{where}{summary}"), file=sys.stderr if out is None else sys.stdout)

@@ -11,6 +11,7 @@ import typer
 from dh2sim.cli.common import build_all
 from dh2sim.cli.output import progress_bar
 from dh2sim.errors import PictureError
+from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.draw.renderer import PictureOptions
@@ -123,7 +124,7 @@ def render(
         summary += f" at {motion.time[position]:g} s" if of_run else f" at {configuration or 'home'}"
     _warn_if_stopped(data)
     if not quiet:
-        print(f"{path}: {summary}, {options.width}x{options.height}")
+        print(printable(f"{path}: {summary}, {options.width}x{options.height}"))
 
 
 def _beside(run: Path, ending: str) -> Path:
@@ -138,7 +139,7 @@ def _warn_if_stopped(data: RolloutData | None) -> None:
         when = f" in time step {data.stop_step}" if data.stop_step >= 0 else ""
         end = float(data.values("time")[-1])
         text = f"{data.label} stopped early{when} ({data.reason}): what is shown ends at {end:g} s"
-        print(f"dh2sim: {text}", file=sys.stderr)
+        print(printable(f"dh2sim: {text}"), file=sys.stderr)
 
 
 def _options(size: str, camera: str | None, *, frames: bool, trace: bool) -> PictureOptions:
@@ -220,4 +221,4 @@ def plot(
     write_plot(path, data, what, size=pixels, dpi=dpi)
     _warn_if_stopped(data)
     if not quiet:
-        print(f"{path}: {what} of {data.label}")
+        print(printable(f"{path}: {what} of {data.label}"))

@@ -17,6 +17,7 @@ import typer
 from dh2sim.cli.common import INTERRUPTED, RobotArgument, build_all
 from dh2sim.cli.output import json_text, make_console, progress_bar, size_text
 from dh2sim.cli.runs import clipped_controls, contacts
+from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -141,8 +142,8 @@ def rollout(
     if progress.finished:
         return 0
     print(
-        f"dh2sim: interrupted; {summary.rollouts - summary.not_run:,} of {rollouts:,} rollouts are saved in {out}. "
-        "Continue with the same command and --resume",
+        f"dh2sim: interrupted; {summary.rollouts - summary.not_run:,} of {rollouts:,} rollouts are saved in "
+        f"{printable(str(out))}. Continue with the same command and --resume",
         file=sys.stderr,
     )
     return INTERRUPTED if patience.arrived == signal.SIGINT else 128 + int(patience.arrived or 0)
@@ -201,7 +202,7 @@ def _print_summary(job: Job, summary: RunDescription, progress: Progress, out: P
     options = job.options
     print(
         f"{summary.robot}: {summary.rollouts:,} rollouts of {summary.steps:,} steps ({summary.duration:g} s), "
-        f"{options.controller}, in {out}"
+        f"{printable(options.controller)}, in {printable(str(out))}"
     )
     if progress.rollouts:
         rate = progress.rollouts * options.steps / progress.seconds

@@ -115,11 +115,11 @@ def _convert(paths: list[Path], to: str, out: Path | None, *, overwrite: bool, q
             written = convert(path, target, overwrite=overwrite, advance=advance)
         if not quiet:
             for file in written:
-                print(f"{file}  {size_text(file.stat().st_size)}", flush=True)
+                print(f"{printable(str(file))}  {size_text(file.stat().st_size)}", flush=True)
         if summary.not_run:
             print(
-                f"dh2sim: {summary.not_run:,} of {summary.rollouts:,} rollouts of '{path}' are not run yet; their "
-                "numbers are missing in what was written",
+                f"dh2sim: {summary.not_run:,} of {summary.rollouts:,} rollouts of '{printable(str(path))}' are "
+                "not run yet; their numbers are missing in what was written",
                 file=sys.stderr,
             )
 

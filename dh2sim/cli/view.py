@@ -13,6 +13,7 @@ import typer
 
 from dh2sim.cli.common import RobotArgument, StrictOption, load_all, report_slips
 from dh2sim.cli.output import require_free
+from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.view.state import ViewState
@@ -140,4 +141,4 @@ def _export(state: ViewState, run: Path | None, rollout: int, page: Path) -> Non
 
         data = open_rollout(run, rollout)
     export_page(state.model, state.q, page, rollout=data)
-    print(f"{page}: {state.spec.name}{'' if run is None else f', rollout {rollout} of {run}'}")
+    print(printable(f"{page}: {state.spec.name}{'' if run is None else f', rollout {rollout} of {run}'}"))

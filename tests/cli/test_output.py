@@ -1,14 +1,16 @@
-"""JSON of commands has no numbers that are not finite."""
+"""JSON of commands has no numbers that are not finite, and what they print has no control characters."""
 
 from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import pytest
 
 from dh2sim.cli.output import json_text
 from dh2sim.errors import NotFiniteError
+from tests.program import dh2sim
 
 
 def test_json_reads_back() -> None:
@@ -21,3 +23,28 @@ def test_json_reads_back() -> None:
 def test_a_number_that_is_not_finite_is_refused_with_its_place(number: float) -> None:
     with pytest.raises(NotFiniteError, match=rf"^JSON\.a\[1\]\.b: {number} is not a finite number"):
         json_text({"a": [1.0, {"b": number}]})
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("export", "rpr", "--out", ""),
+        ("export", "rpr", "--check", "--out", "nothing"),
+        ("new", "--out", "arm.yaml", "arm"),
+        ("convert", "rpr", "--to", "modified", "--out", "arm.yaml"),
+        ("rollout", "rpr", "--rollouts", "1", "--steps", "1", "--out", "run.zarr"),
+        ("draw", "rpr", "--out", "rpr.svg"),
+    ],
+    ids=" ".join,
+)
+def test_names_of_folders_do_not_reach_the_terminal_as_they_are(command: tuple[str, ...], tmp_path: Path) -> None:
+    folder = tmp_path / "a\x1b[2Jb"
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("the system has no such names")
+    place = command.index("--out") + 1
+    done = dh2sim(*command[:place], folder / command[place], *command[place + 1 :])
+    assert done.status in (0, 1), done.err
+    assert "\x1b" not in done.out + done.err
+    assert "a\\x1b[2Jb" in done.out

@@ -347,8 +347,8 @@ class _PythonScript:
             case ast.Mult() if type(left) is list and isinstance(right, float):
                 return (
                     list(left) * int(right)
-                    if right == int(right) and len(left) * right <= MAX_ITEMS
-                    else Unknown("*")
+                    if right.is_integer() and len(left) * right <= MAX_ITEMS
+                    else Unknown("a list times something is not read")
                 )
             case ast.Add():
                 return elementwise(lambda a, b: a + b, left, right)

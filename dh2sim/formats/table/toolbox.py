@@ -195,6 +195,8 @@ def elementwise(operation: Callable[..., object], *values: object, depth: int = 
     if not arrays:
         try:
             return operation(*map(number, values))
+        except OverflowError:
+            return Unknown("the number is too large")
         except (ArithmeticError, TypeError, ValueError) as error:  # TypeError: the wrong number of arguments
             return Unknown(str(error))
     size = len(arrays[0])
