@@ -86,10 +86,12 @@ def choice(
     *,
     without: tuple[Word, ...] = (),
     other_names: Mapping[str, str] | None = None,
+    others: Sequence[str] = (),
 ) -> Word | None:
     """Return the member of an enumeration that the value of an option names; None if it was not given.
 
-    ``other_names`` are what people call its members elsewhere, for the message.
+    For the message, ``other_names`` are what people call its members elsewhere, and ``others`` what else the option
+    takes.
 
     Raises:
         BadParameter: The value names no member.
@@ -101,13 +103,24 @@ def choice(
     if found is None:
         from dh2sim.messages import did_you_mean, shown
 
-        names = [word.value for word in allowed]
+        names = [*(word.value for word in allowed), *others]
         meant = (other_names or {}).get(text.lower())
         hint = f" It is called '{meant}' here" if meant in names else did_you_mean(text, names)
         raise typer.BadParameter(
             f"{shown(text)} is not one of {', '.join(names)}.{hint}".rstrip("."), param_hint=option
         )
     return found
+
+
+def refuse_options(what: str, options: Mapping[str, object]) -> None:
+    """Refuse options that were given and do not apply; None and False are what was not given.
+
+    Raises:
+        BadParameter: One of them was given.
+    """
+    for name, value in options.items():
+        if value is not None and value is not False:
+            raise typer.BadParameter(f"does not apply to {what}", param_hint=name)
 
 
 def tolerance_of(value: float) -> float:

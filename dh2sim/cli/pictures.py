@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import build_all
+from dh2sim.cli.common import build_all, refuse_options
 from dh2sim.cli.output import progress_bar
 from dh2sim.errors import PictureError
 from dh2sim.messages import printable
@@ -83,9 +83,9 @@ def render(
     """
     of_run = source.endswith(".zarr") or Path(source).is_dir()
     if of_run:
-        _refuse("a run", {"--configuration": configuration})
+        refuse_options("a run", {"--configuration": configuration})
     else:
-        _refuse("a robot", {"--rollout": rollout, "--fps": fps, "--speed": speed, "--time": time})
+        refuse_options("a robot", {"--rollout": rollout, "--fps": fps, "--speed": speed, "--time": time})
     from dh2sim.draw.motion import motion_of_robot, motion_of_run
     from dh2sim.draw.rollout_data import open_rollout
     from dh2sim.draw.video import VIDEOS, VideoSpeed, require_picture, video_positions, write_image, write_video
@@ -101,9 +101,9 @@ def render(
     if video and not of_run:
         raise PictureError(f"a robot does not move: write '{path.with_suffix('.png')}', or render a run")
     if video:
-        _refuse("a video", {"--time": time})
+        refuse_options("a video", {"--time": time})
     else:
-        _refuse("a .png", {"--fps": fps, "--speed": speed})
+        refuse_options("a .png", {"--fps": fps, "--speed": speed})
     options = _options(size or (GIF_SIZE if gif else SIZE), camera, frames=frames, trace=trace)
     usual = GIF_FPS if gif else FPS
     rate = VideoSpeed(fps=usual if fps is None else fps, speed=1.0 if speed is None else speed)
@@ -160,12 +160,6 @@ def _parse_size(text: str) -> tuple[int, int]:
     if not (width.isascii() and width.isdigit() and height.isascii() and height.isdigit() and len(text) < 20):
         raise typer.BadParameter(f"'{text}' must have the form WIDTHxHEIGHT, such as {SIZE}", param_hint="--size")
     return int(width), int(height)
-
-
-def _refuse(what: str, options: dict[str, object]) -> None:
-    for name, value in options.items():
-        if value is not None:
-            raise typer.BadParameter(f"does not apply to {what}", param_hint=name)
 
 
 def plot(

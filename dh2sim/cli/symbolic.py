@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, choice, load_all
+from dh2sim.cli.common import RobotArgument, choice, load_all, refuse_options
 from dh2sim.cli.output import hand_over, json_text, require_free
 from dh2sim.cli.symbolic_code import LANGUAGES, is_about_code, print_code
+from dh2sim.codegen.program import What as CodeWhat
 from dh2sim.errors import Dh2simError
 
 if TYPE_CHECKING:
@@ -72,33 +73,34 @@ def symbolic(
       dh2sim symbolic planar_2r --what dynamics --letters
       dh2sim symbolic ur5e --what pose,jacobian,inverse-dynamics --as c -o ur5e.c
     """
+    frames = {"--from": source != "base_link", "--to": target != "tool0"}
+    nesting = {
+        "--style": style != "base",
+        "--lengths": lengths is not None,
+        "--fold": fold != "parallel" or no_fold,
+    }
     if is_about_code(what, as_):
-        others = {
-            "--from": source != "base_link",
-            "--to": target != "tool0",
-            "--style": style != "base",
-            "--lengths": lengths is not None,
-            "--no-names": not names,
-            "--numbers": numbers,
-            "--letters": letters,
-            "--fold": fold != "parallel" or no_fold,
-            "--q": q,
-        }
-        print_code(robot, what, as_, out, force=force, others=others)
+        words = {"--no-names": not names, "--numbers": numbers, "--letters": letters, "--q": q}
+        refuse_options("code", frames | nesting | words)
+        print_code(robot, what, as_, out, force=force)
         return
     # imported here: code needs none of it
     from dh2sim.symbolic.expression import Lengths, Style
     from dh2sim.symbolic.request import What, symbolic_form
     from dh2sim.symbolic.table import Fold
 
-    wanted = choice(what, What, "--what")
-    format_ = choice(as_, Format, "--as")
+    wanted = choice(what, What, "--what", others=(CodeWhat.INVERSE_DYNAMICS,))
+    format_ = choice(as_, Format, "--as", others=LANGUAGES)
     nested = choice(style, Style, "--style")
     place = choice(lengths, Lengths, "--lengths")
     axes = Fold.NONE if no_fold else choice(fold, Fold, "--fold")
     assert wanted is not None
     assert nested is not None
     assert axes is not None
+    if wanted is What.MATRICES:
+        refuse_options("--what matrices", frames)
+    elif wanted is What.DYNAMICS:
+        refuse_options("--what dynamics", frames | nesting)
     require_free(out, force=force)
     [spec] = load_all([robot])
     bodies = None

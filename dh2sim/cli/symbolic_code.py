@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +26,7 @@ def is_about_code(what: str, as_: str) -> bool:
     return as_.lower() in LANGUAGES or "," in what or what.lower() == What.INVERSE_DYNAMICS
 
 
-def print_code(robot: str, what: str, as_: str, out: Path | None, *, force: bool, others: Mapping[str, bool]) -> None:
+def print_code(robot: str, what: str, as_: str, out: Path | None, *, force: bool) -> None:
     """Write code, or with ``--as text`` and ``--as json`` what the inverse dynamics cost.
 
     Args:
@@ -36,16 +35,12 @@ def print_code(robot: str, what: str, as_: str, out: Path | None, *, force: bool
         as_: Of ``--as``.
         out: File to write.
         force: Whether to overwrite it.
-        others: Options that do not apply to code, and whether they were given.
 
     Raises:
-        BadParameter: An option has a wrong value, or does not apply.
+        BadParameter: An option has a wrong value.
     """
     from dh2sim.codegen.generate import generate_code, summarize
 
-    for option, given in others.items():
-        if given:
-            raise typer.BadParameter("does not apply to code", param_hint=option)
     wanted = [choice(word.strip(), What, "--what") for word in what.split(",")]
     require_free(out, force=force)
     [spec] = load_all([robot])
@@ -75,14 +70,17 @@ def _as_dict(spec: RobotSpec, summary: CodeSummary) -> dict[str, object]:
 def _as_text(spec: RobotSpec, summary: CodeSummary) -> str:
     [operations] = summary.operations.values()
     width = max((len(name) for name, _, _ in summary.constants), default=0)
-    lines = [
-        f"{spec.name}: inverse dynamics by the recursive Newton-Euler algorithm",
-        "",
-        f"Each call takes {operations}.",
+    constants = [
         "Constants: lengths, gravity, and base inertial parameters, XX2 to MZ2 of what",
         "row 2 moves, with all that may be regrouped from the links after it:",
         "",
         *(f"  {name:{width}}  {value:<23.16g} {note}".rstrip() for name, value, note in summary.constants),
+    ]
+    lines = [
+        f"{spec.name}: inverse dynamics by the recursive Newton-Euler algorithm",
+        "",
+        f"Each call takes {operations}.",
+        *(constants if summary.constants else ()),
         "",
         f"The code: dh2sim symbolic {spec.name} --what inverse-dynamics --as c",
         f"Languages: {', '.join(Language)}",

@@ -15,6 +15,11 @@ from dh2sim.symbolic.table import Letter, SymbolicTable
 
 PAGE: Final = 44.0
 """Width of a line of formulas in em: A4 with margins of 2 cm at 10 pt leaves 48."""
+_MOST_BEFORE_ZERO: Final = 22.0
+"""Width of an expression that is written in front of ``= 0``, em; a wider one is behind, where it can be broken."""
+_MOST_ALIGNED: Final = 60
+"""Lines that are aligned with one another: TeX keeps all of them in memory."""
+_NEW_LINE: Final = " \\\\\n"
 _GREEK: Final = frozenset(
     "alpha beta gamma delta epsilon eta theta kappa lambda mu phi psi rho tau".split()  # noqa: SIM905
 )
@@ -29,7 +34,11 @@ class LatexNotation:
         """``joint_names`` is 'theta', with sliding coordinates d_i, or 'q'."""
         self._joint = joint_names
         self._turns = [row.type.turns for row in table.spec.rows]
-        self._taken = set(table.letters)
+        self._letters: dict[str, str] = {}
+        for name in table.letters:
+            written_ = latex_name(name)
+            self._letters[name] = _verbatim(name) if written_ in self._letters.values() else written_
+        self._taken = set(self._letters.values())
         self._separator = "," if len(table.spec.rows) > 9 else ""
 
     def atom(self, atom: Atom) -> str:
@@ -46,7 +55,11 @@ class LatexNotation:
         if atom.startswith("sqrt("):
             return rf"\sqrt{{{atom[5:-1]}}}"
         trig = trig_of(atom)
-        return latex_name(atom) if trig is None else self.trig(trig.function, trig.angle)
+        return self.letter(atom) if trig is None else self.trig(trig.function, trig.angle)
+
+    def letter(self, name: str) -> str:
+        """Return a constant as it is written: a_2 for a2, unless another one is written like that."""
+        return self._letters.get(name) or latex_name(name)
 
     def trig(self, function: str, angle: Angle) -> str:
         """Return c_{12} for plain sums of coordinates, a cosine in full for other angles."""
@@ -56,16 +69,16 @@ class LatexNotation:
             if is_long_run(numbers):
                 return rf"{function[0]}_{{{numbers[0]}\dots{numbers[-1]}}}"
             rows = self._separator.join(map(str, numbers))
-            if f"{function[0]}{rows}" not in self._taken:
-                return f"{function[0]}_{{{rows}}}"
+            name = f"{function[0]}_{{{rows}}}"
+            if name not in self._taken:
+                return name
         return rf"\{function}({self.angle(angle)})"
 
     def coordinate(self, row: int, *, turns: bool) -> str:
         """Return what the coordinate of a row is called."""
-        if turns and self._joint == "theta":
-            return rf"\theta_{{{row}}}"
-        letter = "d" if self._joint == "theta" and f"d{row}" not in self._taken else "q"
-        return f"{letter}_{{{row}}}"
+        usual = (r"\theta" if turns else "d") if self._joint == "theta" else "q"
+        candidates = [f"{letter}_{{{row}}}" for letter in (usual, "q", r"\tilde{q}")]
+        return next(name for name in candidates if name not in self._taken)
 
     def angle(self, angle: Angle) -> str:
         """Return an angle in full, without spaces."""
@@ -73,7 +86,7 @@ class LatexNotation:
         plain = not angle.names and not angle.degrees and all(n == 1 for _, n in angle.coordinates)
         if plain and is_long_run([row for row, _ in angle.coordinates]):
             return rf"{parts[0][0]}+\dots+{parts[-1][0]}"
-        parts += [(latex_name(name), n) for name, n in angle.names]
+        parts += [(self.letter(name), n) for name, n in angle.names]
         text = ""
         for name, n in parts:
             body = name if abs(n) == 1 else rf"{self.number(magnitude(n))}\,{name}"
@@ -104,13 +117,17 @@ def latex_name(name: str) -> str:
         return f"{inertial[1]}_{{{inertial[2]}{inertial[3]}}}"
     found = re.fullmatch(r"([A-Za-z]+)_?([A-Za-z0-9_]*?)_*", name)
     if found is None:
-        escaped = name.replace("_", r"\_")
-        return rf"\mathrm{{{escaped}}}"
+        return _verbatim(name)
     word, index = found[1], found[2].replace("_", r"\_")
     head = rf"\{word}" if word in _GREEK else word if len(word) == 1 else rf"\mathrm{{{word}}}"
     if not index:
         return head
     return f"{head}_{{{index}}}" if index.isdigit() else rf"{head}_{{\mathrm{{{index}}}}}"
+
+
+def _verbatim(name: str) -> str:
+    escaped = name.replace("_", r"\_")
+    return rf"\mathrm{{{escaped}}}"
 
 
 def latex_document(form: Form, title: str) -> str:
@@ -128,9 +145,17 @@ def latex_document(form: Form, title: str) -> str:
     for heading, formulas in latex_parts(form):
         if heading:
             lines += ["", _escaped(heading)]
-        lines += [r"\begin{align*}", *formulas, r"\end{align*}"]
+        for block in _aligned_blocks(formulas):
+            lines += [r"\begin{align*}", block, r"\end{align*}"]
     lines += [line for note in form.notes for line in ("", _escaped(note))]
     return "\n".join([*lines, r"\end{document}"]) + "\n"
+
+
+def _aligned_blocks(formulas: Sequence[str]) -> Iterator[str]:
+    text = "\n".join(formulas)
+    rows = [text] if r"\begin{bmatrix}" in text else text.split(_NEW_LINE)
+    for first in range(0, len(rows), _MOST_ALIGNED):
+        yield _NEW_LINE.join(rows[first : first + _MOST_ALIGNED])
 
 
 def latex_parts(form: Form) -> Iterator[tuple[str, list[str]]]:
@@ -226,7 +251,8 @@ def _entry_name(name: str) -> str:
 
 
 def _condition(condition: Condition, notation: LatexNotation) -> str:
-    text = f"{written(condition.expression, notation)} &= 0"
+    expression = written(condition.expression, notation)
+    text = f"{expression} &= 0" if _width(expression) <= _MOST_BEFORE_ZERO else _broken("0", expression)
     if condition.name:
         text += rf" \quad\text{{({condition.name})}}"
     if condition.angle is not None and condition.degrees:
@@ -244,15 +270,16 @@ def _legend(form: Form, notation: LatexNotation) -> Iterator[str]:
     for letter in used_letters(form.table, form.atoms):
         if math.isnan(letter.value):
             continue
-        yield _letter(letter, form.table)
+        yield _letter(letter, form.table, notation)
 
 
-def _letter(letter: Letter, table: SymbolicTable) -> str:
+def _letter(letter: Letter, table: SymbolicTable, notation: LatexNotation) -> str:
+    name = notation.letter(letter.name)
     if letter.kind == "angle":
-        return rf"{latex_name(letter.name)} &= {math.degrees(letter.value):.10g}^\circ"
+        return rf"{name} &= {math.degrees(letter.value):.10g}^\circ"
     power = {"length": "", "acceleration": "/s^2"}.get(letter.kind)
     unit = "" if power is None else rf"\,\mathrm{{{table.unit.value}{power}}}"
-    return f"{latex_name(letter.name)} &= {letter.value:.12g}{unit}"
+    return f"{name} &= {letter.value:.12g}{unit}"
 
 
 def _escaped(text: str) -> str:

@@ -65,9 +65,18 @@ def test_every_format_prints_something(format_: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--what", "pse"], "'pse' is not one of pose, matrices, jacobian, dynamics. Did you mean 'pose'?"),
+        (
+            ["--what", "pse"],
+            "'pse' is not one of pose, matrices, jacobian, dynamics, inverse-dynamics. Did you mean 'pose'?",
+        ),
         (["--style", "bas"], "'bas' is not one of base, tool, expanded. Did you mean 'base'?"),
-        (["--as", "tex"], "'tex' is not one of text, latex, markdown, json"),
+        (
+            ["--as", "fortran"],
+            "'fortran' is not one of text, latex, markdown, json, python, numpy, c, cpp, matlab, javascript",
+        ),
+        (["--what", "matrices", "--to", "dh_2"], "Invalid value for --to: does not apply to --what matrices"),
+        (["--what", "dynamics", "--style", "tool"], "Invalid value for --style: does not apply to --what dynamics"),
+        (["--what", "dynamics", "--no-fold"], "Invalid value for --fold: does not apply to --what dynamics"),
         (["--fold", "some"], "'some' is not one of parallel, all, none"),
         (["--to", "dh_7"], "scara: unknown frame 'dh_7'."),
     ],

@@ -68,3 +68,11 @@ def test_options_that_do_not_fit_code_are_refused(arguments: list[str], error: s
     done = dh2sim("symbolic", "rpr", *arguments)
     assert (done.status, done.out) == (2, "")
     assert error in done.err
+
+
+def test_a_robot_that_does_not_move_has_no_constants_to_list(tmp_path: Path) -> None:
+    file = tmp_path / "post.yaml"
+    file.write_text("{name: post, convention: standard, joints: [{type: fixed, d: 1}]}")
+    run = dh2sim("symbolic", file, "--what", "inverse-dynamics")
+    assert run.status == 0
+    assert "Constants" not in run.out

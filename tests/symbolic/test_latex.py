@@ -122,3 +122,34 @@ def test_markdown_has_formulas_between_dollar_signs() -> None:
 
 def test_a_notebook_shows_formulas() -> None:
     assert symbolic_form(spec_of("planar_2r"))._repr_latex_().startswith("$$\\begin{aligned}")
+
+
+def test_no_two_things_are_written_alike() -> None:
+    file = """{name: x, convention: standard, parameters: {theta_1: 2, a_2: 3, a2: 4, d_2: 5, c_3: 6},
+      joints: [{type: revolute, a: theta_1, d: a2}, {type: prismatic, a: a_2, alpha: 1.5707963267948966, d: d_2},
+      {type: revolute, a: c_3}]}"""
+    text = symbolic_form(parse_robot(file), fold="none").latex()
+    legend = text[text.rindex(r"\begin{align*}") :]
+    names = [line.split(" &=")[0] for line in legend.splitlines() if " &= " in line]
+    assert len(names) == len(set(names))
+    assert r"\theta_{1} &= 2\,\mathrm{m}" in legend
+    assert r"\cos(q_{1})" in text
+    assert r"\mathrm{a2} &= 4\,\mathrm{m}" in legend
+    assert "d_{2} + q_{2}" in text
+    assert r"\cos(\theta_{3})" in text
+
+
+def test_a_wide_factor_of_a_determinant_is_broken_behind_the_zero() -> None:
+    text = symbolic_form(spec_of("franka_panda"), "jacobian", source="dh_0", target="dh_6").latex()
+    conditions = text[text.index("Singular where") :]
+    conditions = conditions[: conditions.index("with")]
+    assert "0 &= 0.004764375" in conditions
+    assert r"\qquad" in conditions
+
+
+def test_long_lists_of_equations_are_aligned_in_parts() -> None:
+    rows = tuple(row(f"j{i}", a=0.1 * i, d=0.2, alpha=0.3 + 0.1 * i) for i in range(1, 6))
+    text = symbolic_form(RobotSpec(name="general", rows=rows), style="expanded").latex()
+    blocks = text.split(r"\begin{align*}")[1:]
+    assert len(blocks) > 2
+    assert all(block.count("\n") <= 62 for block in blocks)
