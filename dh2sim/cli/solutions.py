@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
@@ -78,7 +79,8 @@ def solution_lines(
     for number, curve in enumerate(solutions.curves, start=1):
         lines += _filled(f"curve {number}: {_curve_text(spec, curve)}")
     if solutions.found_share < 1.0:
-        lines += _filled(f"There may be more: in trials {solutions.found_share:.1%} of all solutions were found.")
+        share = math.floor(1000.0 * solutions.found_share) / 10.0  # never 100
+        lines += _filled(f"There may be more: in trials {share:.1f}% of all solutions were found.")
     if len(behind):
         names = ", ".join(row.name for row in robot.moving_rows[len(spec.moving_rows) :])
         lines += _filled(f"Not moved, being behind {frame}: {names}")

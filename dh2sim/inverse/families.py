@@ -12,10 +12,10 @@ from typing import Final
 
 import numpy as np
 
-from dh2sim.inverse.elimination import CONVERGED, Found
+from dh2sim.inverse.elimination import CONVERGED, NEARLY_SINGULAR, Found
 from dh2sim.inverse.loop import Arm, Flags, pose_and_jacobian
 from dh2sim.inverse.polish import polish
-from dh2sim.inverse.self_motion import SELF_MOTION, Path, follow, lies_on
+from dh2sim.inverse.self_motion import SELF_MOTION, Path, follow, lies_on, null_directions
 from dh2sim.typing import Array
 
 SINGULAR: Final = 1e-7
@@ -45,13 +45,13 @@ def split_families(arm: Arm, T: Array, moving: Flags, found: Found) -> tuple[Fou
     paths: list[Path] = []
     flat = False
     for i in np.argsort(found.sigma, kind="stable"):
-        if found.sigma[i] > SINGULAR:
+        if found.sigma[i] > NEARLY_SINGULAR:
             break
         values = np.linalg.svd(pose_and_jacobian(arm, found.q[i : i + 1])[1][0][:, moving], compute_uv=False)
         several = int((values < SINGULAR).sum()) > 1
         if (several and flat) or any(lies_on(path.q, found.q[i], turns, closed=path.closed) for path in paths):
             isolated[i] = False
-        elif len(paths) < MOST and _goes_on(arm, found.q[i], T, moving):
+        elif found.sigma[i] <= SINGULAR and len(paths) < MOST and _goes_on(arm, found.q[i], T, moving):
             isolated[i] = False
             paths.append(follow(arm, found.q[i], T, moving))
             flat |= several
@@ -60,26 +60,24 @@ def split_families(arm: Arm, T: Array, moving: Flags, found: Found) -> tuple[Fou
 
 def _goes_on(arm: Arm, q: Array, T: Array, moving: Flags) -> bool:
     """Return whether there are other configurations near a singular one that reach its pose."""
-    J = pose_and_jacobian(arm, q[None])[1][0][:, moving]
-    there = q.copy()
-    there[moving] += STEP * np.linalg.svd(J)[2][-1]
-    back, error = polish(arm, there[None], T[None], moving)
-    return float(error[0]) < CONVERGED and float(np.linalg.norm(back[0] - q)) > 0.5 * STEP
+    there = q + STEP * null_directions(arm, q, moving)
+    back, error = polish(arm, there, np.broadcast_to(T, (len(there), 4, 4)), moving)
+    return bool(((error < CONVERGED) & (np.linalg.norm(back - q, axis=1) > 0.5 * STEP)).any())
 
 
 def family_kind(path: Path, joints: int) -> str:
-    """Return what textbooks call the singularity at which a family of six joints is found.
+    """Return what textbooks call the singularity at which a family of six joints, or of a wrist's three, is found.
 
     Args:
         path: The family.
         joints: How many joints the robot has.
     """
     moves = moving_joints(path, joints)
-    if joints != 6 or not moves:
+    if joints not in (3, 6) or not moves:
         return SELF_MOTION
-    if 0 in moves:
+    if joints == 6 and 0 in moves:
         return "shoulder singularity"
-    return "wrist singularity" if 5 in moves and 4 not in moves else SELF_MOTION
+    return "wrist singularity" if joints - 1 in moves and joints - 2 not in moves else SELF_MOTION
 
 
 def moving_joints(path: Path, joints: int) -> Sequence[int]:

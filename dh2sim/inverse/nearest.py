@@ -10,7 +10,7 @@ import numpy as np
 
 from dh2sim.inverse.goals import Free
 from dh2sim.inverse.numeric import NumericSolver, goal_angles, goal_distances
-from dh2sim.inverse.reach import amount_text, beyond_limits
+from dh2sim.inverse.reach import SLACK, amount_text, beyond_limits
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.kinematics.chain import ChainLike, chain_of
 from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian
@@ -78,11 +78,14 @@ def no_solutions(n: int, nearest: Array | None = None) -> Solutions:
 
 
 def miss_text(spec: RobotSpec, q: Array, T: Array, free: Free | None) -> str:
-    """Return how far a configuration is from a goal: ``0.12 m and 3.1 degrees away``."""
+    """Return how far a configuration is from a goal: ``0.12 m and 3.1 degrees away``; what fits is left out."""
     pose = forward_kinematics(spec, q)
-    parts = [f"{math.dist(pose[:3, 3], T[:3, 3]):.3g} m"]
+    distance, angle = math.dist(pose[:3, 3], T[:3, 3]), 0.0
     if free != "rotation":
-        parts.append(amount_text(spec, float(goal_angles(pose[None], T[None], free)[0]), turns=True))
+        angle = float(goal_angles(pose[None], T[None], free)[0])
+    parts = [f"{distance:.3g} m"] if distance > SLACK or angle <= SLACK else []
+    if angle > SLACK:
+        parts.append(amount_text(spec, angle, turns=True))
     return f"{' and '.join(parts)} away"
 
 

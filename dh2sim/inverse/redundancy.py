@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.inverse.loop import Arm, joint_rank, pose_and_jacobian
-from dh2sim.inverse.self_motion import SELF_MOTION, Path, follow, inside, lies_on
+from dh2sim.inverse.loop import Arm, joint_rank, pose_and_jacobian, pose_error
+from dh2sim.inverse.self_motion import ON_POSE, Path, follow, inside, lies_on, null_directions
 from dh2sim.inverse.solutions import Curve
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.typing import Array, read_only
@@ -21,6 +21,8 @@ SAMPLED: Final = 2
 """Joints that are locked there, one after the other."""
 LEAST_SHARE: Final = 1e-6
 """Joints with less of a self-motion stand still in it: locking them leaves the arm short of a direction."""
+LEAST_EXTENT: Final = 1e-3
+"""What moves less, in rad and lengths of the arm, is a point: that of an arm stretched as far as it goes."""
 
 SolveLocked: TypeAlias = Callable[[Array, Mapping[int, Array]], Array]
 """Solves poses of shape (N, 4, 4), positions in lengths of the arm, with the joints of these indices locked at values
@@ -56,7 +58,8 @@ def self_motions(
     """Return the self-motions of a pose, the one that passes nearest to a configuration first.
 
     They start at all solutions with one joint locked at each of several values, so one that no such value meets is
-    missed; joints that take most part in self-motions are locked.
+    missed; joints that take most part in self-motions are locked. Where axes in line give the arm more freedom, its
+    configurations are a surface, of which one curve is followed.
 
     Args:
         arm: The arm, with one joint to spare.
@@ -76,10 +79,20 @@ def self_motions(
         seeds.append(solve_locked(np.broadcast_to(T, (len(values), 4, 4)), {joint: values}))
     found = np.concatenate(seeds) if seeds else np.zeros((0, arm.n))
     order = np.argsort(_distances(found[:, own], near[own], turns), kind="stable")
+    ordered = list(found[order])
+    if (
+        not arm.goal_joints
+        and float(np.abs(pose_error(pose_and_jacobian(arm, near[None])[0], T[None])).max()) < ON_POSE
+    ):
+        ordered.insert(0, near)  # exactly singular, where what is found is nearly so
     paths: list[Path] = []
-    for q in found[order]:
-        if not any(lies_on(path.q[:, own], q[own], turns, closed=path.closed) for path in paths):
-            paths.append(follow(arm, q, T, moving))
+    flat = False
+    for q in ordered:
+        several = len(null_directions(arm, q, moving)) > 1  # of a surface one curve is enough
+        if (several and flat) or any(lies_on(path.q[:, own], q[own], turns, closed=path.closed) for path in paths):
+            continue
+        paths.append(follow(arm, q, T, moving))
+        flat |= several
     return paths
 
 
@@ -96,13 +109,14 @@ def _moving_most(arm: Arm, moving: NDArray[np.bool_], ranges: Array) -> list[int
 
 
 def curves_and_nearest(
-    arm: Arm, paths: list[Path], lower: Array, upper: Array, near: Array
+    arm: Arm, paths: list[Path], kinds: Sequence[str], lower: Array, upper: Array, near: Array
 ) -> tuple[list[Curve], Array, list[int]]:
     """Return what limits leave of self-motions as curves, and the configuration of each that is nearest to another.
 
     Args:
         arm: The arm.
-        paths: Its self-motions.
+        paths: Its self-motions; one that stands still is no curve, but its configuration is returned.
+        kinds: What each is called.
         lower: Lowest joint coordinates, rad and m, shape (n,) of the arm's own joints; -inf where there is no limit.
         upper: Highest ones.
         near: The other configuration, likewise.
@@ -119,7 +133,11 @@ def curves_and_nearest(
             nearest = int(distances.argmin())
             parts.append((float(distances[nearest]), number, part, part.q[nearest]))
     parts.sort(key=lambda part: part[0])
-    curves = [Curve(q=read_only(part.q), kind=SELF_MOTION, closed=part.closed) for _, _, part, _ in parts]
+    curves = [
+        Curve(q=read_only(part.q), kind=kinds[number], closed=part.closed)
+        for _, number, part, _ in parts
+        if np.ptp(paths[number].q, axis=0).max() > LEAST_EXTENT
+    ]
     q = np.array([q for *_, q in parts]).reshape(-1, n)
     return curves, q, [number for _, number, _, _ in parts]
 

@@ -31,6 +31,8 @@ MOST: Final = 4000
 """Points of a curve."""
 FAR: Final = 10.0
 """A slide this many lengths of the arm from where it began ends the curve."""
+WOUND: Final = 5.0 * np.pi
+"""A turn this far from where it began ends it, too: such a curve winds over a surface, and may never close."""
 FLAT: Final = 1e-7
 """Singular values below count as zero."""
 
@@ -74,7 +76,7 @@ class _Curve:
 
     def followed(self, start: Array, sign: float) -> tuple[Array, bool]:
         """Return points from ``start`` on in one direction, and whether they lead back to it."""
-        first = sign * self._direction(start, None)
+        first = sign * self._first_direction(start)
         q, direction, step = start, first, FIRST
         points = [start]
         while len(points) < MOST:
@@ -87,23 +89,26 @@ class _Curve:
                 continue
             if len(points) > 3 and self._passes(start, q, there) and float(ahead @ first) > 0.5:
                 return np.array(points), True
-            if np.abs((there - start)[~self._turns]).max(initial=0.0) > FAR:
+            if (np.abs(there - start) > np.where(self._turns, WOUND, FAR)).any():
                 return np.array(points), False
             points.append(there)
             q, direction, step = there, ahead, min(1.5 * step, LONGEST)
         return np.array(points), False
 
-    def _direction(self, q: Array, before: Array | None) -> Array:
+    def _first_direction(self, q: Array) -> Array:
+        """Return a unit vector along a curve through ``q``: of several, one that goes on."""
+        directions = null_directions(self._arm, q, self._moving)
+        for direction in directions if len(directions) > 1 else ():
+            there = self._onto(q + FIRST * direction)
+            if there is not None and float(np.linalg.norm(there - q - FIRST * direction)) < 0.1 * FIRST:
+                return np.asarray(direction)
+        return np.asarray(directions[-1])
+
+    def _direction(self, q: Array, before: Array) -> Array:
         """Return the unit vector along the curve: of several, where the arm is singular, the one that goes on."""
-        J = pose_and_jacobian(self._arm, q[None])[1][0][:, self._moving]
-        _, values, vectors = np.linalg.svd(J)
-        rank = int((values > FLAT).sum())
-        null = vectors[min(rank, len(vectors) - 1) :]
+        null = _null_space(self._arm, q, self._moving)
         direction = np.zeros(len(q))
-        if before is None:
-            direction[self._moving] = null[-1]
-        else:
-            direction[self._moving] = null.T @ (null @ before[self._moving])
+        direction[self._moving] = null.T @ (null @ before[self._moving])
         length = float(np.linalg.norm(direction))
         return direction / length if length > 0.0 else direction
 
@@ -133,6 +138,31 @@ class _Curve:
     def wrapped(self, difference: Array) -> Array:
         """Return a difference of configurations, whole turns left out."""
         return np.where(self._turns, (difference + np.pi) % (2.0 * np.pi) - np.pi, difference)
+
+
+def null_directions(arm: Arm, q: Array, moving: NDArray[np.bool_]) -> Array:
+    """Return unit vectors that span the velocities at which the tool stands still, shape (k, n), k at least 1.
+
+    Where there are several, each moves as few joints as possible: curves along them close, as those along mixtures of
+    turns in line with each other need not.
+    """
+    rows = np.array(_null_space(arm, q, moving))
+    for i in range(len(rows) if len(rows) > 1 else 0):
+        row, column = divmod(int(np.abs(rows[i:]).argmax()), rows.shape[1])
+        rows[[i, i + row]] = rows[[i + row, i]]
+        rows[i] /= rows[i, column]
+        others = np.arange(len(rows)) != i
+        rows[others] -= rows[others, column, None] * rows[i]
+    directions = np.zeros((len(rows), len(q)))
+    directions[:, moving] = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    return directions
+
+
+def _null_space(arm: Arm, q: Array, moving: NDArray[np.bool_]) -> Array:
+    """Return an orthonormal basis of it, or the least vector where there is none, of the joints that move."""
+    _, values, vectors = np.linalg.svd(pose_and_jacobian(arm, q[None])[1][0][:, moving])
+    rank = int((values > FLAT).sum())
+    return np.asarray(vectors[min(rank, len(vectors) - 1) :])
 
 
 def lies_on(points: Array, q: Array, turns: NDArray[np.bool_], *, closed: bool) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
@@ -22,7 +22,7 @@ from dh2sim.inverse.nearest import goal_residuals, goal_sigma_min, miss_text, no
 from dh2sim.inverse.numeric import NumericSolver, arm_size
 from dh2sim.inverse.reach import limits_reason, position_limits, why_unreachable
 from dh2sim.inverse.redundancy import SAMPLES, curves_and_nearest, joints_to_lock, self_motions
-from dh2sim.inverse.self_motion import LONGEST, Path
+from dh2sim.inverse.self_motion import LONGEST, SELF_MOTION, Path
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.turns import Turns
 from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, spec_of
@@ -249,15 +249,24 @@ class InverseSolver:
         paths = self_motions(arm, arm.scaled_poses(T), moving, ranges, near_scaled, solve_locked)
         none = replace(no_solutions(len(self.names)), complete=min(shares) == 1.0, found_share=min(shares))
         note = f"Self-motions were looked for at {SAMPLES} values each of {listed(sampled, ' and ')}."
-        result = self._of_paths(none, arm, paths, T, q0, free, limits=limits)
+        result = self._of_paths(none, arm, paths, [SELF_MOTION] * len(paths), T, q0, free, limits=limits)
         return replace(result, notes=(note,)) if paths else result
 
     def _of_paths(
-        self, none: Solutions, arm: Arm, paths: list[Path], T: Array, q0: Array, free: Free | None, *, limits: bool
+        self,
+        none: Solutions,
+        arm: Arm,
+        paths: list[Path],
+        kinds: Sequence[str],
+        T: Array,
+        q0: Array,
+        free: Free | None,
+        *,
+        limits: bool,
     ) -> Solutions:
         """Return what limits leave of curves, and the configuration of each that is nearest to ``q0``."""
-        curves, q, same = curves_and_nearest(arm, paths, *self._bounds(limits=limits), q0)
-        if paths and not curves:
+        curves, q, same = curves_and_nearest(arm, paths, kinds, *self._bounds(limits=limits), q0)
+        if paths and not len(q):
             ends = np.concatenate([arm.unscaled(path.q)[:, : len(q0)] for path in paths])
             return replace(none, reason=limits_reason(self._spec, self._turns.placed(ends, q0)))
         reached = goal_residuals(self._spec, q0[None], T[None], free=free, size=self.size)[0] <= VERIFIED
@@ -288,18 +297,17 @@ class InverseSolver:
         limits: bool,
     ) -> Solutions:
         """Add families at a singularity to the isolated solutions of a pose, of which there are so many in all."""
-        families = self._of_paths(no_solutions(len(q0)), arm, paths, T, q0, free, limits=limits)
+        kinds = [family_kind(path, len(q0)) for path in paths]
+        families = self._of_paths(no_solutions(len(q0)), arm, paths, kinds, T, q0, free, limits=limits)
         if not len(families):
             return isolated if len(isolated) else replace(isolated, reason=isolated.reason or families.reason)
-        kinds = [family_kind(paths[number], len(q0)) for number in families.same]
         notes = []
-        for path in paths:
+        for path, kind in zip(paths, kinds, strict=True):
             *names, last = (self.names[joint] for joint in moving_joints(path, len(q0)))
             joints = f"{', '.join(names)} and {last} move" if names else f"{last} moves"
-            notes.append(f"{family_kind(path, len(q0)).capitalize()}: {joints}, tool0 does not.")
+            notes.append(f"{kind.capitalize()}: {joints}, tool0 does not.")
         order = np.argsort(self._turns.distance(np.concatenate([isolated.q, families.q]), q0), kind="stable")
         same = np.concatenate([isolated.same, families.same + count])[order]
-        curves = tuple(replace(curve, kind=kind) for curve, kind in zip(families.curves, kinds, strict=True))
         return replace(
             isolated,
             q=read_only(np.concatenate([isolated.q, families.q])[order]),
@@ -308,7 +316,7 @@ class InverseSolver:
             within_limits=np.concatenate([isolated.within_limits, families.within_limits])[order],
             same=same,
             branch=("",) * len(order),
-            curves=curves,
+            curves=families.curves,
             notes=(*isolated.notes, *dict.fromkeys(notes)),
             reason="",
         )

@@ -53,3 +53,16 @@ def test_a_stretched_elbow_is_one_isolated_solution() -> None:
 def test_a_note_says_which_joints_move() -> None:
     solutions = solved("puma560", [0.3, -0.6, 0.5, 0.9, 0.0, -0.4])
     assert solutions.notes == ("Wrist singularity: joint_4 and joint_6 move, tool0 does not.",)
+
+
+def test_a_straight_elbow_and_a_wrist_in_line_are_one_curve_and_no_point_of_it_beside() -> None:
+    straight = -np.arctan2(0.4318, 0.0203)
+    solutions = solved("puma560", [0.0, 0.0, float(straight), 0.0, 0.0, 0.0])
+    assert [curve.kind for curve in solutions.curves] == ["wrist singularity"]
+    in_line = [name for name in solutions.branch if "wrist singular" in name]
+    assert in_line == ["left, elbow straight, wrist singular"]
+
+
+def test_a_wrist_alone_has_a_wrist_singularity() -> None:
+    solutions = solved("spherical_wrist", [0.4, 0.0, 0.3])
+    assert [curve.kind for curve in solutions.curves] == ["wrist singularity"]

@@ -153,3 +153,21 @@ def test_a_slide_at_its_limit_ends_a_curve() -> None:
     [curve] = answer.curves
     assert not curve.closed
     assert curve.q[:, 0] == pytest.approx(-curve.q[:, 2])
+
+
+def test_axes_all_in_line_leave_one_closed_curve_of_two_joints() -> None:
+    iiwa = robot("kuka_iiwa14")
+    q = np.zeros(7)
+    solutions = inverse_kinematics(iiwa, table_tool_pose(iiwa, q), q, limits=False)
+    [curve] = solutions.curves
+    assert curve.closed
+    assert (np.ptp(curve.q, axis=0) > 1e-6).sum() == 2
+    assert np.abs(table_tool_pose(iiwa, curve.q) - table_tool_pose(iiwa, q)).max() < 1e-12
+
+
+def test_an_arm_stretched_to_one_point_has_no_curve() -> None:
+    kinova = robot("kinova_gen3")
+    q = np.zeros(7)
+    solutions = inverse_kinematics(kinova, table_tool_pose(kinova, q), q)
+    assert solutions.curves == ()
+    assert solutions.q == pytest.approx(q[None], abs=1e-6)
