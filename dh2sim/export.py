@@ -284,11 +284,15 @@ def export_robot(
     """
     files = render(model, formats, dh_frames=dh_frames)
     target = out / model.name
-    with atomic_files(out, model.name, wait=wait, waiting=waiting) as staging, mujoco_warnings() as warned:
+    checks: list[Verified] = []
+    warned: list[str] = []
+    with atomic_files(out, model.name, wait=wait, waiting=waiting) as staging:
         for relative, data in files.items():
             (staging / relative).parent.mkdir(parents=True, exist_ok=True)
             (staging / relative).write_bytes(data)
-        checks = verify(model, staging, formats) if verified else []
+        if verified:
+            with mujoco_warnings() as warned:
+                checks = verify(model, staging, formats)
         unchanged = {relative for relative, data in files.items() if _holds(target / relative, data)}
     return ExportReport(
         name=model.name,

@@ -67,8 +67,9 @@ Examples:
   dh2sim validate stanford           check every engine against the table
   dh2sim fk stanford 17 -40 0.5 63 34 -23
   dh2sim jacobian stanford home
-  dh2sim ik puma560 --at 10 20 30 40 50 60     all ways to get there
+  dh2sim ik puma560 --at home        all ways to get there
   dh2sim symbolic puma560            its pose in symbols
+  dh2sim draw stanford               a drawing of it
   dh2sim view stanford --export stanford.html
   dh2sim import arm.urdf -o arm.yaml
   dh2sim convert stanford --to modified
