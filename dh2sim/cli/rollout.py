@@ -202,7 +202,7 @@ def _print_summary(job: Job, summary: RunDescription, progress: Progress, out: P
     options = job.options
     print(
         f"{summary.robot}: {summary.rollouts:,} rollouts of {summary.steps:,} steps ({summary.duration:g} s), "
-        f"{printable(options.controller)}, in {printable(str(out))}"
+        f"{printable(str(options.controller))}, in {printable(str(out))}"
     )
     if progress.rollouts:
         rate = progress.rollouts * options.steps / progress.seconds
