@@ -12,7 +12,7 @@ from hypothesis.internal.conjecture import providers
 
 # derandomized: the same robots in every run, so that a failure is one of the code and not of the day
 settings.register_profile("full", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile("quick", settings.get_profile("full"), max_examples=15)
+settings.register_profile("quick", settings.get_profile("full"), max_examples=8)
 
 # property tests try constants of the modules that are loaded, too; without them, which examples a test tries does not
 # depend on which others run with it. There is no setting for it.

@@ -24,7 +24,7 @@ from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.robot.spec import Convention, JointType, RobotSpec
 from dh2sim.typing import Array
 from tests.program import dh2sim, environment
-from tests.sample_robots import COSTLY_NAMES, robot
+from tests.sample_robots import NAMES, robot
 from tests.strategies import robots_with_joint_vectors
 
 STYLES = ("kinematic", "frames", "stick")
@@ -64,7 +64,9 @@ def test_the_arm_is_where_the_table_has_it(sample: tuple[RobotSpec, Array]) -> N
 
 
 @pytest.mark.parametrize("style", STYLES)
-@pytest.mark.parametrize("name", COSTLY_NAMES)
+@pytest.mark.parametrize(
+    "name", ["puma560", *(pytest.param(name, marks=pytest.mark.slow) for name in NAMES if name != "puma560")]
+)
 def test_labels_are_never_on_each_other(name: str, style: str) -> None:
     boxes = []
     for text in draw_robot(robot(name), style=style).sheet.texts:
@@ -75,7 +77,9 @@ def test_labels_are_never_on_each_other(name: str, style: str) -> None:
         assert bool((low >= most).any() or (high <= least).any()), f"{one} is on {other}"
 
 
-@pytest.mark.parametrize("name", COSTLY_NAMES)
+@pytest.mark.parametrize(
+    "name", ["stanford", *(pytest.param(name, marks=pytest.mark.slow) for name in NAMES if name != "stanford")]
+)
 def test_every_joint_axis_and_length_is_named_in_the_diagram(name: str) -> None:
     spec = robot(name)
     arm = place_arm(spec, spec.named_configurations["home"])
@@ -127,6 +131,7 @@ def test_ticks_are_at_round_numbers(length: float, step: float) -> None:
     assert tick_step(length) == pytest.approx(step)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("style", STYLES)
 def test_svg_is_well_formed_the_same_every_time_and_complete(style: str) -> None:
     drawing = draw_robot(robot("puma560"), style=style)
@@ -139,6 +144,7 @@ def test_svg_is_well_formed_the_same_every_time_and_complete(style: str) -> None
     assert "nan" not in drawing.svg
 
 
+@pytest.mark.slow
 def test_everything_is_inside_the_picture() -> None:
     for style in STYLES:
         sheet = draw_robot(robot("ssrms"), style=style).sheet
@@ -264,6 +270,7 @@ def test_wrong_options_are_refused(
     assert message in " ".join(done.err.split())
 
 
+@pytest.mark.slow
 def test_the_pictures_of_the_page_are_what_the_command_draws() -> None:
     from scripts.draw_robots import FOLDER, drawings
 
@@ -272,6 +279,7 @@ def test_the_pictures_of_the_page_are_what_the_command_draws() -> None:
         assert f"images/{name}" in (FOLDER.parent / "drawings.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_only_png_and_pdf_need_matplotlib(tmp_path: Path) -> None:
     code = "import sys; sys.modules['matplotlib'] = None; from dh2sim.cli.main import main; main()"
 

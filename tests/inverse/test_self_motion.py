@@ -63,6 +63,7 @@ def test_no_curve_is_returned_twice() -> None:
             assert apart(curve.q[len(curve) // 2], other) > 1e-3
 
 
+@pytest.mark.slow
 def test_inside_the_limits_a_curve_is_cut_where_it_leaves_them() -> None:
     spec, built = robot("franka_panda"), model("franka_panda")
     q = in_limits(built, 1, seed=4)[0]

@@ -174,6 +174,7 @@ def test_blocks_that_were_damaged_by_hand_are_computed_again(run: Path, undistur
     _assert_same(run, undisturbed)
 
 
+@pytest.mark.slow
 def test_a_run_whose_metadata_were_damaged_by_hand_is_computed_again_elsewhere(
     run: Path, undisturbed: Path, tmp_path: Path
 ) -> None:

@@ -168,7 +168,7 @@ NONSENSE = {
 }
 
 
-@pytest.mark.parametrize("known", [False, True], ids=["at first", "later"])
+@pytest.mark.parametrize("known", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["at first", "later"])
 @pytest.mark.parametrize("what", NONSENSE)
 def test_a_page_that_sends_nonsense_loses_only_itself(
     served: Viewer, what: str, known: bool, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
