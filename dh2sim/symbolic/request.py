@@ -142,19 +142,9 @@ def symbolic_form(
             from dh2sim.symbolic.motion_form import dynamics_form
 
             form = dynamics_form(table, None if letters else bodies, names=names, joint_names=joint_names)
-        case What.POSE:
-            form = pose_form(
-                table,
-                source,
-                target,
-                style=style_,
-                lengths=lengths_,
-                names=names,
-                fold=fold_,
-                joint_names=joint_names,
-            )
-        case What.JACOBIAN:
-            form = jacobian_form(
+        case What.POSE | What.JACOBIAN:
+            between_frames = pose_form if wanted is What.POSE else jacobian_form
+            form = between_frames(
                 table,
                 source,
                 target,
