@@ -72,5 +72,5 @@ def _sentence(text: str, joints: Sequence[str]) -> str:
         what = _WORDS.get(found[1], found[1])
         return f"A simulation became unstable at {float(found[3]):g} s: {what} of {named(found[2])}."
     if "XML contains a 'NaN'" in text:
-        return "An XML file contains NaN, which is no number."
+        return "An XML file contains NaN, which is not a number."
     return f"MuJoCo warns: {text.rstrip('.')}."

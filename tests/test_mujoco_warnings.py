@@ -94,7 +94,7 @@ def test_warnings_are_collected_once_and_the_latest_context_takes_them() -> None
             for _ in range(2):
                 mujoco.MjModel.from_xml_string(text)
         assert outer == []
-        assert warning_sentences(inner) == ("An XML file contains NaN, which is no number.",)
+        assert warning_sentences(inner) == ("An XML file contains NaN, which is not a number.",)
         assert mujoco.get_mju_user_warning() is own
     finally:
         mujoco.set_mju_user_warning(None)

@@ -25,7 +25,7 @@ def branch_names(robot: ChainLike, q: ArrayLike) -> tuple[str, ...]:
         q: Joint vectors, rad and m, shape (k, n).
 
     Returns:
-        k names; '' where the arm is of no class that has them. What is singular is told: ``left, elbow straight``.
+        k names; '' where the arm is of no class that has them. What is singular is named: ``left, elbow straight``.
 
     Raises:
         ConfigurationError: ``q`` has the wrong shape or is not finite.

@@ -135,7 +135,7 @@ def test_a_nan_in_a_file_never_passes(exported: Path, attribute: str, monkeypatc
     run = dh2sim("validate", exported / "odd.yaml", "--dir", exported / "made", "--samples", "5")
     assert run.status == 1
     assert run.err == ""
-    assert "mujoco: An XML file contains NaN, which is no number." in run.out
+    assert "mujoco: An XML file contains NaN, which is not a number." in run.out
     assert not (exported / "MUJOCO_LOG.TXT").exists()
     assert {line.split()[0] for line in run.out.splitlines() if line.endswith("FAILED")} >= {"mujoco-mjcf"}
 
