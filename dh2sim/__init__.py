@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 _HOMES = {
     "ActuatorSpec": "robot.spec",
-    "Continuous": "robot_facade",
+    "Continuous": "robot.table_rows",
     "Dh2simError": "errors",
     "Dynamics": "robot.spec",
     "Explanation": "inverse.textbook",
-    "Fixed": "robot_facade",
+    "Fixed": "robot.table_rows",
     "ImportOptions": "importing.sources",
     "InverseSolver": "inverse.solver",
     "KinematicChain": "kinematics.chain",
@@ -21,8 +21,8 @@ _HOMES = {
     "LinkSpec": "robot.spec",
     "PayloadSpec": "robot.spec",
     "Pose": "robot.spec",
-    "Prismatic": "robot_facade",
-    "Revolute": "robot_facade",
+    "Prismatic": "robot.table_rows",
+    "Revolute": "robot.table_rows",
     "Robot": "robot_facade",
     "RobotError": "errors",
     "RobotFileError": "errors",
@@ -100,11 +100,11 @@ if TYPE_CHECKING:
     from dh2sim.robot.spec import Row as Row
     from dh2sim.robot.spec import ShapeSpec as ShapeSpec
     from dh2sim.robot.spec import ToolSpec as ToolSpec
+    from dh2sim.robot.table_rows import Continuous as Continuous
+    from dh2sim.robot.table_rows import Fixed as Fixed
+    from dh2sim.robot.table_rows import Prismatic as Prismatic
+    from dh2sim.robot.table_rows import Revolute as Revolute
     from dh2sim.robot.write import robot_file_text as robot_file_text
-    from dh2sim.robot_facade import Continuous as Continuous
-    from dh2sim.robot_facade import Fixed as Fixed
-    from dh2sim.robot_facade import Prismatic as Prismatic
-    from dh2sim.robot_facade import Revolute as Revolute
     from dh2sim.robot_facade import Robot as Robot
     from dh2sim.symbolic.request import SymbolicForm as SymbolicForm
     from dh2sim.symbolic.request import symbolic_form as symbolic_form

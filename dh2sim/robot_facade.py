@@ -1,4 +1,4 @@
-"""A robot with its verbs: ``Robot``, and the rows that one is made of in code.
+"""``Robot``: a robot with its verbs.
 
 Every method calls functions that are public themselves, and imports what it needs when it is called.
 """
@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from functools import cached_property, wraps
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, TypeAlias, Unpack, cast
+from typing import TYPE_CHECKING, Any, Final, Self, TypeAlias, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,15 +21,10 @@ from dh2sim.errors import ConfigurationError, Dh2simError, EngineError, OutputEr
 from dh2sim.messages import did_you_mean, listed, member, shown
 from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
 from dh2sim.robot.spec import (
-    ActuatorSpec,
     AngleUnit,
     BaseSpec,
     Convention,
-    Dynamics,
-    JointType,
     LengthUnit,
-    Limits,
-    LinkSpec,
     PayloadSpec,
     Pose,
     RobotSpec,
@@ -37,6 +32,7 @@ from dh2sim.robot.spec import (
     ToolSpec,
     Units,
 )
+from dh2sim.robot.table_rows import TableRow, spec_rows
 from dh2sim.robot.textbook_table import table_html, table_latex, table_text
 from dh2sim.typing import Array, read_only
 
@@ -70,78 +66,6 @@ _RIGID: Final = 1e-9
 """By which entries of R Rᵀ may differ from those of the identity."""
 PoseLike: TypeAlias = Pose | ArrayLike
 """A pose; or a position, m, shape (3,); or a homogeneous transform, shape (4, 4)."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class TableRow:
-    """A row of the DH table of a robot made in code: lengths in m, angles in rad, everything else SI."""
-
-    type: ClassVar[JointType]
-
-    name: str | None = None
-    """By default ``joint_<i>``, counted from 1."""
-    a: float = 0.0
-    alpha: float = 0.0
-    d: float = 0.0
-    theta: float = 0.0
-    beta: float = 0.0
-    """Second twist; of a Hayati row only."""
-    flip: bool = False
-    """True: the joint coordinate subtracts instead."""
-    limits: Sequence[float] | Limits | None = None
-    """Lower and upper joint coordinate, rad or m; or :class:`Limits`, which hold velocity and effort too."""
-    dynamics: Dynamics = field(default_factory=Dynamics)
-    link: LinkSpec = field(default_factory=LinkSpec)
-    """Mass, inertia and looks of the link that the joint moves."""
-    actuator: ActuatorSpec = field(default_factory=ActuatorSpec)
-    """What drives the joint; by default position control with gains that dh2sim chooses."""
-    convention: Convention | str | None = None
-    """By default the robot's."""
-
-
-def _reporting_arguments(init: Callable[..., None]) -> Callable[..., None]:
-    """Let ``__init__`` of a row report wrong arguments under the row's own name, and show the ones it has."""
-
-    @wraps(init)
-    def checked(self: TableRow, *unnamed: object, **values: object) -> None:
-        row, names = type(self).__name__, [argument.name for argument in fields(TableRow)]
-        if unnamed:
-            raise TypeError(f"{row} takes named arguments only, as in {row}(d=0.4, alpha=-pi / 2)")
-        for name in values:
-            if name not in names:
-                raise TypeError(
-                    f"{row} has no argument '{name}'.{did_you_mean(name, names)} Arguments: {listed(names)}"
-                )
-        init(self, **values)
-
-    return checked
-
-
-TableRow.__init__ = _reporting_arguments(TableRow.__init__)  # type: ignore[method-assign]
-
-
-class Revolute(TableRow):
-    """A row whose joint coordinate adds to theta."""
-
-    type = JointType.REVOLUTE
-
-
-class Continuous(TableRow):
-    """A row whose joint coordinate adds to theta, without position limits."""
-
-    type = JointType.CONTINUOUS
-
-
-class Prismatic(TableRow):
-    """A row whose joint coordinate adds to d."""
-
-    type = JointType.PRISMATIC
-
-
-class Fixed(TableRow):
-    """A row that does not move."""
-
-    type = JointType.FIXED
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -187,7 +111,7 @@ class Robot:
         """
         given: dict[str, Any] = {
             "name": name,
-            "rows": _rows(rows),
+            "rows": spec_rows(rows),
             "description": description,
             "source": source,
             "convention": convention,
@@ -803,25 +727,6 @@ class Robot:
 
 def _restored(kind: type[Robot], given: dict[str, Any], notes: tuple[str, ...]) -> Robot:
     return kind.from_spec(RobotSpec(**given), notes=notes)
-
-
-def _rows(rows: object) -> object:
-    """Return rows as a specification holds them; what is wrong with them is for the specification to say.
-
-    Raises:
-        RobotError: A text is given.
-    """
-    if isinstance(rows, str):
-        message = f"expected a list of rows, found {shown(rows)}; Robot.load reads a robot file"
-        raise RobotError([Problem(path="joints", message=message)])
-    return [_row(row) for row in rows] if isinstance(rows, Iterable) else rows
-
-
-def _row(row: object) -> object:
-    if not isinstance(row, TableRow):
-        return row
-    given = {field.name: getattr(row, field.name) for field in fields(row)}
-    return Row(type=row.type, **{**given, "limits": Limits() if row.limits is None else row.limits})
 
 
 def _pose(name: str, pose: PoseLike) -> Pose:

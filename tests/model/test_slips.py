@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from dh2sim import Robot, RobotFileError, find_slips, parse_robot
 from dh2sim.model.slips import Slip, SlipKind
 from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.table_rows import Prismatic, Revolute
 from dh2sim.robot.write import robot_file_text
-from dh2sim.robot_facade import Prismatic, Revolute
 from tests.kinematics.test_compaction import calibrated_ur5
 from tests.program import dh2sim
 from tests.refusals import refusal
