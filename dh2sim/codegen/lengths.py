@@ -39,7 +39,7 @@ def _polynomials(spec: RobotSpec) -> Mapping[tuple[int | str, str], Polynomial]:
     """Return the lengths of the base, every row and the tool over the parameters, in the file's unit."""
     from dh2sim.symbolic.angles import slide
     from dh2sim.symbolic.polynomial import Polynomial
-    from dh2sim.symbolic.table import symbolic_table
+    from dh2sim.symbolic.reading import symbolic_table
 
     table = symbolic_table(spec)
     frames = ["base_link", *(f"dh_{i}" for i in range(len(spec.rows) + 1)), "tool0"]

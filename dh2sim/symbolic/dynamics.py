@@ -18,8 +18,8 @@ from typing import Any, Protocol, TypeAlias
 from dh2sim.robot.spec import Convention
 from dh2sim.symbolic.angles import derivative_by, rate, slide
 from dh2sim.symbolic.harmonics import Harmonics, Runs
-from dh2sim.symbolic.polynomial import ZERO, Atom, Matrix, Polynomial, simple
-from dh2sim.symbolic.table import Fold, Letter, SymbolicTable, exact_number, transform
+from dh2sim.symbolic.polynomial import ZERO, Atom, Matrix, Polynomial, exact_number, simple
+from dh2sim.symbolic.table import Fold, Letter, SymbolicTable, transform
 from dh2sim.typing import Array
 
 

@@ -148,6 +148,11 @@ def simple(number: Rational) -> Rational:
     return number.numerator if number.denominator == 1 else number
 
 
+def exact_number(value: float) -> Rational:
+    """Return the decimal fraction that a double is printed as."""
+    return simple(Fraction(repr(float(value))))
+
+
 def magnitude(number: Rational) -> Rational:
     """Return the absolute value."""
     return -number if number < 0 else number

@@ -12,7 +12,8 @@ from dh2sim.messages import member
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.form import Equation, Form
 from dh2sim.symbolic.kinematics import jacobian_form, matrices_form, pose_form
-from dh2sim.symbolic.table import Fold, symbolic_table
+from dh2sim.symbolic.reading import symbolic_table
+from dh2sim.symbolic.table import Fold
 from dh2sim.symbolic.text import form_text
 
 if TYPE_CHECKING:

@@ -18,8 +18,9 @@ from dh2sim.robot.spec import BaseSpec, Pose, RobotSpec, ToolSpec
 from dh2sim.symbolic.check import SampledConfigurations, check_form
 from dh2sim.symbolic.expression import Factor, Lengths, Style, Sum, Term, evaluated, operation_count
 from dh2sim.symbolic.form import Equation, Form
+from dh2sim.symbolic.reading import symbolic_table
 from dh2sim.symbolic.request import symbolic_form
-from dh2sim.symbolic.table import Fold, symbolic_table
+from dh2sim.symbolic.table import Fold
 from tests.sample_robots import NAMES, row
 from tests.sample_robots import robot as spec_of
 from tests.strategies import robot_specs
