@@ -29,12 +29,14 @@ _HOMES = {
     "RobotModel": "model.robot_model",
     "RobotSpec": "robot.spec",
     "Row": "robot.spec",
+    "SampledTrajectory": "trajectory.files",
     "SerialChain": "kinematics.serial_chain",
     "SerialJoint": "kinematics.serial_chain",
     "ShapeSpec": "robot.spec",
     "Solutions": "inverse.solutions",
     "SymbolicForm": "symbolic.request",
     "ToolSpec": "robot.spec",
+    "Trajectory": "trajectory.trajectory",
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
     "convert_robot": "importing.convert",
@@ -49,6 +51,8 @@ _HOMES = {
     "inverse_kinematics": "inverse.solver",
     "load_robot": "robot.read",
     "parse_robot": "robot.read",
+    "plan_trajectory": "trajectory.plan",
+    "read_trajectory": "trajectory.files",
     "recover_table": "kinematics.frame_assignment.recover",
     "robot_file_text": "robot.write",
     "symbolic_form": "symbolic.request",
@@ -108,6 +112,10 @@ if TYPE_CHECKING:
     from dh2sim.robot_facade import Robot as Robot
     from dh2sim.symbolic.request import SymbolicForm as SymbolicForm
     from dh2sim.symbolic.request import symbolic_form as symbolic_form
+    from dh2sim.trajectory.files import SampledTrajectory as SampledTrajectory
+    from dh2sim.trajectory.files import read_trajectory as read_trajectory
+    from dh2sim.trajectory.plan import plan_trajectory as plan_trajectory
+    from dh2sim.trajectory.trajectory import Trajectory as Trajectory
 
     __version__: str
 else:

@@ -141,6 +141,10 @@ class ControllerError(Dh2simError):
     """A controller is not known, its options or files are wrong, or its code failed."""
 
 
+class TrajectoryError(Dh2simError, ValueError):
+    """A trajectory cannot be: a path leaves limits, jumps or cannot be followed; or a file of one is wrong."""
+
+
 class SettingsError(Dh2simError, ValueError):
     """Options of a run are wrong; ``problems`` has the name of each argument with what is wrong with it.
 

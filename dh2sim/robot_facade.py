@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from dh2sim.model.slips import Slip
     from dh2sim.simulate.options import RolloutKeywords
     from dh2sim.symbolic.request import SymbolicForm, SymbolicKeywords, What
+    from dh2sim.trajectory.plan import TrajectoryKeywords
+    from dh2sim.trajectory.trajectory import Trajectory
     from dh2sim.validate.report import RobotReport
     from dh2sim.view.server import Viewer
 
@@ -434,6 +436,27 @@ class Robot:
 
         near = None if q0 is None else self._vectors(q0)
         return inverse_kinematics(self, T, near, limits, lock, free, numeric)
+
+    def trajectory(self, waypoints: Iterable[Any], **options: Unpack[TrajectoryKeywords]) -> Trajectory:
+        """Plan a motion through waypoints, from rest to rest, that keeps all limits.
+
+        Args:
+            waypoints: At least two: names of configurations, joint vectors (n,), poses of tool0 in base_link (4, 4),
+                or mappings with the keys of a waypoint file, in rad and m.
+            **options: As for :func:`dh2sim.plan_trajectory`: ``kind`` ('joint', 'line' or 'arc'), ``profile``
+                ('quintic', 'trapezoid', 'jerk' or 'optimal'), ``duration``, ``limits``, ``through``, ``free``.
+
+        Returns:
+            The :class:`Trajectory`: ``at(t)`` gives positions, velocities, accelerations and jerks, ``save`` writes
+            samples.
+
+        Raises:
+            SettingsError: Waypoints or options are wrong.
+            TrajectoryError: There is no such trajectory; the text says where and why.
+        """
+        from dh2sim.trajectory.plan import plan_trajectory
+
+        return plan_trajectory(self.model, waypoints, **options)
 
     def explain_ik(self, T: ArrayLike) -> Explanation:
         """Derive the configurations that reach a pose as a textbook does, in steps with the numbers.

@@ -22,6 +22,8 @@ class Command(NamedTuple):
     settings: dict[str, Any] = {}  # noqa: RUF012
     many: tuple[str, ...] = ()
     """Options that take all words up to the next option."""
+    bare: tuple[str, ...] = ()
+    """Those of them that may have no word."""
 
 
 NEGATIVE_NUMBERS: Final = {"ignore_unknown_options": True}
@@ -34,6 +36,14 @@ COMMANDS: Final = {
     "fk": Command("fk", "fk", "Print the pose of a frame.", NEGATIVE_NUMBERS),
     "jacobian": Command("fk", "jacobian", "Print the Jacobian, and how close it is to singular.", NEGATIVE_NUMBERS),
     "ik": Command("ik", "ik", "Find all joint vectors that reach a pose.", many=("--at", "--near", "--lock")),
+    "trajectory": Command(
+        "trajectory",
+        "trajectory",
+        "Plan motions through waypoints, within limits.",
+        NEGATIVE_NUMBERS,
+        many=("--limits",),
+        bare=("--limits",),
+    ),
     "symbolic": Command("symbolic", "symbolic", "Print kinematics in symbols, as a textbook does."),
     "info": Command("info", "info", "Print the table, frames, mass and reach."),
     "view": Command("view", "view", "Show a robot in the browser, and edit its table."),
@@ -68,6 +78,7 @@ Examples:
   dh2sim fk stanford 17 -40 0.5 63 34 -23
   dh2sim jacobian stanford home
   dh2sim ik puma560 --at home        all ways to get there
+  dh2sim trajectory puma560 home zero -o motion.csv
   dh2sim symbolic puma560            its pose in symbols
   dh2sim draw stanford               a drawing of it
   dh2sim view stanford --export stanford.html
@@ -100,7 +111,9 @@ class LazyGroup(TyperGroup):
         single = _plain_app(add_completion=False)
         function = getattr(import_module(f"dh2sim.cli.{command.module}"), command.function)
         settings = {**_SETTINGS, **command.settings}
-        single.command(cmd_name, cls=_taking_many(command.many), context_settings=settings)(guarded(function))
+        single.command(cmd_name, cls=_taking_many(command.many, command.bare), context_settings=settings)(
+            guarded(function)
+        )
         return typer.main.get_command(single)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -126,11 +139,11 @@ class LazyGroup(TyperGroup):
             formatter.write_dl([(name, command.help) for name, command in COMMANDS.items()])
 
 
-def _taking_many(options: tuple[str, ...]) -> type[TyperCommand]:
+def _taking_many(options: tuple[str, ...], bare: tuple[str, ...] = ()) -> type[TyperCommand]:
     """Return the class of a command some of whose options take all words up to the next option.
 
-    Negative numbers among them are no options. The command gets the words of an option as one text, with MANY between
-    them.
+    Negative numbers among them are no options; those of ``bare`` may stand alone. The command gets the words of an
+    option as one text, with MANY between them.
     """
 
     class TakingMany(TyperCommand):
@@ -139,7 +152,9 @@ def _taking_many(options: tuple[str, ...]) -> type[TyperCommand]:
             for start in reversed(range(len(given))):
                 if given[start] in options:
                     words = list(takewhile(_is_value, given[start + 1 :]))
-                    given[start + 1 : start + 1 + len(words)] = [MANY.join(words)] if words else []
+                    given[start + 1 : start + 1 + len(words)] = (
+                        [MANY.join(words)] if words or given[start] in bare else []
+                    )
             return super().parse_args(ctx, given)
 
     return TakingMany if options else TyperCommand

@@ -78,6 +78,8 @@ def read_tree(
     data: bytes,
     report: Report,
     directory: Path | None,
+    *,
+    default_units: Units | None = None,
     **compose_options: str,
 ) -> tuple[Tree, Places]:
     """Return the checked tree of a file, with its text as ``source_file``, and the places of its values.
@@ -88,6 +90,7 @@ def read_tree(
         data: The file's content.
         report: Where problems are noted.
         directory: Where paths in the file start; None where it may name no files.
+        default_units: Of a file that names none; by default rad and m.
         **compose_options: As for ``compose``.
 
     Raises:
@@ -96,12 +99,13 @@ def read_tree(
     text = decode(data, report)
     root = compose(text, report, **compose_options)
     places = Places(root, report)
+    usual = default_units or Units()
     scope = Scope(
         report=places,
         parameters=_evaluate_parameters(root, report),
         directory=directory,
-        angle=_unit(root.at("units", "angle"), AngleUnit),
-        length=_unit(root.at("units", "length"), LengthUnit),
+        angle=_unit(root.at("units", "angle"), AngleUnit, usual.angle),
+        length=_unit(root.at("units", "length"), LengthUnit, usual.length),
     )
     tree = kind.check(_plain(root), (), scope)
     if tree is not WRONG:
@@ -143,10 +147,10 @@ class Places:
         return next(node for end in range(len(loc), -1, -1) if (node := self._root.at(*loc[:end])))
 
 
-def _unit(node: Node | None, units: type[StrEnum]) -> str:
-    """Return a unit of the file; the default one where it names none, or a wrong one."""
+def _unit(node: Node | None, units: type[StrEnum], usual: StrEnum) -> str:
+    """Return a unit of the file; the usual one where it names none, or a wrong one."""
     allowed = [unit.value for unit in units]
-    return str(node.value) if node is not None and node.value in allowed else allowed[0]
+    return str(node.value) if node is not None and node.value in allowed else usual.value
 
 
 def units_of(tree: Tree) -> Units:

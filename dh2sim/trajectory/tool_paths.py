@@ -1,0 +1,173 @@
+"""Paths of the tool: straight lines and arcs of its origin, with its orientation turning at a constant rate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from dh2sim.errors import TrajectoryError
+from dh2sim.typing import Array, read_only
+
+_ON_LINE: Final = 1e-9
+"""Sine of the angle between chords below which three points lie on a line."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ToolPath:
+    """A path of tool0 in base_link over the parameter 0 to 1, at a constant rate of position and orientation.
+
+    The orientation is Rodrigues's rotation about one fixed axis, which is spherical linear interpolation (slerp).
+    Source: K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
+    """
+
+    kind: str
+    """'line' or 'arc'."""
+    start: Array
+    """Pose, shape (4, 4)."""
+    distance: float
+    """Length of the path of tool0's origin, m."""
+    angle: float
+    """By which it turns, rad."""
+    turn: Array
+    """Axis times angle of the whole turn, in base_link, rad, shape (3,)."""
+    chord: Array
+    """Of a line: from the start to the end, m, shape (3,)."""
+    centre: Array | None = None
+    """Of an arc, m, shape (3,)."""
+    sweep: Array = field(default_factory=lambda: read_only(np.zeros(3)))
+    """Of an arc: axis times angle about its centre, rad, shape (3,)."""
+
+    def poses(self, x: Array) -> Array:
+        """Return poses at parameters, shape (N, 4, 4)."""
+        T = np.zeros((len(x), 4, 4))
+        T[:, 3, 3] = 1.0
+        T[:, :3, :3] = rotations(x[:, None] * self.turn) @ self.start[:3, :3]
+        if self.centre is None:
+            T[:, :3, 3] = self.start[:3, 3] + x[:, None] * self.chord
+        else:
+            spoke = self.start[:3, 3] - self.centre
+            T[:, :3, 3] = self.centre + rotations(x[:, None] * self.sweep) @ spoke
+        return T
+
+    def velocities(self, T: Array) -> Array:
+        """Return the origin's velocity and the angular velocity per unit of the parameter at poses, shape (N, 6)."""
+        found = np.zeros((len(T), 6))
+        found[:, 3:] = self.turn
+        found[:, :3] = self.chord if self.centre is None else np.cross(self.sweep, T[:, :3, 3] - self.centre)
+        return found
+
+    def place(self, x: float) -> str:
+        """Return where a parameter is: ``0.12 m of 0.5 m along the line``."""
+        if self.distance > 1e-12:
+            return f"{x * self.distance:.4g} m of {self.distance:.4g} m along the {self.kind}"
+        whole = math.degrees(self.angle)
+        return f"{x * whole:.4g} of {whole:.4g} degrees through the turn"
+
+
+def line(start: Array, end: Array) -> ToolPath:
+    """Return the straight line between two poses, shape (4, 4)."""
+    turn = rotation_vector(end[:3, :3] @ start[:3, :3].T)
+    chord = end[:3, 3] - start[:3, 3]
+    return ToolPath(
+        kind="line",
+        start=read_only(start),
+        distance=float(np.linalg.norm(chord)),
+        angle=float(np.linalg.norm(turn)),
+        turn=read_only(turn),
+        chord=read_only(chord),
+    )
+
+
+def arc(start: Array, via: Array, end: Array) -> ToolPath:
+    """Return the arc of a circle from a pose through a point to a pose.
+
+    Args:
+        start: Pose, shape (4, 4).
+        via: Point of the arc, m, shape (3,).
+        end: Pose, shape (4, 4).
+
+    Raises:
+        TrajectoryError: The three points lie on a line.
+    """
+    a, b = via - start[:3, 3], end[:3, 3] - start[:3, 3]
+    normal = np.cross(a, b)
+    size = float(np.linalg.norm(normal))
+    if size <= _ON_LINE * float(np.linalg.norm(a)) * float(np.linalg.norm(b)) or size == 0.0:
+        raise TrajectoryError("start, via and end of the arc lie on a line: no circle goes through them")
+    # the point at equal distance from all three
+    centre = start[:3, 3] + (np.cross(normal, a) * (b @ b) + np.cross(b, normal) * (a @ a)) / (2.0 * size * size)
+    axis = normal / size
+    spoke, last = start[:3, 3] - centre, end[:3, 3] - centre
+    swept = math.atan2(float(np.cross(spoke, last) @ axis), float(spoke @ last)) % math.tau
+    return _arc(start, centre, axis * swept, rotation_vector(end[:3, :3] @ start[:3, :3].T))
+
+
+def circle(start: Array, centre: Array, axis: Array, angle: float) -> ToolPath:
+    """Return the arc about a centre by an angle, rad, positive about the axis; the orientation stays.
+
+    Raises:
+        TrajectoryError: The start lies on the axis, or not in the plane of the circle.
+    """
+    unit = axis / np.linalg.norm(axis)
+    spoke = start[:3, 3] - centre
+    radius = float(np.linalg.norm(spoke))
+    if radius <= 1e-12 or abs(float(unit @ spoke)) > 1e-6 * radius:
+        raise TrajectoryError(
+            "the circle does not go through its start: the line from centre to start must be perpendicular to axis"
+        )
+    return _arc(start, centre, unit * angle, np.zeros(3))
+
+
+def _arc(start: Array, centre: Array, sweep: Array, turn: Array) -> ToolPath:
+    radius = float(np.linalg.norm(start[:3, 3] - centre))
+    return ToolPath(
+        kind="arc",
+        start=read_only(start),
+        distance=radius * float(np.linalg.norm(sweep)),
+        angle=float(np.linalg.norm(turn)),
+        turn=read_only(turn),
+        chord=read_only(np.zeros(3)),
+        centre=read_only(centre),
+        sweep=read_only(sweep),
+    )
+
+
+def rotations(vectors: Array) -> Array:
+    """Return the rotations about axes by angles: vectors (N, 3), rad, to matrices (N, 3, 3); Rodrigues's formula."""
+    angle = np.linalg.norm(vectors, axis=1)
+    half = 0.5 * angle
+    safe = np.where(angle > 0.0, angle, 1.0)
+    # sin(a) / a and (1 - cos a) / a², without cancellation
+    first = np.where(angle > 0.0, np.sin(angle) / safe, 1.0)[:, None, None]
+    second = np.where(angle > 0.0, 2.0 * (np.sin(half) / safe) ** 2, 0.5)[:, None, None]
+    K = np.zeros((len(vectors), 3, 3))
+    K[:, 2, 1], K[:, 0, 2], K[:, 1, 0] = vectors.T
+    K -= np.swapaxes(K, 1, 2)
+    return np.asarray(np.eye(3) + first * K + second * (K @ K))
+
+
+def rotation_vector(R: Array) -> Array:
+    """Return the axis times the angle, 0 to pi, of a rotation, shape (3, 3), or of each of shape (N, 3, 3)."""
+    matrices = R[None] if R.ndim == 2 else R
+    axial = 0.5 * np.stack(
+        [
+            matrices[:, 2, 1] - matrices[:, 1, 2],
+            matrices[:, 0, 2] - matrices[:, 2, 0],
+            matrices[:, 1, 0] - matrices[:, 0, 1],
+        ],
+        axis=1,
+    )
+    sine = np.linalg.norm(axial, axis=1)
+    cosine = 0.5 * (np.trace(matrices, axis1=1, axis2=2) - 1.0)
+    angle = np.arctan2(sine, cosine)
+    factor = np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 1.0)
+    vectors = factor[:, None] * axial
+    for i in np.flatnonzero((cosine < 0.0) & (sine < 1e-4)):  # near half a turn the axis is in the symmetric part
+        symmetric = 0.5 * (matrices[i] + matrices[i].T) - np.cos(angle[i]) * np.eye(3)
+        column = symmetric[:, int(np.argmax(np.diag(symmetric)))]
+        axis = column / np.linalg.norm(column)
+        vectors[i] = angle[i] * (axis if axis @ axial[i] >= 0.0 else -axis)
+    return np.asarray(vectors[0] if R.ndim == 2 else vectors)
