@@ -24,6 +24,7 @@ MODULES = {
     "video": {"PIL", "imageio_ffmpeg", "xarray"},
     "data": {"xarray", "pyarrow", "h5netcdf", "h5py"},
     "engines": {"yourdfpy"},
+    "toppra": {"toppra"},
     "xacro": {"xacro"},
 }
 """What is imported of each extra's libraries."""
@@ -93,6 +94,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("data", "runs run.zarr --to parquet", "Parquet"),
         ("data", "runs run.zarr --to hdf5", "HDF5"),
         ("data", "validate rpr --dynamics", "--dynamics"),
+        ("toppra", "trajectory rpr home zero --profile optimal", "profile 'optimal'"),
     ],
 )
 def test_a_command_without_its_extra_says_how_to_install_it(
@@ -143,6 +145,7 @@ def test_nothing_is_simulated_that_could_not_be_returned(folder: Path) -> None:
         "frames axes.yaml -q",
         "rollout rpr --out other.zarr --rollouts 2 --steps 5",
         "runs run.zarr",
+        "trajectory rpr home home -o motion.csv",
     ],
 )
 def test_the_core_works_without_any_extra(folder: Path, tmp_path: Path, command: str) -> None:

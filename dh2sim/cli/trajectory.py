@@ -96,7 +96,7 @@ def trajectory(
     Then:
       dh2sim view puma560 motion.csv
       dh2sim plot motion.csv
-      dh2sim rollout puma560 --out run.zarr --controller replay:motion.csv --start reference
+      dh2sim rollout puma560 --out run.zarr --controller replay:motion.csv
     """
     from dh2sim.trajectory.files import require_suffix
     from dh2sim.trajectory.plan import plan_trajectory

@@ -26,6 +26,7 @@ COMMANDS = (
     "fk",
     "jacobian",
     "ik",
+    "trajectory",
     "symbolic",
     "info",
     "view",
