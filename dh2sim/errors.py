@@ -81,6 +81,10 @@ class NotFiniteError(Dh2simError, ValueError):
         return type(self)(f"{part}.{self.where}" if self.where else part, self.value)
 
 
+class AssemblyError(Dh2simError, ValueError):
+    """The loops of a mechanism cannot be closed."""
+
+
 class MeshError(Dh2simError):
     """A mesh cannot be used."""
 

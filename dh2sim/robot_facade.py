@@ -132,11 +132,19 @@ class Robot:
 
     @classmethod
     def from_spec(cls, spec: RobotSpec, *, notes: Iterable[str] = ()) -> Self:
-        """Return the robot that a :class:`RobotSpec` describes."""
+        """Return the robot that a :class:`RobotSpec` describes.
+
+        Raises:
+            AssemblyError: It has loops that cannot be closed.
+        """
         from dh2sim.kinematics.chain import spec_of
 
         robot = cls.__new__(cls)
         robot._set(spec_of(spec), notes)
+        if robot.spec.closures:
+            from dh2sim.kinematics.loop_closure import assembly
+
+            assembly(robot.spec)
         return robot
 
     @classmethod

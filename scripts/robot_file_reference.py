@@ -84,6 +84,33 @@ that they hold it. It is no body, and in no export; an arm that does carry somet
 ball of 1000 kg/m³ that touches tool0, beyond it along its z, or has its centre at `com`, in DH frame n. Without a
 `payload` it weighs a fifth of the moving links, as the nominal payload of many arms does.
 
+## Branches and closed loops
+
+`joints` is the main chain, which carries tool0. `branches` are more chains, each from any frame of the main chain or
+of a branch before it; `closures` are joints between two frames, which close loops. A four-bar linkage:
+
+```yaml
+name: four_bar
+convention: standard
+units: {angle: deg}
+joints:                                     # ground A, crank 0.6 to B, coupler 1.8 to C
+  - {type: revolute, a: 0.6}
+  - {type: revolute, a: 1.8}
+branches:
+  rocker: {from: base_link, pose: {xyz: [2, 0, 0]}, joints: [{type: revolute, a: 1.4}]}
+closures:
+  - {name: C, between: [dh_2, rocker/dh_1], type: revolute}
+actuated: [joint_1]
+assembly: {q: [70, -50, 110]}
+```
+
+The frames of a branch are `rocker/dh_0`, `rocker/dh_1` …, `rocker/link_1` …; its joints are `rocker_joint_1` … unless
+they have names. Joint vectors hold the coordinates of the main chain, then those of the branches in their order.
+The axis of a closure is the z axis of both frames; what must coincide is in the table of `closures` below.
+`assembly` is a guess from which the loops are closed, to 1e-12, when the robot is read; where there is none, `home`
+is. Where that fails, the error says which closure stays open, and by how much. With `actuated`, all other joints are
+passive: they have no actuator. [Mechanisms](mechanisms.md) says what is done with them.
+
 ## Links that weigh nothing
 
 `link: {mass: 0}` is for links between joints, such as those of a wrist or of a planar base that are one body: what
@@ -121,6 +148,9 @@ TITLES = {
     "PayloadEntry": "`payload`",
     "BaseEntry": "`base`",
     "JointEntry": "`joints`: a row of the table",
+    "BranchEntry": "`branches`: a further chain",
+    "ClosureEntry": "`closures`: a joint that closes a loop",
+    "AssemblyEntry": "`assembly`",
     "LimitsEntry": "`joints[].limits`",
     "DynamicsEntry": "`joints[].dynamics`",
     "LinkEntry": "`joints[].link`",
@@ -184,12 +214,13 @@ def _kind(value: dict[str, Any], schema: dict[str, Any]) -> str:
     if kind == "array":
         least, most = value.get("minItems"), value.get("maxItems")
         count = f"{least}" if least == most else f"{least} to {most}" if most else ""
-        item = "mappings" if "$ref" in value.get("items", {}) else "numbers"
+        items = value.get("items", {})
+        item = "mappings" if "$ref" in items else "names" if items.get("type") == "string" else "numbers"
         return f"list of {count} {item}".replace("  ", " ") + _default(value)
     if kind == "object":
-        return "mapping of names to " + (
-            "lists of numbers" if value["additionalProperties"].get("type") == "array" else "numbers"
-        )
+        each = value["additionalProperties"]
+        values = "mappings" if "$ref" in each else "lists of numbers" if each.get("type") == "array" else "numbers"
+        return f"mapping of names to {values}"
     return {"string": "text", "boolean": "`true` \\| `false`"}[str(kind)] + _default(value)
 
 

@@ -40,9 +40,9 @@ Word = TypeVar("Word", bound=StrEnum)
 
 def complete_robot(incomplete: str) -> list[str]:
     """Return what a shell offers for ROBOT: robots that come with dh2sim, robot files and folders."""
-    from dh2sim.robot.catalog import builtin_robots
+    from dh2sim.robot.catalog import builtin_mechanisms, builtin_robots
 
-    names = [name for name in builtin_robots() if name.startswith(incomplete)]
+    names = [name for name in (*builtin_robots(), *builtin_mechanisms()) if name.startswith(incomplete)]
     folder, start = os.path.split(incomplete)
     try:
         entries = sorted(os.scandir(folder or "."), key=lambda entry: entry.name)
@@ -210,7 +210,12 @@ def load_all(robots: Sequence[str]) -> list[RobotSpec]:
 
     def load(robot: str) -> RobotSpec:
         refuse_other_formats(robot)
-        return load_robot(robot)
+        spec = load_robot(robot)
+        if spec.closures:
+            from dh2sim.kinematics.loop_closure import assembly
+
+            assembly(spec)
+        return spec
 
     return _all(load, robots)
 

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.errors import ConfigurationError
+from dh2sim.errors import ConfigurationError, ModelError
 from dh2sim.kinematics.transforms import compose, identity, joint_part, link_part, pose_from_rpy, second_twist
-from dh2sim.robot.spec import Convention, JointType, RobotSpec
+from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 from dh2sim.typing import Array
 
 
@@ -116,12 +117,35 @@ def build_chain(spec: SpecLike) -> KinematicChain:
 
     Returns:
         One joint for every row; its transforms are the same bits on every machine.
+
+    Raises:
+        ModelError: The robot has branches or closures; ``build_tree`` takes those too.
     """
     spec = spec_of(spec)
+    if spec.is_mechanism:
+        raise ModelError(f"{spec.name}: has {_more_than_a_chain(spec)}: this works on serial robots")
     T_base_link_dh0 = pose_from_rpy(spec.base.pose.xyz, spec.base.pose.rpy)
-    T_parent_dh = T_base_link_dh0  # the previous row's DH frame in the parent of the joint at hand
+    return KinematicChain(
+        joints=placed_joints(spec.rows, T_base_link_dh0),
+        T_base_link_dh0=T_base_link_dh0,
+        T_dhn_tool0=pose_from_rpy(spec.tool.xyz, spec.tool.rpy),
+    )
+
+
+def _more_than_a_chain(spec: RobotSpec) -> str:
+    """Return what a mechanism has besides its main chain."""
+    return "closed loops" if spec.closures else "branches"
+
+
+def placed_joints(rows: Iterable[Row], T_parent_dh: Array) -> tuple[Joint, ...]:
+    """Turn the rows of one chain into joint-placed bodies.
+
+    Args:
+        rows: The DH table.
+        T_parent_dh: Pose of the DH frame before the first row in the parent of the first joint, shape (4, 4).
+    """
     joints = []
-    for row in spec.rows:
+    for row in rows:
         link, joint = link_part(row.a, row.alpha), joint_part(row.theta, row.d)
         match row.convention:
             case Convention.STANDARD:
@@ -139,12 +163,8 @@ def build_chain(spec: SpecLike) -> KinematicChain:
                 T_joint_dh=T_joint_dh,
             )
         )
-        T_parent_dh = T_joint_dh
-    return KinematicChain(
-        joints=tuple(joints),
-        T_base_link_dh0=T_base_link_dh0,
-        T_dhn_tool0=pose_from_rpy(spec.tool.xyz, spec.tool.rpy),
-    )
+        T_parent_dh = T_joint_dh  # of the previous row, in the parent of the next joint
+    return tuple(joints)
 
 
 def joint_vectors(chain: KinematicChain, q: ArrayLike) -> tuple[Array, tuple[int, ...]]:

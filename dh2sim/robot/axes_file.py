@@ -10,7 +10,7 @@ import numpy as np
 
 from dh2sim.errors import ImportedFileError
 from dh2sim.messages import Loc, closest
-from dh2sim.robot.checks import check_actuators, check_configurations, check_names, check_type, trees
+from dh2sim.robot.checks import check_actuators, check_configurations, check_names, check_type, placed_rows
 from dh2sim.robot.fields import WRONG, Choice, Configurations, Name, Numbers, Parameters, Scope, Text, Tree, UnitsLike
 from dh2sim.robot.parts import Internal, Part, Parts
 from dh2sim.robot.read import read_tree, units_of
@@ -151,9 +151,9 @@ def read_axes(data: bytes, *, file: str, directory: Path) -> AxesSpec:
 
 def _check(tree: Tree, scope: Scope) -> None:
     """Report what does not go together in an axes file."""
-    axes = trees(tree, "axes")
-    check_names(axes, "axes", scope)
-    for index, axis in enumerate(axes):
-        check_type(axis, ("axes", index), scope)
-    check_configurations(tree, axes, "axes", scope, each="axis")
-    check_actuators(tree, axes, "axes", scope)
+    axes = placed_rows(tree, "axes")
+    check_names(axes, scope)
+    for placed in axes:
+        check_type(placed.row, placed.loc, scope)
+    check_configurations(tree, axes, scope, each="axis")
+    check_actuators(tree, axes, scope)

@@ -13,6 +13,8 @@ from dh2sim.robot.yaml_tree import Node, Report, compose
 _PACKAGE: Final = Path(__file__).resolve().parent.parent
 _FOLDERS: Final = (_PACKAGE / "robots", _PACKAGE.parent / "robots")
 """In an installed wheel; in a checkout."""
+_MECHANISMS: Final = "mechanisms"
+"""The folder in it of the files with branches and closed loops."""
 _GROUPS: Final = "groups.toml"
 """The file in the folder that sorts the robots: a list of names for each group."""
 
@@ -37,10 +39,17 @@ def builtin_robots() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _folder().glob("*.yaml")))
 
 
+def builtin_mechanisms() -> tuple[str, ...]:
+    """Return the names of the mechanisms with branches and closed loops that come with dh2sim, sorted."""
+    return tuple(sorted(path.stem for path in (_folder() / _MECHANISMS).glob("*.yaml")))
+
+
 def builtin_path(name: str) -> Path | None:
-    """Return the file of a robot that comes with dh2sim, with or without ``.yaml``; None for others."""
+    """Return the file of what comes with dh2sim by this name, with or without ``.yaml``; None for others."""
     stem = name.removesuffix(".yaml")
-    return _folder() / f"{stem}.yaml" if stem in builtin_robots() else None
+    if stem in builtin_robots():
+        return _folder() / f"{stem}.yaml"
+    return _folder() / _MECHANISMS / f"{stem}.yaml" if stem in builtin_mechanisms() else None
 
 
 def builtin_groups() -> dict[str, tuple[str, ...]]:

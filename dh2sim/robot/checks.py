@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from dh2sim.messages import Loc, listed, path_of, shown
 from dh2sim.robot.fields import COORDINATE, WRONG, Scope, Tree, is_reserved, name_problem
@@ -22,20 +22,45 @@ _SIZES: Final = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": (
 """The sizes that a shape has."""
 
 
-def default_name(index: int) -> str:
-    """Return the name of a row that is given none; ``index`` counts from 0, the name from 1."""
-    return f"joint_{index + 1}"
+def default_name(index: int, branch: str = "") -> str:
+    """Return the name of a row that is given none, of the main chain or of a branch; ``index`` counts from 0."""
+    return f"{branch}_joint_{index + 1}" if branch else f"joint_{index + 1}"
+
+
+class PlacedRow(NamedTuple):
+    """A row of a checked tree, and its place."""
+
+    loc: Loc
+    row: Tree
+    name: Any
+    """Its own or default name; WRONG where that is wrong."""
+
+
+def placed_rows(robot: Tree, key: str = "joints") -> list[PlacedRow]:
+    """Return the rows of a checked tree in the order of a joint vector: the main chain, then the branches."""
+    placed = _placed(trees(robot, key), (key,), "")
+    branches = robot.get("branches")
+    for name, branch in branches.items() if isinstance(branches, dict) else ():
+        if isinstance(branch, dict):
+            placed += _placed(trees(branch, key), ("branches", str(name), key), str(name))
+    return placed
+
+
+def _placed(rows: Sequence[Tree], loc: Loc, branch: str) -> list[PlacedRow]:
+    return [
+        PlacedRow((*loc, index), row, row.get("name", default_name(index, branch))) for index, row in enumerate(rows)
+    ]
 
 
 def check(robot: Tree, scope: Scope) -> None:
     """Report what does not go together in a robot."""
-    rows = trees(robot, "joints")
-    check_names(rows, "joints", scope)
-    for index, row in enumerate(rows):
-        check_type(row, ("joints", index), scope)
-        _check_convention(row, ("joints", index), robot, scope)
-    check_configurations(robot, rows, "joints", scope)
-    check_actuators(robot, rows, "joints", scope)
+    rows = placed_rows(robot)
+    check_names(rows, scope)
+    for placed in rows:
+        check_type(placed.row, placed.loc, scope)
+        _check_convention(placed.row, placed.loc, robot, scope)
+    check_configurations(robot, rows, scope)
+    check_actuators(robot, rows, scope)
     _check_tool(robot.get("tool"), scope)
     _check_masses(robot, rows, scope)
 
@@ -46,25 +71,20 @@ def trees(tree: Any, key: str) -> list[Tree]:
     return [entry if isinstance(entry, dict) else {} for entry in entries] if isinstance(entries, list) else []
 
 
-def _name(rows: Sequence[Tree], index: int) -> Any:
-    return rows[index].get("name", default_name(index))
-
-
-def check_names(rows: Sequence[Tree], key: str, scope: Scope) -> None:
+def check_names(rows: Sequence[PlacedRow], scope: Scope) -> None:
     """Joint names are unique, and none is one that the exports need."""
-    first: dict[str, int] = {}
-    for index, row in enumerate(rows):
-        name = _name(rows, index)
+    first: dict[str, Loc] = {}
+    for place, row, name in rows:
         if name is WRONG:
             continue
-        loc: Loc = (key, index, "name") if "name" in row else (key, index)
+        loc: Loc = (*place, "name") if "name" in row else place
         if is_reserved(name):
             scope.report(loc, f"{shown(name)} is the name of a fixed joint in the exports; choose another")
-        other = first.setdefault(name, index)
-        if other != index:
+        other = first.setdefault(name, place)
+        if other != place:
             what = "joint name" if "name" in row else "default joint name"
-            line = scope.report.line((key, other, "name"), (key, other))
-            scope.report(loc, f"duplicate {what} {shown(name)}; {path_of((key, other))}{line} has it already")
+            line = scope.report.line((*other, "name"), other)
+            scope.report(loc, f"duplicate {what} {shown(name)}; {path_of(other)}{line} has it already")
 
 
 def check_type(row: Tree, loc: Loc, scope: Scope) -> None:
@@ -96,35 +116,39 @@ def _check_convention(row: Tree, loc: Loc, robot: Tree, scope: Scope) -> None:
         scope.report((*loc, "beta"), message, at_key=True)
 
 
-def check_configurations(
-    robot: Tree, rows: Sequence[Tree], key: str, scope: Scope, *, each: str = "moving row"
-) -> None:
+def check_configurations(robot: Tree, rows: Sequence[PlacedRow], scope: Scope, *, each: str = "moving row") -> None:
     """Configurations have proper names, a value for each moving row, and each value within its limits."""
     configurations = robot.get("configurations")
     if not isinstance(configurations, dict):
         return
-    moving = [index for index, row in enumerate(rows) if row.get("type") != "fixed"]
-    countable = bool(rows) and all(isinstance(row.get("type"), str) for row in rows)
     for name, values in configurations.items():
         if problem := name_problem(name, "the name of a configuration"):
             scope.report(("configurations", str(name)), problem, at_key=True, path=("configurations",))
-        if not countable or not isinstance(values, list):
+        check_joint_vector(values, ("configurations", str(name)), rows, scope, each=each)
+
+
+def check_joint_vector(
+    values: Any, loc: Loc, rows: Sequence[PlacedRow], scope: Scope, *, each: str = "moving row"
+) -> None:
+    """A joint vector has a value for each moving row, each within its limits."""
+    countable = bool(rows) and all(isinstance(placed.row.get("type"), str) for placed in rows)
+    if not countable or not isinstance(values, list):
+        return
+    moving = [placed for placed in rows if placed.row["type"] != "fixed"]
+    called = [path_of(placed.loc) if placed.name is WRONG else placed.name for placed in moving]
+    if len(values) != len(moving):
+        expected = f"expected {len(moving)} numbers, one for each {each} ({listed(called)})"
+        scope.report(loc, f"{expected}, found a list of {len(values)}")
+        return
+    for place, (value, placed, joint) in enumerate(zip(values, moving, called, strict=True)):
+        if value is WRONG:
             continue
-        loc: Loc = ("configurations", str(name))
-        called = [path_of((key, index)) if _name(rows, index) is WRONG else _name(rows, index) for index in moving]
-        if len(values) != len(moving):
-            expected = f"expected {len(moving)} numbers, one for each {each} ({listed(called)})"
-            scope.report(loc, f"{expected}, found a list of {len(values)}")
-            continue
-        for place, (value, index, joint) in enumerate(zip(values, moving, called, strict=True)):
-            if value is WRONG:
-                continue
-            if problem := COORDINATE.size_problem(value, replace(scope, joint_type=rows[index]["type"])):
-                scope.report((*loc, place), f"{problem}, found {shown(value)}")
-            elif limits := _outside(value, rows[index]):
-                lower, upper = limits
-                outside = f"{value!r} is outside the limits of {joint}: {lower!r} to {upper!r}"
-                scope.report((*loc, place), outside + _whole_turn_hint(value, rows[index], limits, scope))
+        if problem := COORDINATE.size_problem(value, replace(scope, joint_type=placed.row["type"])):
+            scope.report((*loc, place), f"{problem}, found {shown(value)}")
+        elif limits := _outside(value, placed.row):
+            lower, upper = limits
+            outside = f"{value!r} is outside the limits of {joint}: {lower!r} to {upper!r}"
+            scope.report((*loc, place), outside + _whole_turn_hint(value, placed.row, limits, scope))
 
 
 def _outside(value: float, row: Tree) -> tuple[float, float] | None:
@@ -149,13 +173,13 @@ def _whole_turn_hint(value: float, row: Tree, limits: tuple[float, float], scope
     return f"; {same:.12g} is the same angle" if limits[0] <= same <= limits[1] else ""
 
 
-def check_actuators(robot: Tree, rows: Sequence[Tree], key: str, scope: Scope) -> None:
+def check_actuators(robot: Tree, rows: Sequence[PlacedRow], scope: Scope) -> None:
     """An actuator has only the gains that its type uses."""
     shared = robot.get("actuators")
     default = _check_gains(shared, ("actuators",), "position", scope)
-    for index, row in enumerate(rows):
+    for loc, row, _ in rows:
         if row.get("type") != "fixed":
-            _check_gains(row.get("actuator"), (key, index, "actuator"), default, scope)
+            _check_gains(row.get("actuator"), (*loc, "actuator"), default, scope)
 
 
 def _check_gains(actuator: Any, loc: Loc, inherited: Any, scope: Scope) -> Any:
@@ -191,21 +215,28 @@ def _check_tool(tool: Any, scope: Scope) -> None:
                 scope.report(("tool", key), message, at_key=True)
 
 
-def _check_masses(robot: Tree, rows: Sequence[Tree], scope: Scope) -> None:
-    """What weighs nothing has no centre of mass, and the last joint moves some mass."""
-    links = [_part(row, "link") for row in rows]
+def _check_masses(robot: Tree, rows: Sequence[PlacedRow], scope: Scope) -> None:
+    """What weighs nothing has no centre of mass, and the last joint of each chain moves some mass."""
     tool = _part(robot, "tool")
-    owners: list[tuple[Loc, Tree]] = [(("joints", index, "link"), link) for index, link in enumerate(links)]
-    for loc, owner in [*owners, (("tool",), tool)]:
+    links = [((*placed.loc, "link"), _part(placed.row, "link")) for placed in rows]
+    for loc, owner in [*links, (("tool",), tool)]:
         for key in ("com", "inertia"):
             if owner.get("mass") == 0 and key in owner:
                 scope.report((*loc, key), f"what has a mass of 0 has no '{key}'", at_key=True)
-    last = max((index for index, row in enumerate(rows) if row.get("type") not in (None, "fixed")), default=None)
-    if last is None or any(link.get("mass") != 0 for link in links[last:]):
+    chains: dict[Loc, list[PlacedRow]] = {}
+    for placed in rows:
+        chains.setdefault(placed.loc[:-1], []).append(placed)
+    for loc, chain in chains.items():
+        _check_last_mass(chain, tool if len(loc) == 1 else {}, scope)
+
+
+def _check_last_mass(rows: Sequence[PlacedRow], tool: Tree, scope: Scope) -> None:
+    last = max((k for k, placed in enumerate(rows) if placed.row.get("type") not in (None, "fixed")), default=None)
+    if last is None or any(_part(placed.row, "link").get("mass") != 0 for placed in rows[last:]):
         return  # what is not given is estimated
     if tool.get("mass", 0) == 0 and ("mass" in tool or "shape" not in tool):
-        message = f"{_name(rows, last)} would move nothing that has mass; 0 is for links between others"
-        scope.report(("joints", last, "link", "mass"), f"{message}, or before a tool that has a mass")
+        message = f"{rows[last].name} would move nothing that has mass; 0 is for links between others"
+        scope.report((*rows[last].loc, "link", "mass"), f"{message}, or before a tool that has a mass")
 
 
 def _part(tree: Tree, key: str) -> Tree:

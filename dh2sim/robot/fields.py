@@ -436,9 +436,39 @@ class Configurations(Kind):
         """Return a mapping of names to lists of numbers, some of which may be WRONG."""
         if not isinstance(value, dict):
             return scope.wrong(loc, f"expected a mapping, found {shown(value)}")
-        return {name: self._vector(vector, (*loc, str(name)), scope) for name, vector in value.items()}
+        return {name: Vector().check(vector, (*loc, str(name)), scope) for name, vector in value.items()}
 
-    def _vector(self, value: object, loc: Loc, scope: Scope) -> Any:
+
+@dataclass(eq=False, repr=False)
+class Texts(Kind):
+    """A list of texts, such as names that are looked up elsewhere."""
+
+    of: str = field(default="names", kw_only=True)
+    """What they are, as messages name them."""
+    count: int | None = field(default=None, kw_only=True)
+    """How many there are."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return a list of texts, some of which may be WRONG."""
+        number = "" if self.count is None else f"{self.count} "
+        expected = f"expected a list of {number}{self.of}"
+        if not isinstance(value, list):
+            return scope.wrong(loc, f"{expected}, found {shown(value)}")
+        if self.count not in (None, len(value)):
+            return scope.wrong(loc, f"{expected}, found a list of {len(value)}")
+        return [Text().check(text, (*loc, index), scope) for index, text in enumerate(value)]
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:  # noqa: ARG002
+        """Return a tuple."""
+        return tuple(value)
+
+
+@dataclass(eq=False, repr=False)
+class Vector(Kind):
+    """A joint vector; its length and its bounds are checked with the table."""
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return a list of numbers, some of which may be WRONG."""
         if not isinstance(value, list):
             return scope.wrong(loc, f"expected a list, found {shown(value)}")
         return [_ANY.check(number, (*loc, index), scope) for index, number in enumerate(value)]

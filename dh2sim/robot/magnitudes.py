@@ -70,6 +70,8 @@ MAGNITUDES: Final = (
 MOST_ROWS: Final = 494
 """Of a table. MuJoCo's XML reader nests at most 496 bodies; base_link is one of them, and a tool or a last frame may
 be another."""
+MOST_CLOSURES: Final = 100
+"""Of a mechanism: closing them takes time that grows with their cube."""
 LARGEST: Final = max(of.most for of in MAGNITUDES)
 """Greatest number of any kind."""
 

@@ -107,15 +107,16 @@ _NO_PART: Final = Part()
 
 @dataclass(eq=False, repr=False)
 class Parts(Kind):
-    """A list of parts, at least one and at most ``MOST_ROWS``."""
+    """A list of parts, at most ``MOST_ROWS``, and at least one unless it may be empty."""
 
     item: Part = _NO_PART
+    may_be_empty: bool = field(default=False, kw_only=True)
 
     def check(self, value: object, loc: Loc, scope: Scope) -> Any:
         """Return a list of trees, some of which may be WRONG."""
         if not isinstance(value, list):
             return scope.wrong(loc, f"expected a list, found {shown(value)}")
-        if not value:
+        if not value and not self.may_be_empty:
             return scope.wrong(loc, "the list is empty; at least one entry is needed")
         if len(value) > MOST_ROWS:
             return scope.wrong(loc, f"the list has {len(value)} entries; at most {MOST_ROWS} are allowed")
@@ -124,6 +125,25 @@ class Parts(Kind):
     def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
         """Return a tuple of parts in SI units."""
         return tuple(self.item.to_si(tree, units, turns=turns) for tree in value)
+
+
+@dataclass(eq=False, repr=False)
+class NamedParts(Kind):
+    """Parts by name, at most ``MOST_ROWS``; the names are checked with the robot."""
+
+    item: Part = _NO_PART
+
+    def check(self, value: object, loc: Loc, scope: Scope) -> Any:
+        """Return a mapping of names to trees, some of which may be WRONG."""
+        if not isinstance(value, dict):
+            return scope.wrong(loc, f"expected a mapping of names to mappings, found {shown(value)}")
+        if len(value) > MOST_ROWS:
+            return scope.wrong(loc, f"the mapping has {len(value)} entries; at most {MOST_ROWS} are allowed")
+        return {name: self.item.check(item, (*loc, str(name)), scope) for name, item in value.items()}
+
+    def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
+        """Return a mapping of names to parts in SI units."""
+        return MappingProxyType({name: self.item.to_si(tree, units, turns=turns) for name, tree in value.items()})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

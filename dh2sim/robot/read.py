@@ -12,12 +12,12 @@ from pathlib import Path
 
 from dh2sim.errors import Dh2simError, RobotError, UnknownRobotError
 from dh2sim.messages import Loc, did_you_mean, listed, loc_of, path_of, shown
-from dh2sim.robot.catalog import builtin_path, builtin_robots
-from dh2sim.robot.checks import check
+from dh2sim.robot.catalog import builtin_mechanisms, builtin_path, builtin_robots
+from dh2sim.robot.checks import placed_rows
 from dh2sim.robot.expressions import NumberError, is_name, names_in, parameter_name_problem, to_number
 from dh2sim.robot.fields import WRONG, Scope, Tree
 from dh2sim.robot.parts import Part
-from dh2sim.robot.spec import ROBOT, AngleUnit, LengthUnit, RobotSpec, SourceFile, Units, robot_fields
+from dh2sim.robot.spec import ROBOT, AngleUnit, LengthUnit, RobotSpec, SourceFile, Units, check_robot, robot_fields
 from dh2sim.robot.yaml_tree import MAX_BYTES, Entry, Node, Report, check_size, compose, decode
 
 
@@ -62,8 +62,8 @@ def parse_robot(
     data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
     report = Report(file)
     folder = directory or Path.cwd()
-    tree, places = read_tree(ROBOT, check, data, report, folder if mesh_files else None)
-    _locate_meshes(tree, places)
+    tree, places = read_tree(ROBOT, check_robot, data, report, folder if mesh_files else None)
+    _locate(tree, places)
     try:
         return RobotSpec(**robot_fields(tree, units_of(tree)))
     except RobotError as error:  # right in the file's units alone, such as a radius that is too small in m
@@ -169,13 +169,15 @@ def _plain(node: Node) -> object:
             return scalar
 
 
-def _locate_meshes(tree: Tree, places: Places) -> None:
-    """Note in the meshes of a checked tree where the file names them, for later messages."""
+def _locate(tree: Tree, places: Places) -> None:
+    """Note where the file names meshes and the assembly, of which more is found out later."""
     owners: list[tuple[Loc, Tree]] = [((key,), tree.get(key, {})) for key in ("base", "tool")]
-    owners += [(("joints", index, "link"), row.get("link", {})) for index, row in enumerate(tree["joints"])]
+    owners += [((*placed.loc, "link"), placed.row.get("link", {})) for placed in placed_rows(tree)]
     for loc, owner in owners:
         if "mesh" in owner:
             owner["mesh"]["location"] = places.place((*loc, "mesh", "file"))
+    if "assembly" in tree:
+        tree["assembly"]["location"] = places.place(("assembly", "q"))
 
 
 def _evaluate_parameters(root: Node, report: Report) -> Mapping[str, float]:
@@ -251,14 +253,14 @@ def _find(given: str) -> tuple[Path, str]:
     path = Path(given)
     if given and os.path.lexists(given):
         if path.is_dir():
-            named = given in builtin_robots()
+            named = builtin_path(given) is not None
             hint = f"; '{given}.yaml' is the robot that comes with dh2sim" if named else ""
             raise Dh2simError(f"{given}: is a folder, not a robot file{hint}")
         return path, given
     builtin = builtin_path(given)
     if builtin is not None:
         return builtin, builtin.name
-    known = builtin_robots()
+    known = [*builtin_robots(), *builtin_mechanisms()]
     here = f"{given}.yaml"
     hint = (
         f" Did you mean '{here}'?"

@@ -21,9 +21,11 @@ from dh2sim.robot.fields import (
     Number,
     Numbers,
     Parameters,
+    Texts,
+    Vector,
 )
 from dh2sim.robot.magnitudes import ANGLE, LENGTH, MOST_ROWS, Magnitude
-from dh2sim.robot.parts import Inertia, InertiaNumbers, Part, Parts, fields_of
+from dh2sim.robot.parts import Inertia, InertiaNumbers, NamedParts, Part, Parts, fields_of
 from dh2sim.robot.spec import ROBOT, AngleUnit, LengthUnit
 
 _NAME = {"pattern": NAME_PATTERN, "maxLength": LONGEST_NAME}
@@ -79,7 +81,21 @@ def _value(kind: Kind, definitions: dict[str, Any]) -> dict[str, Any]:
         case Inertia():
             return _value(Part("", InertiaNumbers), definitions)
         case Parts():
-            return {"type": "array", "items": _value(kind.item, definitions), "minItems": 1, "maxItems": MOST_ROWS}
+            least = 0 if kind.may_be_empty else 1
+            return {
+                "type": "array",
+                "items": _value(kind.item, definitions),
+                "minItems": least,
+                "maxItems": MOST_ROWS,
+            }
+        case NamedParts():
+            parts = _value(kind.item, definitions)
+            return {"type": "object", "propertyNames": _NAME, "additionalProperties": parts}
+        case Texts():
+            lengths = {} if kind.count is None else {"minItems": kind.count, "maxItems": kind.count}
+            return {"type": "array", "items": {"type": "string"}, **lengths}
+        case Vector():
+            return {"type": "array", "items": _NUMBER}
         case Choice():
             letters = [spelling for short in kind.short for spelling in (short.upper(), short)]
             definitions[kind.of.__name__] = {
@@ -98,8 +114,7 @@ def _value(kind: Kind, definitions: dict[str, Any]) -> dict[str, Any]:
             items = [_value(kind.item, definitions) for _ in range(count)]
             return {"type": "array", "prefixItems": items, "minItems": count, "maxItems": count}
         case Configurations():
-            vectors = {"type": "array", "items": _NUMBER}
-            return {"type": "object", "propertyNames": _NAME, "additionalProperties": vectors}
+            return {"type": "object", "propertyNames": _NAME, "additionalProperties": _value(Vector(), definitions)}
         case Parameters():
             names = {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}
             return {"type": "object", "propertyNames": names, "additionalProperties": _NUMBER}

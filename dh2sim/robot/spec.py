@@ -31,8 +31,10 @@ from dh2sim.robot.fields import (
     Range,
     Scope,
     Text,
+    Texts,
     Tree,
     UnitsLike,
+    Vector,
 )
 from dh2sim.robot.magnitudes import (
     ACCELERATION,
@@ -46,7 +48,8 @@ from dh2sim.robot.magnitudes import (
     SCALE,
     VELOCITY_GAIN,
 )
-from dh2sim.robot.parts import Inertia, Internal, Part, Parts, kept, plain_part
+from dh2sim.robot.mechanism_checks import check_mechanism, default_closure_name
+from dh2sim.robot.parts import Inertia, Internal, NamedParts, Part, Parts, kept, plain_part
 from dh2sim.typing import Array, read_only
 
 _FILLED_IN: Final[Any] = None
@@ -417,6 +420,65 @@ class PayloadSpec:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BranchSpec:
+    """A further chain of rows, which starts from a frame of the main chain or of a branch before it."""
+
+    origin: Annotated[
+        str,
+        Text("Frame that it starts from: base_link, link_1, dh_2, tool0, rocker/dh_1.", required=True, key="from"),
+    ]
+    pose: Annotated[Pose, Part("Pose of the branch's DH frame 0 in that frame.", Pose)] = field(default_factory=Pose)
+    rows: Annotated[
+        tuple[Row, ...], Parts("The branch's DH table, a row each.", Part("", Row), required=True, key="joints")
+    ]
+
+
+class ClosureType(StrEnum):
+    """A joint that closes a loop; its axis is the z axis of both frames."""
+
+    REVOLUTE = "revolute"
+    """The origins and the z axes coincide."""
+    SPHERICAL = "spherical"
+    """The origins coincide."""
+    UNIVERSAL = "universal"
+    """The origins coincide and the z axes, those of the cross, are perpendicular."""
+    CYLINDRICAL = "cylindrical"
+    """The z axes are on one line."""
+    PRISMATIC = "prismatic"
+    """The z axes are on one line, and the frames have the same orientation."""
+    FIXED = "fixed"
+    """The frames coincide."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ClosureSpec:
+    """Two frames that must coincide, up to the freedom of a joint."""
+
+    name: Annotated[str, Name("Default closure_<i>, counted from 1.")] = _FILLED_IN
+    between: Annotated[
+        tuple[str, str],
+        Texts("The two frames, such as [dh_2, rocker/dh_1].", of="frames", count=2, required=True),
+    ]
+    type: Annotated[ClosureType, Choice("The joint between them.", ClosureType, required=True)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AssemblySpec:
+    """A configuration near which the loops are closed: it picks one of the ways to assemble the mechanism."""
+
+    q: Annotated[
+        Array,
+        Vector(
+            "A joint vector, in the file's units: of the moving rows of the main chain, then of the branches.",
+            required=True,
+        ),
+    ]
+    """Shape (n,), rad and m, as given: a guess."""
+    location: Annotated[str, Internal("", str)] = ""
+    """``file:line:column: path`` of the vector in the robot file, to begin an error message with."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotSpec:
     """A robot described by its Denavit-Hartenberg table.
 
@@ -469,6 +531,19 @@ class RobotSpec:
         Configurations("Named joint vectors, a number for each moving row, in the file's units."),
     ] = field(default_factory=lambda: MappingProxyType({}))
     """Each of shape (number of moving rows,)."""
+    branches: Annotated[
+        Mapping[str, BranchSpec],
+        NamedParts("Further chains by name, each from a frame of those before it.", Part("", BranchSpec)),
+    ] = field(default_factory=lambda: MappingProxyType({}))
+    closures: Annotated[
+        tuple[ClosureSpec, ...],
+        Parts("Joints that close loops: frames that must coincide.", Part("", ClosureSpec), may_be_empty=True),
+    ] = ()
+    actuated: Annotated[
+        tuple[str, ...] | None,
+        Texts("Names of the joints that are driven; the others are passive. Default all.", of="joint names"),
+    ] = None
+    assembly: Annotated[AssemblySpec | None, Part("How the loops are assembled.", AssemblySpec)] = None
     source_file: Annotated[SourceFile | None, Internal("", SourceFile)] = None
     """None for a robot made in code."""
 
@@ -477,25 +552,40 @@ class RobotSpec:
         problems = _Problems()
         scope = Scope(report=problems, parameters=None, directory=Path())
         tree = ROBOT.check({"convention": Convention.STANDARD.value, **plain_part(self)}, (), scope)
-        check(tree, scope)
+        check_robot(tree, scope)
         if problems.found:
             raise RobotError(problems.found)
         for name, value in robot_fields(tree, Units()).items():
             object.__setattr__(self, name, kept(getattr(self, name), value))
 
     @property
+    def all_rows(self) -> tuple[Row, ...]:
+        """The rows of the main chain, then those of the branches."""
+        return (*self.rows, *(row for branch in self.branches.values() for row in branch.rows))
+
+    @property
     def moving_rows(self) -> tuple[Row, ...]:
-        """The rows that have a joint coordinate, in the order of a joint vector."""
-        return tuple(row for row in self.rows if row.type.moves)
+        """The rows that have a joint coordinate, in the order of a joint vector: main chain first, then branches."""
+        return tuple(row for row in self.all_rows if row.type.moves)
+
+    @property
+    def is_mechanism(self) -> bool:
+        """Whether there is more than one serial chain."""
+        return bool(self.branches or self.closures)
 
     @property
     def named_configurations(self) -> Mapping[str, Array]:
-        """Home and zero, which every robot has, and those of the robot file: rad and m, each of shape (n,).
+        """Home and zero, which every serial robot has, and those of the robot file: rad and m, each of shape (n,).
 
-        Where the file has no ``home``, it is zero moved inside the limits.
+        Where the file has no ``home``, it is the assembly, or zero moved inside the limits. Where there are loops,
+        these are what they are closed from, and there is no zero but the file's.
         """
         limits = [row.limits.position or (0.0, 0.0) for row in self.moving_rows]
         home = read_only([min(max(0.0, lower), upper) for lower, upper in limits])
+        if self.closures:
+            return MappingProxyType(
+                {"home": home if self.assembly is None else self.assembly.q, **self.configurations}
+            )
         return MappingProxyType({"home": home, "zero": read_only([0.0] * len(limits)), **self.configurations})
 
 
@@ -516,6 +606,12 @@ class _Problems:
         return ""
 
 
+def check_robot(tree: Tree, scope: Scope) -> None:
+    """Report what does not go together in a robot."""
+    check(tree, scope)
+    check_mechanism(tree, scope)
+
+
 def robot_fields(tree: Tree, units: UnitsLike) -> dict[str, Any]:
     """Return the fields of the robot that a checked tree describes: what is left out is filled in.
 
@@ -524,30 +620,49 @@ def robot_fields(tree: Tree, units: UnitsLike) -> dict[str, Any]:
         units: That its values are in.
     """
     rows = filled_in(tree["joints"], tree)
-    fields = ROBOT.fields({**tree, "joints": rows}, units)
-    return {**fields, "configurations": joint_vectors(tree, rows, units)}
+    branches = {
+        name: {**branch, "joints": filled_in(branch["joints"], tree, name)}
+        for name, branch in tree.get("branches", {}).items()
+    }
+    closures = [
+        {"name": default_closure_name(index), **closure} for index, closure in enumerate(tree.get("closures", ()))
+    ]
+    whole = {**tree, "joints": rows, "branches": branches, "closures": closures}
+    fields = ROBOT.fields(whole, units)
+    every = [*rows, *(row for branch in branches.values() for row in branch["joints"])]
+    fields["configurations"] = joint_vectors(tree, every, units)
+    if "assembly" in tree:
+        q = joint_vector_si(tree["assembly"]["q"], every, units)
+        fields["assembly"] = AssemblySpec(q=q, location=tree["assembly"].get("location", ""))
+    return fields
 
 
-def filled_in(rows: Sequence[Tree], robot: Tree) -> list[Tree]:
+def filled_in(rows: Sequence[Tree], robot: Tree, branch: str = "") -> list[Tree]:
     """Return the rows of a checked tree, each with a name, a convention and an actuator."""
     shared = {"type": ActuatorType.POSITION, **robot.get("actuators", {})}
     convention = robot.get("convention", Convention.STANDARD)
-    return [
-        {"name": default_name(index), "convention": convention, **row, "actuator": _actuator(row, shared)}
+    filled = [
+        {"name": default_name(index, branch), "convention": convention, **row, "actuator": _actuator(row, shared)}
         for index, row in enumerate(rows)
     ]
+    actuated = robot.get("actuated")
+    if actuated is None:
+        return filled
+    passive = {"type": ActuatorType.NONE}
+    return [row if row["name"] in actuated else {**row, "actuator": passive} for row in filled]
 
 
 def joint_vectors(robot: Tree, rows: Sequence[Tree], units: UnitsLike) -> Mapping[str, Array]:
     """Return the configurations of a checked tree in SI units."""
+    vectors = robot.get("configurations", {})
+    return MappingProxyType({name: joint_vector_si(vector, rows, units) for name, vector in vectors.items()})
+
+
+def joint_vector_si(vector: Sequence[float], rows: Sequence[Tree], units: UnitsLike) -> Array:
+    """Return a joint vector of a checked tree in SI units."""
     turns = [row["type"].turns for row in rows if row["type"].moves]
-    vectors = {
-        name: read_only(
-            [units.to_si(value, Dimension.COORDINATE, turns=turn) for value, turn in zip(vector, turns, strict=True)]
-        )
-        for name, vector in robot.get("configurations", {}).items()
-    }
-    return MappingProxyType(vectors)
+    pairs = zip(vector, turns, strict=True)
+    return read_only([units.to_si(value, Dimension.COORDINATE, turns=turn) for value, turn in pairs])
 
 
 def _actuator(row: Tree, shared: Tree) -> Tree:

@@ -24,6 +24,7 @@ import numpy as np
 from dh2sim.errors import ModelError, NotFiniteError
 from dh2sim.robot.checks import default_name
 from dh2sim.robot.fields import Choice, Color, Dimension, Flag, Kind, MeshFile, Number, Numbers
+from dh2sim.robot.mechanism_checks import default_closure_name
 from dh2sim.robot.parts import Inertia, Internal, Part, fields_of
 from dh2sim.robot.spec import (
     ActuatorSpec,
@@ -446,8 +447,25 @@ def robot_file_text(
     if spec.gravity.tolist() != _GRAVITY:
         before["gravity"] = numbers(spec.gravity.tolist())
     lines += [line for key, tree in before.items() if tree for line in entry_lines(key, tree)]
-    named = any(row.name != default_name(index) for index, row in enumerate(spec.rows))
-    lines += ["joints:", *table_lines([parts.row(row, spec.convention, shared, named=named) for row in spec.rows])]
+    lines += ["joints:", *table_lines(_table(spec, spec.rows, parts, shared))]
+    if spec.branches:
+        lines.append("branches:")
+    for name, branch in spec.branches.items():
+        lines.append(f"  {word(name)}:")
+        pose = parts.part(branch.pose)
+        start: dict[str, Tree] = {"from": word(branch.origin), **({"pose": pose} if pose else {})}
+        rows = table_lines(_table(spec, branch.rows, parts, shared, name))
+        lines += [*block_lines(start, 4), "    joints:", *(f"    {line}" for line in rows)]
+    if spec.closures:
+        lines.append("closures:")
+    for index, closure in enumerate(spec.closures):
+        own: dict[str, Tree] = {"name": word(closure.name)} if closure.name != default_closure_name(index) else {}
+        own |= {"between": [word(frame) for frame in closure.between], "type": closure.type.value}
+        lines.append(f"  - {inline(own)}")
+    if spec.actuated is not None:
+        lines += entry_lines("actuated", [word(name) for name in spec.actuated])
+    if spec.assembly is not None:
+        lines += entry_lines("assembly", {"q": parts.configuration(spec.assembly.q, spec.moving_rows)})
     if spec.configurations:
         lines.append("configurations:")
     for name, vector in spec.configurations.items():
@@ -457,7 +475,21 @@ def robot_file_text(
     return "\n".join([*lines, ""])
 
 
+def _table(
+    spec: RobotSpec, rows: Sequence[Row], parts: PartWriter, shared: Tree, branch: str = ""
+) -> list[dict[str, Tree]]:
+    """Return the rows of the main chain, or of a branch."""
+    named = any(row.name != default_name(index, branch) for index, row in enumerate(rows))
+    passive = set() if spec.actuated is None else {row.name for row in rows} - set(spec.actuated)
+    table = [parts.row(row, spec.convention, shared, named=named) for row in rows]
+    for row, tree in zip(rows, table, strict=True):
+        if row.name in passive:
+            tree.pop("actuator", None)
+    return table
+
+
 def _shared_actuator(spec: RobotSpec, parts: PartWriter) -> ActuatorSpec:
-    """Return the actuator of all moving rows where it is one and the same, else the default."""
-    first, *others = [row.actuator for row in spec.moving_rows] or [ActuatorSpec()]
+    """Return the actuator of all driven rows where it is one and the same, else the default."""
+    driven = [row for row in spec.moving_rows if spec.actuated is None or row.name in spec.actuated]
+    first, *others = [row.actuator for row in driven] or [ActuatorSpec()]
     return first if all(parts.part(other) == parts.part(first) for other in others) else ActuatorSpec()

@@ -10,7 +10,7 @@ from tests.robot.files import MINIMAL, complaints, with_joint, with_keys
 
 TOP = (
     "name, description, source, convention, units, parameters, base, tool, payload, gravity, joints, configurations, "
-    "actuators"
+    "branches, closures, actuated, assembly, actuators"
 )
 JOINT = "name, type, convention, a, alpha, d, theta, beta, flip, limits, dynamics, link, actuator"
 NUMBER = "expected a number or an expression in a string"
