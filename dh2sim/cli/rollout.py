@@ -55,9 +55,11 @@ def rollout(
         str,
         typer.Option(
             metavar="NAME|FILE",
-            help="home, zero, random, a configuration of the robot file, or a .csv or .npy file of joint positions.",
+            help="home, zero, random, a configuration of the robot file, or a .csv or .npy file of joint positions; "
+            "reference: where the file begins that the controller follows. [default: that, or home]",
+            show_default=False,
         ),
-    ] = "home",
+    ] = "auto",
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random number generator.")] = 0,
     threads: Annotated[
         int, typer.Option(min=0, max=1024, metavar="N", help="Number of threads; 0: one for each processor.")

@@ -15,7 +15,7 @@ from mujoco.batch import Batch
 from dh2sim.errors import SettingsError
 from dh2sim.messages import did_you_mean, listed
 from dh2sim.simulate.mujoco_runtime import forward
-from dh2sim.simulate.options import STARTS, RolloutOptions
+from dh2sim.simulate.options import REFERENCE, STARTS, RolloutOptions
 from dh2sim.simulate.plant import Plant
 from dh2sim.simulate.randomization import Generators, Purpose
 from dh2sim.typing import Array, read_only
@@ -104,6 +104,26 @@ def read_initial_states(
     frozen = read_only(states)
     digest = "" if start in STARTS else hashlib.sha256(frozen.tobytes()).hexdigest()
     return InitialStates(name=start, given=frozen, digest=digest)
+
+
+def reference_start(first: Mapping[str, float] | None, joints: tuple[str, ...]) -> InitialStates:
+    """Return the start of rollouts where the file begins that the controller follows.
+
+    Args:
+        first: Positions by joint, rad and m; None for a controller that follows no file.
+        joints: Names of the moving joints.
+
+    Raises:
+        SettingsError: It follows none, or not with these joints.
+    """
+    if first is None:
+        raise _refused(f"must not be '{REFERENCE}': the controller follows no file that begins somewhere")
+    if set(first) != set(joints):
+        raise _refused(f"the controller's file begins with joints {listed(first)}; the robot has {listed(joints)}")
+    states = np.zeros((1, 2, len(joints)))
+    states[0, 0] = [first[joint] for joint in joints]
+    frozen = read_only(states)
+    return InitialStates(name=REFERENCE, given=frozen, digest=hashlib.sha256(frozen.tobytes()).hexdigest())
 
 
 def _read_file(path: Path, joints: tuple[str, ...], rollouts: int) -> Array:

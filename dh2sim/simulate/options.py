@@ -21,6 +21,8 @@ RANDOMIZABLE: Final = ("mass", "friction", "damping", "armature", "gain")
 """What ``randomize`` may contain: mass and inertia of links together; dry friction, viscous damping and rotor inertia
 of joints; gains of position and velocity actuators."""
 STARTS: Final = ("home", "zero", "random")
+AUTO: Final = "auto"
+REFERENCE: Final = "reference"
 INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
 DEFAULT_DURATION: Final = 2.0
 """s."""
@@ -177,8 +179,9 @@ class RolloutOptions:
     """'Euler', 'RK4', 'implicit' or 'implicitfast'."""
     controller: str | type = field(default="sine", metadata={"read": _controller})
     """``NAME`` or ``NAME:key=value,…``; of your own ``MODULE:CLASS``, ``MODULE:CLASS:key=value,…``, or the class."""
-    start: str = _option("home", _text)
-    """'home', 'zero', 'random', a configuration of the robot file, or a .csv or .npy file of states."""
+    start: str = _option(AUTO, _text)
+    """'home', 'zero', 'random', a configuration of the robot file, or a .csv or .npy file of states; 'reference':
+    where the file begins that the controller follows; 'auto': that if there is one, else home."""
     seed: int = _option(0, partial(_whole, least=0))
     """Seed of the random number generators. The same seed gives the same bits at any number of threads."""
     record: tuple[str, ...] = _option(DEFAULT_RECORD, _record)

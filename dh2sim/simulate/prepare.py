@@ -18,8 +18,8 @@ from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
 from dh2sim.simulate.block import Job, rehearse
 from dh2sim.simulate.controllers.registry import ControllerChoice, choose
 from dh2sim.simulate.dataset_layout import FORMAT, rollout_bytes, run_layout
-from dh2sim.simulate.initial_states import InitialStates, read_initial_states
-from dh2sim.simulate.options import RolloutOptions
+from dh2sim.simulate.initial_states import InitialStates, read_initial_states, reference_start
+from dh2sim.simulate.options import AUTO, REFERENCE, RolloutOptions
 from dh2sim.simulate.plant import Plant, compile_plant
 from dh2sim.simulate.records import SENSED
 
@@ -49,7 +49,7 @@ def prepare(model: RobotModel, options: RolloutOptions, *, command: str = "") ->
         ModelError: An MJCF cannot hold the robot.
     """
     controller, initial = _resolved(model, options)
-    options = options.replace(controller=controller.text)
+    options = options.replace(controller=controller.text, start=initial.name)
     shown = without_meshes(with_base_mass(model) if options.floating_base else model)
     driven = shown if controller.actuation is None else with_actuators(shown, controller.actuation)
     mjcf = to_mjcf(
@@ -94,7 +94,17 @@ def _resolved(model: RobotModel, options: RolloutOptions) -> tuple[ControllerCho
     if not joints:
         problems.append(("", f"{model.name} has no joint that moves: there is nothing to simulate"))
     configurations = model.spec.named_configurations
-    initial = attempt(lambda: read_initial_states(options.start, joints, configurations, options.rollouts))
+    first = None if controller is None else controller.first
+    start = options.start
+    if start == AUTO:
+        start = "home" if first is None or set(first) != set(joints) else REFERENCE
+    initial = attempt(
+        lambda: (
+            reference_start(first, joints)
+            if start == REFERENCE and REFERENCE not in configurations and controller is not None
+            else read_initial_states(start, joints, configurations, options.rollouts)
+        )
+    )
     if problems or controller is None or initial is None:
         raise SettingsError(problems)
     return controller, initial

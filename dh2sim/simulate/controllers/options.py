@@ -43,20 +43,23 @@ def Within(
     return Field(gt=above, ge=at_least, le=at_most, lt=below, json_schema_extra={"unit": unit} if unit else None)
 
 
-def split_pairs(text: str) -> tuple[list[tuple[str, str]], list[str]]:
-    """Split ``key=value,key=value``.
+def split_pairs(text: str, alone: str | None = None) -> tuple[list[tuple[str, str]], list[str]]:
+    """Split ``key=value,key=value``; a value alone may come first, for the option that ``alone`` names.
 
     A value that contains a comma, or has spaces at its ends, is put in quotation marks.
 
     Args:
         text: What follows the controller's name; may be empty.
+        alone: An option's name; None where every value has a key.
 
     Returns:
         Keys with their values in the order given, and what is wrong.
     """
     pairs: list[tuple[str, str]] = []
     problems = []
-    for part in _split(text):
+    for number, part in enumerate(_split(text)):
+        if number == 0 and alone is not None and "=" not in part:
+            part = f"{alone}={part.strip()}"
         key, equals, value = part.partition("=")
         key, value = key.strip(), value.strip()
         if not equals or not key:
@@ -200,7 +203,8 @@ def read_options(name: str, options: tuple[Option, ...], text: str) -> dict[str,
     Raises:
         ControllerError: Options are wrong; the error reports all that are.
     """
-    pairs, problems = split_pairs(text)
+    required = [option.name for option in options if option.required]
+    pairs, problems = split_pairs(text, required[0] if len(required) == 1 else None)
     known = {option.name: option for option in options}
     keys = [key for key, _ in pairs]
     problems += [f"unknown option '{key}'.{did_you_mean(key, known)}" for key in keys if key not in known]

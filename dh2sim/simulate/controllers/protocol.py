@@ -7,7 +7,7 @@ products that a library blocks by size, and no random numbers but from the rollo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -137,3 +137,5 @@ class Prepared:
     """Hexadecimal SHA-256 of the files that were read."""
     follows: bool = False
     """Whether the controller has a ``reference``."""
+    first: Mapping[str, float] | None = None
+    """Where a reference from a file begins, rad and m, by joint: rollouts start there, unless told otherwise."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ import numpy as np
 from dh2sim.errors import ControllerError, RunError
 from dh2sim.messages import closest, listed
 from dh2sim.robot.spec import ActuatorType
+from dh2sim.simulate.controllers.reference import read_reference
 from dh2sim.simulate.dataset_layout import FORMAT
 from dh2sim.simulate.store.manifest import check_array
 from dh2sim.typing import Array, read_only
@@ -53,6 +54,13 @@ class Recording:
     def times_at(self, timestep: float) -> Array:
         """Return the instants, s, shape (K,)."""
         return read_only(np.arange(self.length) * timestep) if self.times is None else self.times
+
+    @property
+    def first(self) -> Mapping[str, float] | None:
+        """Where positions that are one for all rollouts begin, by joint; None for others."""
+        if not self.positions or self.rollouts is not None or self.names is None:
+            return None
+        return dict(zip(self.names, self.read(range(1))[0, 0].tolist(), strict=True))
 
     def only(self, rollout: int) -> Recording:
         """Return one of its rollouts, for all.
@@ -211,9 +219,9 @@ def read_recording(file: str, kind: str) -> Recording:
         raise ControllerError(f"no such file '{file}'")
     if folder:
         return read_run(path, file, kind)
-    readers = {".csv": _read_csv, ".npy": _read_npy}
+    readers = {".csv": _read_csv, ".npy": _read_npy, ".npz": _read_npz}
     if path.suffix.lower() not in readers:
-        raise ControllerError(f"'{file}' cannot be replayed; it must be a .csv file, a .npy file or a run of dh2sim")
+        raise ControllerError(f"'{file}' cannot be replayed; it must be a .csv, .npy or .npz file or a run of dh2sim")
     try:
         return readers[path.suffix.lower()](path, file, kind)
     except OSError as error:
@@ -314,6 +322,25 @@ def _times(file: str, times: Array) -> Array:
             f"'{file}': time must increase from row to row; {float(times[i + 1])!r} comes after {float(times[i])!r}"
         )
     return read_only(times)
+
+
+def _read_npz(path: Path, file: str, kind: str) -> Recording:
+    if kind == "ctrl":
+        raise ControllerError(f"'{file}' is a trajectory: it contains positions of joints, no controls")
+    read = read_reference(str(path))
+    data = read_only(read.q[None])
+    return Recording(
+        file=f"'{file}'",
+        positions=True,
+        actuation=ActuatorType.POSITION,
+        names=read.joints,
+        width=len(read.joints),
+        length=len(read.time),
+        times=read.time,
+        rollouts=None,
+        read=lambda _: data,
+        digest=read.digest,
+    )
 
 
 def _read_npy(path: Path, file: str, kind: str) -> Recording:

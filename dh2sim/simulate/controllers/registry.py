@@ -43,6 +43,8 @@ class ControllerChoice:
     """SHA-256 of what the options do not show: files that the controller reads, and code outside dh2sim."""
     follows: bool = False
     """Whether it follows a reference, which can be recorded."""
+    first: Mapping[str, float] | None = None
+    """Where the reference of a file begins, by joint, rad and m."""
 
 
 BUILT_IN: Final[Mapping[str, type]] = MappingProxyType(
@@ -103,6 +105,8 @@ def slower(text: str) -> str | None:
     if "period" not in defaults:
         return None
     given = read_options(name, options, rest)
+    if given.get("reference") is not None:
+        return None
     given["period"] = 2.0 * given.get("period", defaults["period"])
     return join_pairs(name, given.items())
 
@@ -128,7 +132,7 @@ class _Maker:
 
 
 def _choice(name: str, found: type, text: str, *, own: bool) -> ControllerChoice:
-    prepare = getattr(found, "prepare", None)
+    prepare = _prepare_of(found)
     options = _options(name, found)
     given = read_options(name, options, text)
     arguments = {option.parameter: given[option.name] for option in options if option.name in given}
@@ -153,12 +157,23 @@ def _choice(name: str, found: type, text: str, *, own: bool) -> ControllerChoice
         options=MappingProxyType(given),
         digest=" ".join(filter(None, (code, prepared.digest))),
         follows=prepared.follows,
+        first=prepared.first,
     )
+
+
+def _prepare_of(found: type) -> Any:
+    """Return a class's ``prepare``; None without one, or where the class replaces the constructor that it is for."""
+    for kind in found.__mro__:
+        if "prepare" in vars(kind):
+            return getattr(found, "prepare", None)
+        if "__init__" in vars(kind):
+            return None
+    return getattr(found, "prepare", None)
 
 
 def _options(name: str, found: type) -> tuple[Option, ...]:
     """Return the options of ``prepare``, or of the constructor after its first argument."""
-    prepare = getattr(found, "prepare", None)
+    prepare = _prepare_of(found)
     try:
         if prepare is None:
             return options_of(found, found.__module__, skip=1)

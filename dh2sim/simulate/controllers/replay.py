@@ -31,7 +31,7 @@ class Replay:
         """Read the file; the numbers of a large one are read when they are needed.
 
         Args:
-            file: A ``.csv`` or ``.npy`` file, or a run.
+            file: A ``.csv``, ``.npy`` or ``.npz`` file, or a run; ``replay:FILE`` names it alone.
             as_: Whether the numbers are controls or positions of joints; 'auto': as the columns are named, and
                 controls for a run.
             rollout: Which of the file's rollouts every rollout replays; None: the one of its own index.
@@ -48,6 +48,7 @@ class Replay:
             actuation=recording.actuation,
             digest=recording.digest,
             follows=follows,
+            first=recording.first,
         )
 
 

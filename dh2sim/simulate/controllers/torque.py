@@ -8,11 +8,14 @@ from typing import Annotated, Final
 import mujoco
 import numpy as np
 
+from dh2sim.errors import ControllerError
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.controllers.options import Within
-from dh2sim.simulate.controllers.protocol import Observation, RolloutBatch
+from dh2sim.simulate.controllers.protocol import Observation, Prepared, RolloutBatch
+from dh2sim.simulate.controllers.reference import SampledReference, read_reference
 from dh2sim.simulate.controllers.trajectories import Amplitude, Period, SmoothReference
 from dh2sim.simulate.plant import Plant
+from dh2sim.trajectory.files import SampledTrajectory
 from dh2sim.typing import Array
 
 MOST_DAMPED: Final = 0.4
@@ -172,24 +175,64 @@ class ComputedTorque:
         self,
         batch: RolloutBatch,
         *,
-        bandwidth: Annotated[float, Within(above=0.0, unit="rad/s")] = 20.0,
-        period: Period = 1.0,
-        amplitude: Amplitude = 0.5,
+        bandwidth: float = 20.0,
+        period: float = 1.0,
+        amplitude: float = 0.5,
+        reference: SampledTrajectory | None = None,
     ) -> None:
-        """Draw the references.
+        """Draw the references, unless one is given.
 
         Args:
             batch: The rollouts.
             bandwidth: How fast errors vanish, rad/s.
             period: Duration of a motion between waypoints, s.
             amplitude: Share of the joints' range that the waypoints are in.
+            reference: What every rollout follows instead.
         """
         self._kp, self._kd = bandwidth * bandwidth, 2.0 * bandwidth
-        self._smooth = SmoothReference(batch, period=period, amplitude=amplitude)
+        self._followed: SmoothReference | SampledReference = (
+            SmoothReference(batch, period=period, amplitude=amplitude)
+            if reference is None
+            else SampledReference(batch, reference)
+        )
+
+    @classmethod
+    def prepare(
+        cls,
+        *,
+        bandwidth: Annotated[float, Within(above=0.0, unit="rad/s")] = 20.0,
+        period: Period = 1.0,
+        amplitude: Amplitude = 0.5,
+        reference: str | None = None,
+    ) -> Prepared:
+        """Read the file of the reference, if there is one.
+
+        Args:
+            bandwidth: How fast errors vanish, rad/s.
+            period: Duration of a motion between random waypoints, s.
+            amplitude: Share of the joints' range that the waypoints are in.
+            reference: A trajectory file, .csv or .npz, that every rollout follows in place of random waypoints.
+
+        Raises:
+            ControllerError: The file cannot be used.
+        """
+        if reference is None:
+            make = functools.partial(cls, bandwidth=bandwidth, period=period, amplitude=amplitude)
+            return Prepared(make=make, actuation=cls.actuation, follows=True)
+        if (period, amplitude) != (1.0, 0.5):
+            raise ControllerError("options 'period' and 'amplitude' are of random references, not of a file's")
+        read = read_reference(reference)
+        return Prepared(
+            make=functools.partial(cls, bandwidth=bandwidth, reference=read),
+            actuation=cls.actuation,
+            digest=read.digest,
+            follows=True,
+            first=dict(zip(read.joints, read.q[0].tolist(), strict=True)),
+        )
 
     def control(self, observation: Observation) -> Array:
         """Return torques or forces, N·m or N, shape (batch, n)."""
-        q, v, a = self._smooth.at(observation.step)
+        q, v, a = self._followed.at(observation.step)
         wanted = a + self._kd * (v - observation.v) + self._kp * (q - observation.q)
         torque = observation.bias - observation.passive
         inertia = observation.mass_matrix
@@ -201,5 +244,5 @@ class ComputedTorque:
 
     def reference(self, first: int, count: int) -> tuple[Array, Array]:
         """Return the reference's positions and velocities."""
-        motion = self._smooth.motion(first, count)
+        motion = self._followed.motion(first, count)
         return motion.q, motion.v

@@ -85,7 +85,7 @@ def test_a_file_that_is_not_there_or_of_no_known_kind_is_refused(
     Path("folder").mkdir()
     assert refused("replay:file=b.csv") == "controller 'replay': no such file 'b.csv'"
     assert refused("replay:file=a.txt") == (
-        "controller 'replay': 'a.txt' cannot be replayed; it must be a .csv file, a .npy file or a run of dh2sim"
+        "controller 'replay': 'a.txt' cannot be replayed; it must be a .csv, .npy or .npz file or a run of dh2sim"
     )
     assert refused("replay:file=~nobody_of_this_name/b.csv") == (
         "controller 'replay': cannot read '~nobody_of_this_name/b.csv': Could not determine home directory."
