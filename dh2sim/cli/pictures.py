@@ -163,7 +163,13 @@ def _parse_size(text: str) -> tuple[int, int]:
 
 
 def plot(
-    run: Annotated[Path, typer.Argument(metavar="RUN.zarr", help="A run written by 'dh2sim rollout'.")],
+    run: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN.zarr|MOTION",
+            help="A run written by 'dh2sim rollout', or a .csv or .npz file written by 'dh2sim trajectory'.",
+        ),
+    ],
     rollout: Annotated[int, typer.Option(metavar="N", help="Number of the rollout, from 0.")] = 0,
     what: Annotated[str, typer.Option(metavar="joints|tool|energy|tracking", help="What to plot.")] = "joints",
     out: Annotated[
@@ -172,7 +178,7 @@ def plot(
             "--out",
             "-o",
             metavar="FILE",
-            help="File to write: .png, .svg or .pdf. [default: RUN-<rollout>-<what>.png]",
+            help="File to write: .png, .svg or .pdf. [default: RUN-<rollout>-<what>.png or MOTION.png]",
         ),
     ] = None,
     size: Annotated[
@@ -183,7 +189,7 @@ def plot(
     ] = 150.0,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Plot a rollout.
+    """Plot a rollout, or position, velocity, acceleration and jerk of a trajectory.
 
     \b
     --what joints     positions, velocities and forces; limits shaded,
@@ -200,19 +206,40 @@ def plot(
       dh2sim plot run.zarr
       dh2sim plot run.zarr --rollout 7 --what tool --out tool.svg
       dh2sim plot run.zarr --what tracking --size 1600x1200
+      dh2sim plot motion.npz
     """
     from dh2sim.draw.plot_style import require_plot
     from dh2sim.draw.plots import require_kind, write_plot
     from dh2sim.draw.rollout_data import open_rollout
+    from dh2sim.trajectory.files import is_trajectory_file
 
     require_kind(what)
-    path = _beside(run, f"-{rollout}-{what}.png") if out is None else out
+    of_file = is_trajectory_file(run) and not run.is_dir()
+    ending = ".png" if of_file else f"-{rollout}-{what}.png"
+    path = _beside(run, ending) if out is None else out
     require_plot(path)
     pixels = None if size is None else _parse_size(size)
     if pixels is not None and not all(200 <= length <= 20_000 for length in pixels):
         raise typer.BadParameter(f"must be from 200 to 20000 pixels each way, got {size}", param_hint="--size")
+    if of_file:
+        if (what, rollout) != ("joints", 0):
+            option = "--what" if what != "joints" else "--rollout"
+            raise typer.BadParameter("does not apply to a trajectory file", param_hint=option)
+        _plot_trajectory(run, path, pixels, dpi, quiet=quiet)
+        return
     data = open_rollout(run, rollout)
     write_plot(path, data, what, size=pixels, dpi=dpi)
     _warn_if_stopped(data)
     if not quiet:
         print(printable(f"{path}: {what} of {data.label}"))
+
+
+def _plot_trajectory(file: Path, out: Path, size: tuple[int, int] | None, dpi: float, *, quiet: bool) -> None:
+    from dh2sim.draw.trajectory_plot import write_trajectory_plot
+    from dh2sim.trajectory.files import read_trajectory
+
+    read = read_trajectory(file)
+    title = " · ".join(filter(None, (read.robot, file.name, f"{read.duration:.4g} s")))
+    write_trajectory_plot(out, read, title, size=size, dpi=dpi)
+    if not quiet:
+        print(printable(f"{out}: {len(read.joints)} joints over {read.duration:.4g} s"))

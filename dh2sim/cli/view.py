@@ -6,6 +6,7 @@ import ctypes
 import os
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,8 @@ from dh2sim.cli.output import require_free
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
+    from dh2sim.model.robot_model import RobotModel
+    from dh2sim.trajectory.files import SampledTrajectory
     from dh2sim.view.state import ViewState
 
 DEFAULT_PORT = 8080
@@ -27,7 +30,11 @@ def view(
     robot: RobotArgument,
     run: Annotated[
         Path | None,
-        typer.Argument(metavar="RUN.zarr", help="A run of that robot to play.", show_default=False),
+        typer.Argument(
+            metavar="RUN.zarr|MOTION",
+            help="A run of that robot to play, or a trajectory file, .csv or .npz.",
+            show_default=False,
+        ),
     ] = None,
     port: Annotated[
         int, typer.Option(min=1, max=65535, metavar="N", help="Port, or the next free one.")
@@ -58,6 +65,7 @@ def view(
       dh2sim view my_robot.yaml --port 9000 --no-browser
       dh2sim view stanford --host 0.0.0.0 --allow-host lab.example.org
       dh2sim view stanford run.zarr
+      dh2sim view puma560 motion.csv         # of 'dh2sim trajectory'
       dh2sim view stanford --export stanford.html
     """
     if share != NEVER:
@@ -78,10 +86,17 @@ def view(
     [spec] = load_all([robot])
     state = open_state(spec, folder_of(robot))
     report_slips([state.model], strict=strict)
+    motion = None if run is None else _trajectory(run, state.model)
+    if motion is not None:
+        if rollout != 0:
+            raise typer.BadParameter("does not apply to a trajectory file", param_hint="--rollout")
+        from dh2sim.view.page_export import tool_path
+
+        state = replace(state, planned=tool_path(state.model, motion), q=tuple(motion.q[0].tolist()))
     if export is None:
         _serve(state, run, host=host, allow_hosts=_host_names(allow_host or []), port=port, browser=browser)
     else:
-        _export(state, run, rollout, export)
+        _export(state, run, rollout, export, motion)
 
 
 def _host_names(names: list[str]) -> list[str]:
@@ -131,14 +146,23 @@ def _use_one_arena() -> None:
         set_option(arena_max, 1)
 
 
-def _export(state: ViewState, run: Path | None, rollout: int, page: Path) -> None:
+def _trajectory(path: Path, model: RobotModel) -> SampledTrajectory | None:
+    """Return a trajectory file's content, in the order of the robot's joints; None for the path of a run."""
+    from dh2sim.trajectory.files import is_trajectory_file, read_trajectory
+    from dh2sim.view.motion.replay import trajectory_of
+
+    return trajectory_of(read_trajectory(path), path, model) if is_trajectory_file(path) else None
+
+
+def _export(state: ViewState, run: Path | None, rollout: int, page: Path, motion: SampledTrajectory | None) -> None:
     """Write a page that needs no server."""
     from dh2sim.view.page_export import export_page
 
     data = None
-    if run is not None:
+    if run is not None and motion is None:
         from dh2sim.draw.rollout_data import open_rollout
 
         data = open_rollout(run, rollout)
-    export_page(state.model, state.q, page, rollout=data)
-    print(printable(f"{page}: {state.spec.name}{'' if run is None else f', rollout {rollout} of {run}'}"))
+    export_page(state.model, state.q, page, rollout=data, trajectory=motion)
+    what = "" if run is None else f", {run}" if motion is not None else f", rollout {rollout} of {run}"
+    print(printable(f"{page}: {state.spec.name}{what}"))

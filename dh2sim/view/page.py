@@ -115,6 +115,8 @@ class Page:
         with self.client.atomic():  # a panel that grows before the user's eyes moves under the mouse
             self._panel = Panel(self.client, self.send, self.state, self._files, self.motion)
             self._panel.show(self.state)
+        if self.state.planned:  # a trajectory was asked for: it plays
+            self._do(lambda: self.motion.play(0), None)
         self._show()
         while self._take():
             self._show()

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from dh2sim.errors import PictureError
 from dh2sim.files import atomic_file
 from dh2sim.kinematics.chain import KinematicChain
+from dh2sim.kinematics.forward import forward_kinematics
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.messages import listed
 from dh2sim.model.robot_model import RobotModel
@@ -26,6 +27,7 @@ from dh2sim.typing import Array
 from dh2sim.view.scene.items import Arrow, Item, Label, Placed, Polyline, Scene, Solid, Triad, Vector
 from dh2sim.view.scene.link_poses import round_length, triad_length
 from dh2sim.view.scene.painter import Painter
+from dh2sim.view.scene.scene import PLANNED_COLOR
 from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids, rotation_matrix
 from dh2sim.view.server import recording_server
 
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     import viser
 
     from dh2sim.draw.rollout_data import RolloutData
+    from dh2sim.trajectory.files import SampledTrajectory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,7 +159,14 @@ _FRAMES_MEASURED = 60
 _ROBOT = "/robot"
 
 
-def export_page(model: RobotModel, q: ArrayLike, path: Path, *, rollout: RolloutData | None = None) -> None:
+def export_page(
+    model: RobotModel,
+    q: ArrayLike,
+    path: Path,
+    *,
+    rollout: RolloutData | None = None,
+    trajectory: SampledTrajectory | None = None,
+) -> None:
     """Write a page that shows a robot with its DH frames, from all sides and with a list of parts to hide.
 
     Args:
@@ -164,13 +174,18 @@ def export_page(model: RobotModel, q: ArrayLike, path: Path, *, rollout: Rollout
         q: Joint vector, rad and m, shape (n,).
         path: Of the file, which is replaced if it exists.
         rollout: Shown instead of ``q``, in a loop, with a time slider, a pause and a choice of speeds.
+        trajectory: Likewise, with the path of tool0; its joints are in the robot's order.
 
     Raises:
         ConfigurationError: ``q`` has the wrong shape or is not finite.
         PictureError: Positions were not recorded in the rollout, or it is of a robot with other joints.
         OutputError: The file cannot be written; one that existed is unchanged.
     """
-    keyframes = [(0.0, robot_page_scene(model, q))] if rollout is None else list(rollout_keyframes(model, rollout))
+    keyframes = [(0.0, robot_page_scene(model, q))]
+    if trajectory is not None:
+        keyframes = list(trajectory_keyframes(model, trajectory))
+    elif rollout is not None:
+        keyframes = list(rollout_keyframes(model, rollout))
     chosen = {round(k) for k in np.linspace(0, len(keyframes) - 1, min(len(keyframes), _FRAMES_MEASURED))}
     bounds = bounding_sphere([keyframes[k][1] for k in sorted(chosen)])
     html = page_html(keyframes, title=model.name, bounds=bounds)
@@ -225,6 +240,24 @@ def rollout_keyframes(model: RobotModel, rollout: RolloutData) -> Iterator[tuple
     for k in shown_records(time):
         base = None if bases is None else _placed(bases[k])
         yield float(time[k] - time[0]), robot_page_scene(model, qpos[k], base)
+
+
+def trajectory_keyframes(model: RobotModel, trajectory: SampledTrajectory) -> Iterator[tuple[float, Scene]]:
+    """Yield times, s, from 0, and scenes of a trajectory at its samples, with the path of tool0."""
+    path = Polyline(points=tool_path(model, trajectory), color=PLANNED_COLOR, width=2.0)
+    for k in shown_records(trajectory.time):
+        yield float(trajectory.time[k]), {**robot_page_scene(model, trajectory.q[k]), "/planned": path}
+
+
+MOST_PATH_POINTS = 1000
+
+
+def tool_path(model: RobotModel, trajectory: SampledTrajectory) -> tuple[Vector, ...]:
+    """Return the path of tool0 along a trajectory, m."""
+    count = min(len(trajectory.time), MOST_PATH_POINTS)
+    q = trajectory.q[np.unique(np.linspace(0, len(trajectory.time) - 1, count).round().astype(int))]
+    points = forward_kinematics(model.chain, q)[:, :3, 3].tolist()
+    return tuple((x, y, z) for x, y, z in points)
 
 
 def shown_records(time: Array) -> list[int]:

@@ -70,6 +70,8 @@ def with_trace(before: ViewState, after: ViewState) -> ViewState:
     """
     moved = after.T_world_base_link != before.T_world_base_link
     returned = moved and after.mode is not before.mode
+    if after.planned and after.model is not before.model:
+        after = replace(after, planned=())
     if Part.TRACE not in after.shown or after.model is not before.model or returned:
         return replace(after, trace=()) if after.trace else after
     if after.q == before.q and not moved and after.trace:

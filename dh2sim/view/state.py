@@ -168,6 +168,8 @@ class ViewState:
     ghost: Ghost | None = None
     trace: tuple[Vector, ...] = ()
     """Path of tool0 in the world since ``Part.TRACE`` is shown, m."""
+    planned: tuple[Vector, ...] = ()
+    """Path of tool0 in the trajectory that pages play, m; empty once the robot is another."""
     goal: Goal | None = None
     mode: Mode = Mode.MANUAL
     paused: bool = False

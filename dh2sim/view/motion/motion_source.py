@@ -195,7 +195,7 @@ class Recording:
     def status(self) -> str:
         """The time that is shown, and why the rollout stopped early, if it did."""
         stopped = self._replay.stopped(self._rollout)
-        return f"Rollout {self._rollout}: {self.time:.2f} of {self.duration:.2f} s. {stopped}".rstrip()
+        return f"{self._replay.label(self._rollout)}: {self.time:.2f} of {self.duration:.2f} s. {stopped}".rstrip()
 
 
 class MotionControl:

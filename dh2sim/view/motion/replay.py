@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dh2sim.errors import RunError
+from dh2sim.draw.motion import Motion
+from dh2sim.errors import RunError, TrajectoryError
 from dh2sim.kinematics.transforms import identity
 from dh2sim.messages import listed
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.simulate.dataset_layout import FINISHED, NOT_RUN
+from dh2sim.trajectory.files import SampledTrajectory, is_trajectory_file, read_trajectory
 from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:
-    from dh2sim.draw.motion import Motion
     from dh2sim.draw.rollout_data import RolloutData
 
 CACHED = 8
@@ -56,6 +57,10 @@ class Replay:
         self.note = note
         """A sentence if the robot of the run may differ from the one that is shown; else empty."""
         self._recorded = functools.lru_cache(maxsize=CACHED)(self._read)
+
+    def label(self, rollout: int) -> str:
+        """Return what a rollout is called."""
+        return f"Rollout {rollout}"
 
     def times(self, rollout: int) -> Array:
         """Return the recorded times, s, ascending, shape (N,).
@@ -97,17 +102,41 @@ class Replay:
         return _Recorded(motion=motion, q=read_only(q), base=base, stopped=_stop_reason(data))
 
 
+class _TrajectoryReplay(Replay):
+    """A trajectory file, which plays as the only rollout of a run does."""
+
+    def __init__(self, path: Path, trajectory: SampledTrajectory) -> None:
+        """Take the samples in the order of the robot's joints."""
+        super().__init__(path, joints=trajectory.joints, rollouts=(0,), note="")
+        self._trajectory = trajectory
+
+    def label(self, rollout: int) -> str:  # noqa: ARG002 - there is one
+        """Return what the file is called."""
+        return "Trajectory"
+
+    def _read(self, rollout: int) -> _Recorded:  # noqa: ARG002 - there is one
+        trajectory = self._trajectory
+        motion = Motion(model=None, qpos=trajectory.q, time=trajectory.time)
+        return _Recorded(motion=motion, q=trajectory.q, base=None, stopped="")
+
+
 def open_replay(path: Path, model: RobotModel | None) -> Replay:
-    """Open a run, finished or not.
+    """Open a run, finished or not, or a trajectory file.
 
     Args:
-        path: Of the run.
+        path: Of the run or the file.
         model: The robot to show; None for the one that the run was made with.
 
     Raises:
         RunError: There is no run, it is damaged, none of its rollouts has been run, or it is of a robot with other
             joints.
+        TrajectoryError: The file is no trajectory, or one of a robot with other joints.
     """
+    if is_trajectory_file(path):
+        read = read_trajectory(path)
+        if model is not None:
+            read = trajectory_of(read, path, model)
+        return _TrajectoryReplay(path, read)
     from dh2sim.simulate.store.reader import open_dataset, reading
 
     with open_dataset(path) as run:
@@ -133,6 +162,18 @@ def open_replay(path: Path, model: RobotModel | None) -> Replay:
         else f"The run was made with another version of {robot}'s file: the motion shown may differ from it."
     )
     return Replay(path, joints=joints, rollouts=rollouts, note=note)
+
+
+def trajectory_of(read: SampledTrajectory, path: Path, model: RobotModel) -> SampledTrajectory:
+    """Return a trajectory with its joints in a robot's order.
+
+    Raises:
+        TrajectoryError: They are not the robot's; the text names the file.
+    """
+    try:
+        return read.ordered([joint.name for joint in model.moving_joints])
+    except TrajectoryError as error:
+        raise TrajectoryError(f"'{path}' is not of {model.name}: {error}") from None
 
 
 def _base_poses(motion: Motion) -> Array:

@@ -52,6 +52,7 @@ PEDESTAL: Final = "/pedestal"
 IN_BASE_LINK: Final = (ROBOT, NAMES, ROW, GHOST, ELLIPSOID, BRANCHES)
 """Items below these are given in base_link, all others, such as the trace and the grid, in the world."""
 _BRANCH_OPACITY: Final = 0.16
+PLANNED_COLOR: Final[Color] = (0.85, 0.45, 0.05)
 _TRACE_COLOR: Final[Color] = (0.10, 0.45, 0.85)
 _GRID_COLOR: Final[Color] = (0.82, 0.84, 0.87)
 _AXIS_COLOR: Final[Color] = (0.62, 0.65, 0.70)
@@ -110,6 +111,8 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
         yield DRAG, _drag_arrow(state, state.drag)
     if (marker := _goal_marker(state)) is not None:
         yield GOAL, marker
+    if len(state.planned) > 1:
+        yield "/planned", Polyline(points=state.planned, color=PLANNED_COLOR, width=2.0)
     if Part.TRACE in state.shown and len(state.trace) > 1:
         yield "/trace", Polyline(points=state.trace, color=_TRACE_COLOR, width=3.0)
     if Part.GRID in state.shown:
