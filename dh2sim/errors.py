@@ -85,6 +85,10 @@ class AssemblyError(Dh2simError, ValueError):
     """The loops of a mechanism cannot be closed."""
 
 
+class SingularPositionError(Dh2simError, ValueError):
+    """A mechanism cannot be moved to where its driven joints are wanted."""
+
+
 class MeshError(Dh2simError):
     """A mesh cannot be used."""
 

@@ -345,16 +345,23 @@ class Robot:
         """Return the pose of a frame in base_link.
 
         Args:
-            q: Joint vectors, rad and m, shape (..., n); or the name of a configuration.
-            frame: tool0, base_link, dh_0 … dh_n or link_1 … link_n.
+            q: Joint vectors, rad and m, shape (..., n); or the name of a configuration. Of a mechanism with closed
+                loops: one vector, of all joints or of the driven ones, which the others are moved by from the
+                assembly.
+            frame: tool0, base_link, dh_0 … dh_n or link_1 … link_n; rocker/dh_1 … of a branch.
 
         Returns:
             Shape (..., 4, 4).
 
         Raises:
             ConfigurationError: ``q`` has the wrong shape, or something in it is not finite.
+            SingularPositionError: A dead or singular position of a mechanism is on the way.
             UnknownFrameError: The frame is unknown.
         """
+        if self.spec.is_mechanism:
+            from dh2sim.kinematics.loop_motion import mechanism_pose
+
+            return mechanism_pose(self.spec, q, frame)
         from dh2sim.kinematics.forward import frame_pose
 
         return frame_pose(self.chain, frame, self._vectors(q))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import sys
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -17,7 +19,7 @@ from dh2sim.cli.joint_vector import (
     read_joint_vector,
 )
 from dh2sim.cli.output import json_text
-from dh2sim.errors import ConfigurationError
+from dh2sim.errors import ConfigurationError, Dh2simError
 
 if TYPE_CHECKING:
     from dh2sim.kinematics.chain import KinematicChain
@@ -69,15 +71,24 @@ def fk(
     [spec] = load_all([robot])
     options = "--frame, --from, --to, --all, --degrees, --radians, --json, --help"
     vector = read_joint_vector(spec, q, degrees=degrees, radians=radians, command="fk", options=options)
-    chain = build_chain(spec)
+    if spec.is_mechanism:
+        if every:
+            raise Dh2simError(f"{spec.name}: --all prints the rows of serial robots; use --frame")
+        pose_of = _mechanism_pose(spec, vector)
+    else:
+        chain = build_chain(spec)
+
+        def pose_of(frame: str) -> Array:
+            return frame_pose(chain, frame, vector.q)
+
     if every:
         _print_rows(spec, chain, vector, as_json=as_json)
         return
     name = target or frame or "tool0"
     with np.errstate(all="ignore"):
-        pose = frame_pose(chain, name, vector.q)
+        pose = pose_of(name)
         if source is not None:
-            pose = invert(frame_pose(chain, source, vector.q)) @ pose
+            pose = invert(pose_of(source)) @ pose
     _require_finite(spec, pose, f"the pose of {name}")
     if as_json:
         origin = {} if source is None else {"from": source}
@@ -86,6 +97,24 @@ def fk(
     print(f"{spec.name}: pose of {name} in {source or 'base_link'}")
     _print_q(vector)
     _print_pose(pose, vector)
+
+
+def _mechanism_pose(spec: RobotSpec, vector: JointVector) -> Callable[[str], Array]:
+    """Return what gives the pose of a frame of a mechanism; a warning is printed where its loops are not closed."""
+    from dh2sim.kinematics.loop_closure import closure_gaps, is_closed
+    from dh2sim.kinematics.tree import build_tree, tree_frames
+
+    tree = build_tree(spec)
+    if tree.closures and not is_closed(tree, vector.q):
+        gaps = "; ".join(map(str, closure_gaps(tree, vector.q)))
+        print(f"dh2sim: warning: the loops are not closed at these coordinates: {gaps}", file=sys.stderr)
+    frames = tree_frames(tree, vector.q)
+
+    def pose_of(frame: str) -> Array:
+        tree.frame(frame)
+        return frames[frame]
+
+    return pose_of
 
 
 def _print_pose(pose: Array, vector: JointVector) -> None:

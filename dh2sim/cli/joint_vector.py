@@ -72,7 +72,7 @@ def read_joint_vector(
     known = spec.named_configurations
     rows = spec.moving_rows
     if len(words) == 1 and words[0] in known:
-        vector = JointVector(q=tuple(known[words[0]].tolist()), name=words[0], units=units, rows=rows)
+        vector = JointVector(q=_named(spec, words[0]), name=words[0], units=units, rows=rows)
     else:
         for word in words:
             if word.startswith("--"):
@@ -84,10 +84,25 @@ def read_joint_vector(
     return vector
 
 
+def _named(spec: RobotSpec, name: str) -> tuple[float, ...]:
+    """Return a named configuration; the loops of a mechanism are closed there."""
+    if not spec.closures:
+        return tuple(spec.named_configurations[name].tolist())
+    from dh2sim.kinematics.loop_motion import named_configuration
+
+    return tuple(named_configuration(spec, name).tolist())
+
+
 def _coordinates(spec: RobotSpec, words: Sequence[str], units: Units) -> tuple[float, ...]:
+    """Return the coordinates that are given; of a mechanism either of all joints, or of those that are driven."""
     from dh2sim.robot.expressions import ExpressionError, evaluate
 
     rows = spec.moving_rows
+    if spec.closures and spec.actuated:
+        driven = {row.name: row for row in rows}
+        some = tuple(driven[name] for name in spec.actuated)
+        if len(some) < len(rows) and len(split(words, len(some))) == len(some):
+            rows = some
     parts = split(words, len(rows))
     if len(parts) != len(rows):
         raise ConfigurationError(_wrong_count(spec, words, parts, units))
@@ -97,6 +112,10 @@ def _coordinates(spec: RobotSpec, words: Sequence[str], units: Units) -> tuple[f
             values.append(units.coordinate(evaluate(part, {}), turns=row.type.turns))
         except ExpressionError as error:
             raise ConfigurationError(f"{row.name}: {_unit_hint(part, _unit(row, units)) or error}") from None
+    if len(rows) < len(spec.moving_rows):
+        from dh2sim.kinematics.loop_motion import mechanism_configuration
+
+        return tuple(mechanism_configuration(spec, values).tolist())
     return tuple(values)
 
 

@@ -58,7 +58,13 @@ class ClosureGap:
     def __str__(self) -> str:
         """Return what of the closure is open, in mm and deg."""
         gap = f"{1000 * self.position:.6g} mm and {math.degrees(self.rotation):.6g} deg"
-        return f"{self.name} stays open by {gap}"
+        opposite = "; its z axes are opposite: turn one frame with 'alpha: 180 deg'"
+        return f"{self.name} stays open by {gap}{opposite if self.opposite else ''}"
+
+    @property
+    def opposite(self) -> bool:
+        """Whether the frames only have to be turned over."""
+        return self.position < 1e-6 and abs(self.rotation - math.pi) < 1e-6
 
 
 class _Rows(NamedTuple):
@@ -102,6 +108,24 @@ def constraint_jacobian(tree: KinematicTree, q: ArrayLike) -> Array:
     """
     rows = [row for of in _closure_rows(tree, q) for row in (*of.position_rows, *of.rotation_rows)]
     return read_only(rows).reshape(len(rows), tree.n)
+
+
+def closure_residual(tree: KinematicTree, q: ArrayLike) -> tuple[Array, list[bool]]:
+    """Return how far the constraints are from being met, m and rad, and which of them are lengths.
+
+    Args:
+        tree: The mechanism.
+        q: Joint vector, rad and m, shape (n,).
+
+    Raises:
+        ConfigurationError: ``q`` has the wrong shape or is not finite.
+    """
+    residual: list[float] = []
+    lengths: list[bool] = []
+    for rows in _closure_rows(tree, q):
+        residual += rows.positions + rows.rotations
+        lengths += [True] * len(rows.positions) + [False] * len(rows.rotations)
+    return read_only(residual), lengths
 
 
 def _closure_rows(tree: KinematicTree, q: ArrayLike) -> Iterator[_Rows]:

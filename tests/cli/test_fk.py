@@ -266,3 +266,21 @@ def test_a_robot_that_does_not_move_takes_no_coordinates(tmp_path: Path) -> None
     assert dh2sim("fk", robot, "1") == Outcome(
         status=2, out="", err="dh2sim: still has no joint coordinates, got 1\n"
     )
+
+
+def test_a_mechanism_is_moved_by_its_driven_joint() -> None:
+    moved = dh2sim("fk", "four_bar", "120", "--frame", "rocker/dh_1", "--json")
+    assert (moved.status, moved.err) == (0, "")
+    found = json.loads(moved.out)
+    whole = [str(value) for value in found["q"]]
+    again = _pose("four_bar", "--radians", *whole, "--frame", "dh_2")
+    assert np.abs(again[:3, 3] - np.array(found["pose"])[:3, 3]).max() < 1e-12
+    refused = dh2sim("fk", "four_bar", "home", "--all")
+    assert refused.status == 2
+    assert refused.err == "dh2sim: four_bar: --all prints the rows of serial robots; use --frame\n"
+
+
+def test_loops_that_are_not_closed_are_warned_of() -> None:
+    open_ = dh2sim("fk", "four_bar", "1", "2", "3")
+    assert open_.status == 0
+    assert open_.err.startswith("dh2sim: warning: the loops are not closed at these coordinates: C stays open by")

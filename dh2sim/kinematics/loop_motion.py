@@ -1,0 +1,233 @@
+"""Forward kinematics of closed loops: from the assembly, the driven joints are moved to where they are wanted.
+
+Continuation: along the straight line in the coordinates of the driven joints, a step of the passive ones along the
+tangent, then Newton steps back onto the loops (E. Allgower, K. Georg, Introduction to Numerical Continuation Methods,
+2003, chapter 2). Steps are as small as the distance from a singular position, so that the path neither changes
+branches nor passes one unseen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dh2sim.errors import AssemblyError, ConfigurationError, SingularPositionError
+from dh2sim.kinematics.chain import SpecLike, spec_of
+from dh2sim.kinematics.loop_closure import (
+    assembly,
+    close_loops,
+    closure_residual,
+    constraint_jacobian,
+    is_closed,
+    mechanism_size,
+)
+from dh2sim.kinematics.tree import KinematicTree, body_poses, joint_values, placed
+from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.typing import Array, read_only
+
+_LONGEST: Final = 0.1
+"""rad, or mechanism sizes: of a step of any joint."""
+_SINGULAR: Final = 1e-5
+"""Least singular value of the passive joints' Jacobian, lengths in mechanism sizes, of a regular position."""
+_RANK: Final = 1e-8
+_MOST_STEPS: Final = 20_000
+
+
+def actuated_joints(robot: SpecLike) -> tuple[int, ...]:
+    """Return the places of the driven joints in a joint vector, in the order of the file's list; default all."""
+    spec = spec_of(robot)
+    names = [row.name for row in spec.moving_rows]
+    return tuple(range(len(names))) if spec.actuated is None else tuple(names.index(name) for name in spec.actuated)
+
+
+def mechanism_configuration(robot: SpecLike, q: ArrayLike) -> Array:
+    """Return the joint vector of a mechanism, given that of its driven joints.
+
+    Args:
+        robot: The robot.
+        q: Coordinates of the driven joints in the order of ``actuated``, rad and m, shape (k,); or of all joints,
+            shape (n,), which are returned as they are.
+
+    Returns:
+        Shape (n,), read-only: the loops are closed, on the branch of motion that the assembly is on.
+
+    Raises:
+        AssemblyError: The loops cannot be closed at all.
+        SingularPositionError: On the way there is a dead or singular position; the text says where.
+        ConfigurationError: ``q`` has another shape or is not finite.
+    """
+    spec = spec_of(robot)
+    tree, q0 = assembly(spec)
+    driven = actuated_joints(spec)
+    values = np.asarray(q, dtype=np.float64)
+    if values.shape == (tree.n,):
+        return read_only(joint_values(tree, values))
+    names = listed(tree.moving_joints[k].name for k in driven)
+    if values.shape != (len(driven),):
+        raise ConfigurationError(
+            f"expected {len(driven)} coordinates of driven joints ({names}), or {tree.n} of all joints, got shape "
+            f"{values.shape}"
+        )
+    if not np.isfinite(values).all():
+        raise ConfigurationError(f"joint coordinates must be finite ({names}), got {values.tolist()}")
+    return read_only(_Motion(spec, tree, driven).follow(q0, values))
+
+
+def named_configuration(robot: SpecLike, name: str) -> Array:
+    """Return a named configuration of a mechanism, with its loops closed.
+
+    Args:
+        robot: The robot.
+        name: One of its ``named_configurations``.
+
+    Returns:
+        Shape (n,), read-only; ``home`` is the assembly where the file has no other.
+
+    Raises:
+        AssemblyError: The loops cannot be closed near it.
+        ConfigurationError: There is no such configuration.
+    """
+    spec = spec_of(robot)
+    tree, q = assembly(spec)
+    known = spec.named_configurations
+    if name not in known:
+        message = f"{spec.name} has no configuration {shown(name)}.{did_you_mean(name, known)}"
+        raise ConfigurationError(f"{message} Configurations: {listed(known)}")
+    if name == "home" and name not in spec.configurations:
+        return q
+    try:
+        return close_loops(tree, known[name]) if tree.closures else known[name]
+    except AssemblyError as error:
+        raise AssemblyError(f"{spec.name}: configuration '{name}': {error}") from None
+
+
+def mechanism_pose(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0") -> Array:
+    """Return the pose of a frame of a mechanism in base_link.
+
+    Args:
+        robot: The robot.
+        q: As for ``mechanism_configuration``, or the name of a configuration.
+        frame: Such as tool0, dh_1 or rocker/dh_1.
+
+    Returns:
+        Shape (4, 4).
+
+    Raises:
+        UnknownFrameError: There is no such frame.
+        Dh2simError: As for ``mechanism_configuration``.
+    """
+    tree, _ = assembly(robot)
+    found = tree.frame(frame)
+    vector = named_configuration(robot, q) if isinstance(q, str) else mechanism_configuration(robot, q)
+    return np.array(placed(body_poses(tree, vector), found))
+
+
+class _Motion:
+    """A mechanism that its driven joints move."""
+
+    def __init__(self, spec: RobotSpec, tree: KinematicTree, driven: Sequence[int]) -> None:
+        self._spec, self._tree = spec, tree
+        self._driven = list(driven)
+        self._passive = [k for k in range(tree.n) if k not in driven]
+        self._size = mechanism_size(tree)
+        self._scale = np.array([1.0 if joint.type.turns else self._size for joint in tree.moving_joints])
+        lengths = np.array(closure_residual(tree, np.zeros(tree.n))[1])
+        self._weights = np.where(lengths, 1.0 / self._size, 1.0)
+
+    def follow(self, q: Array, target: Array) -> Array:
+        """Return the configuration that moving the driven joints straight to a target leads to.
+
+        Raises:
+            SingularPositionError: There is none, or a singular position is on the way.
+        """
+        start = q[self._driven].copy()
+        way = (target - start) / self._scale[self._driven]
+        length = float(np.abs(way).max(initial=0.0))
+        self._check(q)
+        done, step = 0.0, min(1.0, _LONGEST / length) if length else 1.0
+        for _ in range(_MOST_STEPS):
+            if done >= 1.0:
+                return q
+            rates, least = self._rates(q, way)
+            if least < _SINGULAR:
+                raise self._stuck(start, target, done)
+            fastest = max(length, float(np.abs(rates).max(initial=0.0)))
+            limit = _LONGEST * min(1.0, 4.0 * least) / fastest if fastest else 1.0
+            step = min(2.0 * step, limit, 1.0 - done)
+            while (moved := self._moved(q, start, target, done + step, step * rates)) is None:
+                step /= 2.0
+                if step * length < 1e-9:
+                    raise self._stuck(start, target, done)
+            q, done = moved, 1.0 if step == 1.0 - done else done + step
+        raise self._stuck(start, target, done)
+
+    def _jacobian(self, q: Array) -> Array:
+        return np.asarray(self._weights[:, None] * constraint_jacobian(self._tree, q) * self._scale)
+
+    def _rates(self, q: Array, way: Array) -> tuple[Array, float]:
+        """Return the passive joints' rates along a way of the driven ones, and the least singular value."""
+        J = self._jacobian(q)
+        values = np.linalg.svd(J[:, self._passive], compute_uv=False)
+        rates = np.linalg.lstsq(J[:, self._passive], -J[:, self._driven] @ way, rcond=_RANK)[0]
+        least = float(values[len(self._passive) - 1]) if self._passive else 1.0
+        return np.asarray(rates), least
+
+    def _moved(self, q: Array, start: Array, target: Array, done: float, guess: Array) -> Array | None:
+        """Return the configuration with the driven joints at a share of their way; None where Newton fails."""
+        new = q.copy()
+        new[self._driven] = target if done == 1.0 else start + done * (target - start)
+        new[self._passive] += guess * self._scale[self._passive]
+        predicted = new[self._passive].copy()
+        for _ in range(8):
+            residual = self._weights * closure_residual(self._tree, new)[0]
+            J = self._jacobian(new)[:, self._passive]
+            correction = np.linalg.lstsq(J, -residual, rcond=_RANK)[0]
+            new[self._passive] += correction * self._scale[self._passive]
+            if float(np.abs(correction).max(initial=0.0)) < 1e-14:
+                break
+        off = np.abs(new[self._passive] - predicted) / self._scale[self._passive]
+        moved = float(np.abs(guess).max(initial=0.0)) + 1e-9
+        return new if is_closed(self._tree, new) and float(off.max(initial=0.0)) <= 0.3 * moved + 1e-6 else None
+
+    def _check(self, q: Array) -> None:
+        """Refuse driven joints that do not determine the others, or that the loops do not leave free.
+
+        Raises:
+            SingularPositionError: They do not.
+        """
+        J = self._jacobian(q)
+        whole, passive = (_rank(matrix) for matrix in (J, J[:, self._passive]))
+        free = self._tree.n - whole
+        names = listed(self._tree.moving_joints[k].name for k in self._driven)
+        if passive < len(self._passive):
+            raise SingularPositionError(
+                f"{self._spec.name}: {names} driven, {free} freedoms at the assembly: "
+                f"{len(self._passive) - passive} of them stay open, so that the passive joints are not determined"
+            )
+        if free < len(self._driven):
+            raise SingularPositionError(
+                f"{self._spec.name}: {names} driven, but the loops leave {free} freedoms: these joints cannot be "
+                "moved independently; give the coordinates of all joints"
+            )
+
+    def _stuck(self, start: Array, target: Array, done: float) -> SingularPositionError:
+        """Return the error of the position that stops the motion."""
+        at = []
+        for value, k in zip(start + done * (target - start), self._driven, strict=True):
+            joint = self._tree.moving_joints[k]
+            shown_value = f"{math.degrees(value):.6g} deg" if joint.type.turns else f"{value:.6g} m"
+            at.append(f"{joint.name} = {shown_value}")
+        return SingularPositionError(
+            f"{self._spec.name}: the way from the assembly comes to a dead or singular position at {listed(at)}, "
+            "where the driven joints do not determine how the passive ones go on"
+        )
+
+
+def _rank(matrix: Array) -> int:
+    values = np.linalg.svd(matrix, compute_uv=False)
+    return int((values > _RANK * max(1.0, float(values.max(initial=0.0)))).sum())

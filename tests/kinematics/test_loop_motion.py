@@ -1,0 +1,146 @@
+"""Driven joints move mechanisms as closed forms say, up to dead positions."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from dh2sim import Robot
+from dh2sim.errors import ConfigurationError, SingularPositionError
+from dh2sim.kinematics.loop_motion import mechanism_configuration, mechanism_pose
+from dh2sim.robot.read import parse_robot
+from dh2sim.robot.spec import RobotSpec
+from tests.refusals import refusal
+
+
+def _rocker_angle(lengths: tuple[float, float, float, float], crank: float, side: float) -> float | None:
+    """Freudenstein's equation: K1 cos(rocker) - K2 cos(crank) + K3 = cos(crank - rocker), solved for the rocker."""
+    ground, a, b, c = lengths
+    K1, K2, K3 = ground / a, ground / c, (a**2 - b**2 + c**2 + ground**2) / (2 * a * c)
+    A = math.cos(crank) - K1 - K2 * math.cos(crank) + K3
+    B = -2 * math.sin(crank)
+    C = K1 - (K2 + 1) * math.cos(crank) + K3
+    root = B * B - 4 * A * C
+    return None if root < 1e-3 else 2 * math.atan2(-B + side * math.sqrt(root), 2 * A)
+
+
+def _four_bar(lengths: tuple[float, float, float, float], crank: float, side: float) -> RobotSpec | None:
+    ground, a, b, c = lengths
+    rocker = _rocker_angle(lengths, crank, side)
+    if rocker is None:
+        return None
+    B = a * np.array([math.cos(crank), math.sin(crank)])
+    C = np.array([ground, 0.0]) + c * np.array([math.cos(rocker), math.sin(rocker)])
+    coupler = math.atan2(*(C - B)[::-1]) - crank
+    return parse_robot(
+        f"""\
+name: four_bar
+convention: standard
+tool: {{xyz: [-0.4, 0.3, 0]}}
+joints: [{{type: continuous, a: {a!r}}}, {{type: continuous, a: {b!r}}}]
+branches:
+  rocker: {{from: base_link, pose: {{xyz: [{ground!r}, 0, 0]}}, joints: [{{type: continuous, a: {c!r}}}]}}
+closures: [{{between: [dh_2, rocker/dh_1], type: revolute}}]
+actuated: [joint_1]
+assembly: {{q: [{crank!r}, {coupler!r}, {rocker!r}]}}
+"""
+    )
+
+
+length = st.floats(0.4, 2.5)
+
+
+@given(
+    lengths=st.tuples(length, length, length, length), side=st.sampled_from([1.0, -1.0]), move=st.floats(-2.5, 2.5)
+)
+def test_a_four_bars_coupler_curve_is_that_of_freudensteins_equation(
+    lengths: tuple[float, float, float, float], side: float, move: float
+) -> None:
+    """Grashof or not: where the crank gets stuck, the closed form has no solution, or a double one, on the way."""
+    crank = 1.1
+    spec = _four_bar(lengths, crank, side)
+    assume(spec is not None)
+    assert spec is not None
+    way = np.linspace(crank, crank + move, 400)
+    exact = [_rocker_angle(lengths, angle, side) for angle in way]
+    try:
+        q = mechanism_configuration(spec, [crank + move])
+    except SingularPositionError:
+        ground, a, b, c = lengths
+        reach = np.sqrt(ground**2 + a**2 - 2 * ground * a * np.cos(way))
+        dead = min((b + c - reach).min(), (reach - abs(b - c)).min())
+        assert dead < 1e-3
+        return
+    assume(None not in exact)
+    rocker = exact[-1]
+    assert rocker is not None
+    ground, a, b, c = lengths
+    B = a * np.array([math.cos(crank + move), math.sin(crank + move)])
+    C = np.array([ground, 0.0]) + c * np.array([math.cos(rocker), math.sin(rocker)])
+    along = (C - B) / b
+    point = C - 0.4 * along + 0.3 * np.array([-along[1], along[0]])
+    assert np.abs(mechanism_pose(spec, q)[:2, 3] - point).max() < 1e-11
+
+
+CRANK, ROD, OFFSET = 0.3, 0.9, 0.1
+SLIDER = f"""\
+name: slider_crank
+convention: standard
+joints: [{{type: continuous, a: {CRANK}}}, {{type: continuous, a: {ROD}}}]
+branches:
+  slider:
+    from: base_link
+    pose: {{xyz: [0, {OFFSET}, 0], rpy: [0, {math.pi / 2!r}, 0]}}
+    joints: [{{type: prismatic, alpha: {-math.pi / 2!r}, theta: {math.pi / 2!r}}}]
+closures: [{{name: pin, between: [dh_2, slider/dh_1], type: revolute}}]
+actuated: [joint_1]
+assembly: {{q: [0.9, -1.2, 1.0]}}
+"""
+
+
+def test_a_slider_crank_moves_as_its_closed_form() -> None:
+    spec = parse_robot(SLIDER)
+    for angle in np.linspace(-7, 7, 15):
+        q = mechanism_configuration(spec, [angle])
+        exact = CRANK * math.cos(angle) + math.sqrt(ROD**2 - (CRANK * math.sin(angle) - OFFSET) ** 2)
+        assert abs(mechanism_pose(spec, q, "slider/dh_1")[0, 3] - exact) < 1e-12
+        assert abs(q[2] - exact) < 1e-12
+
+
+def test_a_dead_position_is_named_where_it_is() -> None:
+    spec = _four_bar((3.0, 1.0, 1.8, 1.4), 1.1, -1.0)
+    assert spec is not None
+    message = refusal(SingularPositionError, mechanism_configuration, spec, [2.5])
+    angle = float(message.split("joint_1 = ")[1].split(" deg")[0])
+    assert angle == pytest.approx(math.degrees(math.acos((3**2 + 1 - 3.2**2) / (2 * 3))), abs=1e-3)
+
+
+def test_a_flat_parallelogram_is_not_passed() -> None:
+    spec = _four_bar((2.0, 1.0, 2.0, 1.0), 1.1, -1.0)
+    assert spec is not None
+    rocker = mechanism_configuration(spec, [3.1])[2]
+    assert math.remainder(rocker - 3.1, math.tau) == pytest.approx(0, abs=1e-9)
+    message = refusal(SingularPositionError, mechanism_configuration, spec, [3.4])
+    assert float(message.split("joint_1 = ")[1].split(" deg")[0]) == pytest.approx(180, abs=0.05)
+
+
+def test_a_robot_takes_driven_or_all_coordinates() -> None:
+    robot = Robot.load("four_bar")
+    q = mechanism_configuration(robot, [2.0])
+    assert np.array_equal(robot.fk([2.0]), robot.fk(q))
+    assert np.array_equal(robot.fk("home", "dh_0"), np.eye(4))
+    assert "expected 1 coordinates of driven joints" in refusal(ConfigurationError, robot.fk, [1.0, 2.0])
+
+
+def test_driven_joints_that_do_not_determine_the_others_are_refused() -> None:
+    loose = SLIDER.replace("actuated: [joint_1]", "actuated: []")
+    assert "none driven, 1 freedoms" in refusal(
+        SingularPositionError, mechanism_configuration, parse_robot(loose), []
+    )
+    tight = SLIDER.replace("actuated: [joint_1]", "actuated: [joint_1, joint_2]")
+    message = refusal(SingularPositionError, mechanism_configuration, parse_robot(tight), [1.0, 2.0])
+    assert "cannot be moved independently" in message
