@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from dh2sim.cli.common import MANY, guarded
+from dh2sim.cli.values import PlainValues
 
 
 class Command(NamedTuple):
@@ -96,7 +97,7 @@ Exit status: 0 done, 1 a check failed, 2 bad input or usage, 130 interrupted.
 """
 
 
-class LazyGroup(TyperGroup):
+class LazyGroup(PlainValues, TyperGroup):
     """Builds a command when it is called: importing and building them all takes longer than most of them run."""
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
@@ -139,6 +140,10 @@ class LazyGroup(TyperGroup):
             formatter.write_dl([(name, command.help) for name, command in COMMANDS.items()])
 
 
+class PlainCommand(PlainValues, TyperCommand):
+    """A command."""
+
+
 def _taking_many(options: tuple[str, ...], bare: tuple[str, ...] = ()) -> type[TyperCommand]:
     """Return the class of a command some of whose options take all words up to the next option.
 
@@ -146,7 +151,7 @@ def _taking_many(options: tuple[str, ...], bare: tuple[str, ...] = ()) -> type[T
     option as one text, with MANY between them.
     """
 
-    class TakingMany(TyperCommand):
+    class TakingMany(PlainCommand):
         def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
             given = list(args)
             for start in reversed(range(len(given))):
@@ -157,7 +162,7 @@ def _taking_many(options: tuple[str, ...], bare: tuple[str, ...] = ()) -> type[T
                     )
             return super().parse_args(ctx, given)
 
-    return TakingMany if options else TyperCommand
+    return TakingMany if options else PlainCommand
 
 
 def _is_value(word: str) -> bool:

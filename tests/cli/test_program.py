@@ -216,7 +216,9 @@ def test_only_the_module_of_the_called_command_is_imported() -> None:
         "print(*sorted(name for name in sys.modules if name.startswith('dh2sim.cli.')))"
     )
     done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "dh2sim.cli.app dh2sim.cli.common dh2sim.cli.output dh2sim.cli.robots"
+    modules = ("app", "common", "output", "robots", "values")
+    assert done.stdout.split()[-len(modules) :] == [f"dh2sim.cli.{module}" for module in modules]
+    assert done.stdout.count("dh2sim.cli.") == len(modules)
 
 
 def _completions(words: str, folder: Path) -> list[str]:
