@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from dh2sim.importing.sources import ImportOptions
     from dh2sim.inverse.goals import Free
     from dh2sim.inverse.textbook import Explanation
+    from dh2sim.kinematics.batches import BatchOptions, JacobianOptions
     from dh2sim.kinematics.chain import KinematicChain, SpecLike
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.model.slips import Slip
@@ -341,7 +342,7 @@ class Robot:
 
         return find_slips(self.model)
 
-    def fk(self, q: ArrayLike, frame: str = "tool0") -> Array:
+    def fk(self, q: ArrayLike, frame: str = "tool0", **options: Unpack[BatchOptions]) -> Array:
         """Return the pose of a frame in base_link.
 
         Args:
@@ -349,39 +350,45 @@ class Robot:
                 loops: one vector, of all joints or of the driven ones, which the others are moved by from the
                 assembly.
             frame: tool0, base_link, dh_0 … dh_n or link_1 … link_n; rocker/dh_1 … of a branch.
+            **options: ``out=`` takes the result; ``rows=3`` leaves out 0 0 0 1; ``threads=`` for large batches, 0 for
+                all processors.
 
         Returns:
             Shape (..., 4, 4).
 
         Raises:
-            ConfigurationError: ``q`` has the wrong shape, or something in it is not finite.
+            ConfigurationError: ``q`` has the wrong shape, or something in it is not finite; or an option is wrong.
             SingularPositionError: A dead or singular position of a mechanism is on the way.
             UnknownFrameError: The frame is unknown.
         """
         if self.spec.is_mechanism:
             from dh2sim.kinematics.loop_motion import mechanism_pose
 
+            if options:
+                raise ConfigurationError(f"of a mechanism there is no option {listed(list(options))}")
             return mechanism_pose(self.spec, q, frame)
         from dh2sim.kinematics.forward import frame_pose
 
-        return frame_pose(self.chain, frame, self._vectors(q))
+        return frame_pose(self.chain, frame, self._vectors(q), **options)
 
-    def jacobian(self, q: ArrayLike, frame: str = "tool0") -> Array:
+    def jacobian(self, q: ArrayLike, frame: str = "tool0", **options: Unpack[JacobianOptions]) -> Array:
         """Return the geometric Jacobian of a frame in base_link.
 
         Args:
             q: Joint vectors, rad and m, shape (..., n); or the name of a configuration.
             frame: tool0, base_link, dh_0 … dh_n or link_1 … link_n.
+            **options: ``out`` and ``threads``, as for :meth:`fk`.
 
         Returns:
             Shape (..., 6, n): rows 0-2 linear, rows 3-5 angular.
 
         Raises:
-            ConfigurationError: ``q`` has the wrong shape, or something in it is not finite.
+            ConfigurationError: ``q`` has the wrong shape, or something in it is not finite; or an option is wrong.
+            UnknownFrameError: The frame is unknown.
         """
         from dh2sim.kinematics.forward import geometric_jacobian
 
-        return geometric_jacobian(self.chain, self._vectors(q), frame=frame)
+        return geometric_jacobian(self.chain, self._vectors(q), frame=frame, **options)
 
     def symbolic(self, what: What | str = "pose", **options: Unpack[SymbolicKeywords]) -> SymbolicForm:
         """Return the robot's kinematics or dynamics in symbols, compared with numbers; ``print`` shows it.

@@ -19,7 +19,7 @@ import numpy as np
 
 from dh2sim.codegen.mechanism import Mechanism, MovingJoint, Turn
 from dh2sim.codegen.newton_euler import InertialParameters
-from dh2sim.codegen.trace import Number, Trace
+from dh2sim.kinematics.trace import Number, Trace
 from dh2sim.kinematics.transforms import compose, identity, joint_part, rotate_tensor
 from dh2sim.kinematics.trig import sin_cos
 from dh2sim.model.mass import MassProperties, in_frame, shift_inertia

@@ -26,7 +26,7 @@ from dh2sim.codegen.mechanism import (
     turned_about_x,
     turned_about_z,
 )
-from dh2sim.codegen.trace import Number, Token, Trace, cosine, count_operations, sine
+from dh2sim.kinematics.trace import Number, Token, Trace, cosine, count_operations, sine
 from dh2sim.kinematics.trig import sin_cos
 
 _HALF_PI: Final = math.pi / 2

@@ -17,9 +17,9 @@ from dh2sim.codegen.lengths import length_constants
 from dh2sim.codegen.mechanism import Mechanism, build_mechanism, origin_moved
 from dh2sim.codegen.newton_euler import inverse_dynamics
 from dh2sim.codegen.program import Function, Listing, Program, What
-from dh2sim.codegen.trace import Number, Operations, Trace, count_operations
 from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.chain import spec_of
+from dh2sim.kinematics.trace import Number, Operations, Trace, count_operations
 from dh2sim.messages import member
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.robot_model import RobotModel

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from dh2sim.codegen.mechanism import Lengths
-from dh2sim.codegen.trace import Number, Trace
+from dh2sim.kinematics.trace import Number, Trace
 from dh2sim.robot.spec import LengthUnit, RobotSpec
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple, TypeAlias, cast
 
-from dh2sim.codegen.trace import Number, Trace
+from dh2sim.kinematics.trace import Number, Trace
 from dh2sim.kinematics.trig import atan2, sin_cos
 from dh2sim.robot.spec import Convention, Pose, RobotSpec, Row
 

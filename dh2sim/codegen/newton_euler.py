@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from dh2sim.codegen.forward import cross
 from dh2sim.codegen.mechanism import ORIGIN, Mechanism, Turn, Vector, about_x, about_z, added
-from dh2sim.codegen.trace import Number
+from dh2sim.kinematics.trace import Number
 
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, NamedTuple
 
-from dh2sim.codegen.trace import (
+from dh2sim.kinematics.trace import (
     CONSTANT,
     COSINE,
     DIFFERENCE,

@@ -56,11 +56,12 @@ class BlockFrame:
         return BlockFrame(x=self.x, y=self.y, z=self.z, p=_column(p), signs=self.signs)
 
     def write(self, out: Array) -> None:
-        """Put the poses into ``out``, shape (N, 4, 4)."""
+        """Put the poses into ``out``, shape (N, 4, 4), or (N, 3, 4) for those without their last row."""
         columns = ((self.x, self.signs[0]), (self.y, self.signs[1]), (self.z, self.signs[2]), (self.p, 1.0))
         for j, (column, sign) in enumerate(columns):
             write_column(column, sign, out[:, :3, j])
-            out[:, 3, j] = 1.0 if j == 3 else 0.0
+            if out.shape[1] == 4:
+                out[:, 3, j] = 1.0 if j == 3 else 0.0
 
     def _axis(self, factors: Sequence[float]) -> tuple[Column, float]:
         """Combine the axes; an axis that stays one of them, or its opposite, is passed on with its sign."""

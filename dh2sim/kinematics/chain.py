@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
@@ -34,6 +35,29 @@ class Joint:
     """Pose of the row's DH frame in the joint frame, shape (4, 4)."""
 
 
+class CodeCache:
+    """Functions that were made for a chain, by the name of the frame that they are of; not copied, nor pickled."""
+
+    __slots__ = ("_calls", "compiled", "jacobian", "pose")
+
+    def __init__(self) -> None:
+        self.pose: dict[str, Callable[[object], Array | None]] = {}
+        """Take one joint vector."""
+        self.jacobian: dict[str, Callable[[object], Array | None]] = {}
+        self.compiled: dict[object, Callable[[Array, Array], None]] = {}
+        """Take a batch; of the numba backend."""
+        self._calls: Counter[object] = Counter()
+
+    def __reduce__(self) -> tuple[type[CodeCache], tuple[()]]:
+        """Copy, and pickle, as a cache that is empty."""
+        return CodeCache, ()
+
+    def is_due(self, kind: object, frame: str, calls: int) -> bool:
+        """Count a call, and return whether there were ``calls`` of them."""
+        self._calls[kind, frame] += 1
+        return self._calls[kind, frame] >= calls
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class KinematicChain:
     """A serial chain: one joint-placed body for every row of the table."""
@@ -43,6 +67,8 @@ class KinematicChain:
     """Pose of DH frame 0 in base_link, shape (4, 4)."""
     T_dhn_tool0: Array = field(repr=False)
     """Pose of tool0 in the last DH frame, shape (4, 4)."""
+    code: CodeCache = field(default_factory=CodeCache, init=False, repr=False)
+    """What was made to compute with it, no part of its value."""
 
     @property
     def moving_joints(self) -> tuple[Joint, ...]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import UnknownFrameError
 from dh2sim.kinematics.batch_frame import (
-    BLOCK,
     BlockFrame,
     Column,
     cross,
@@ -17,42 +17,46 @@ from dh2sim.kinematics.batch_frame import (
     sines_and_cosines,
     write_column,
 )
+from dh2sim.kinematics.batches import (
+    BatchOptions,
+    Fill,
+    JacobianOptions,
+    checked_options,
+    in_blocks,
+    require_shape,
+)
 from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vector, joint_vectors
+from dh2sim.kinematics.straight_line import JACOBIAN, POSE, Kind, of_one
 from dh2sim.kinematics.transforms import compose, identity, joint_part
 from dh2sim.messages import did_you_mean, shown
 from dh2sim.typing import Array
 
 
-def forward_kinematics(chain: ChainLike, q: ArrayLike) -> Array:
+def forward_kinematics(chain: ChainLike, q: ArrayLike, **options: Unpack[BatchOptions]) -> Array:
     """Return the pose of tool0 in base_link.
 
     Args:
         chain: The robot, in any form.
         q: Joint vectors, rad and m, shape (..., n).
+        **options: ``out``, ``rows``, ``threads``: see :class:`BatchOptions`.
 
     Returns:
         Shape (..., 4, 4).
 
     Raises:
-        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
+        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite; or an option is wrong.
     """
-    robot = chain_of(chain)
-    T_joint_tool0 = compose(robot.joints[-1].T_joint_dh, robot.T_dhn_tool0)
-
-    def fill(out: Array, columns: Array) -> None:
-        for frame in joint_frames(robot, columns):
-            last = frame
-        last.then(T_joint_tool0).write(out)
-
-    return in_blocks(robot, q, (4, 4), fill)
+    return frame_pose(chain, "tool0", q, **options)
 
 
-def frame_poses(chain: ChainLike, q: ArrayLike) -> Array:
+def frame_poses(chain: ChainLike, q: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array:
     """Return the poses of all DH frames in base_link.
 
     Args:
         chain: The robot, in any form.
         q: Joint vectors, rad and m, shape (..., n).
+        out: Takes the result, of its shape; by default a new array.
+        threads: See :class:`BatchOptions`.
 
     Returns:
         Poses of DH frames 0 … number of rows, shape (..., number of rows + 1, 4, 4).
@@ -62,20 +66,22 @@ def frame_poses(chain: ChainLike, q: ArrayLike) -> Array:
     """
     robot = chain_of(chain)
 
-    def fill(out: Array, columns: Array) -> None:
-        out[:, 0] = robot.T_base_link_dh0
+    def fill(results: Array, columns: Array) -> None:
+        results[:, 0] = robot.T_base_link_dh0
         for i, frame in enumerate(joint_frames(robot, columns)):
-            frame.then(robot.joints[i].T_joint_dh).write(out[:, i + 1])
+            frame.then(robot.joints[i].T_joint_dh).write(results[:, i + 1])
 
-    return in_blocks(robot, q, (len(robot.joints) + 1, 4, 4), fill)
+    return in_blocks(*joint_vectors(robot, q), (len(robot.joints) + 1, 4, 4), fill, out, threads)
 
 
-def joint_poses(chain: KinematicChain, q: ArrayLike) -> Array:
+def joint_poses(chain: KinematicChain, q: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array:
     """Return the poses of all joint-placed bodies in base_link; each turns with its own joint.
 
     Args:
         chain: The robot.
         q: Joint vectors, rad and m, shape (..., n).
+        out: Takes the result, of its shape; by default a new array.
+        threads: See :class:`BatchOptions`.
 
     Returns:
         One pose for each row of the table, shape (..., number of rows, 4, 4).
@@ -84,11 +90,11 @@ def joint_poses(chain: KinematicChain, q: ArrayLike) -> Array:
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
 
-    def fill(out: Array, columns: Array) -> None:
+    def fill(results: Array, columns: Array) -> None:
         for i, frame in enumerate(joint_frames(chain, columns)):
-            frame.write(out[:, i])
+            frame.write(results[:, i])
 
-    return in_blocks(chain, q, (len(chain.joints), 4, 4), fill)
+    return in_blocks(*joint_vectors(chain, q), (len(chain.joints), 4, 4), fill, out, threads)
 
 
 def reference_joint_poses(chain: KinematicChain, q: ArrayLike) -> tuple[Array, ...]:
@@ -140,32 +146,6 @@ def joint_frames(chain: KinematicChain, columns: Array) -> Iterator[BlockFrame]:
         yield frame
 
 
-def in_blocks(
-    chain: KinematicChain, q: ArrayLike, shape: tuple[int, ...], fill: Callable[[Array, Array], None]
-) -> Array:
-    """Compute something of ``shape`` for every joint vector, a block at a time.
-
-    Args:
-        chain: The robot.
-        q: Joint vectors, rad and m, shape (..., n).
-        shape: Shape of one result.
-        fill: Called with the results of a block, shape (N, *shape), to be filled, and its joint coordinates,
-            shape (n, N).
-
-    Returns:
-        Shape (..., *shape).
-
-    Raises:
-        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
-    """
-    vectors, batch = joint_vectors(chain, q)
-    results = np.empty((len(vectors), *shape))
-    for start in range(0, len(vectors), BLOCK):
-        block = slice(start, start + BLOCK)
-        fill(results[block], np.ascontiguousarray(vectors[block].T))
-    return results.reshape(*batch, *shape)
-
-
 def frame_names(chain: KinematicChain) -> tuple[str, ...]:
     """Return the names: base_link, link_1 … link_n, dh_0 … dh_n, tool0."""
     n = len(chain.joints)
@@ -188,37 +168,48 @@ def require_frame(chain: KinematicChain, frame: str) -> None:
         )
 
 
-def frame_pose(chain: ChainLike, frame: str, q: ArrayLike) -> Array:
+def frame_pose(chain: ChainLike, frame: str, q: ArrayLike, **options: Unpack[BatchOptions]) -> Array:
     """Return the pose of a named frame in base_link.
 
     Args:
         chain: The robot, in any form.
         frame: One of ``frame_names``; link_i is at joint i, dh_i is the table's frame i.
         q: Joint vectors, rad and m, shape (..., n).
+        **options: ``out``, ``rows``, ``threads``: see :class:`BatchOptions`.
 
     Returns:
         Shape (..., 4, 4).
 
     Raises:
         UnknownFrameError: The frame is unknown.
-        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
+        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite; or an option is wrong.
     """
-    robot = chain_of(chain)
-    require_frame(robot, frame)
-    tool = forward_kinematics(robot, q)
-    if frame == "tool0":
-        return tool
-    if frame == "base_link":
-        return np.broadcast_to(identity(), tool.shape).copy()
-    kind, index = frame.split("_")
-    poses, number = (frame_poses(robot, q), int(index)) if kind == "dh" else (joint_poses(robot, q), int(index) - 1)
-    return np.asarray(poses[..., number, :, :])
+    robot = chain if chain.__class__ is KinematicChain else chain_of(chain)
+    if not options:
+        evaluate = robot.code.pose.get(frame)
+        if evaluate is not None:
+            pose = evaluate(q)
+            if pose is not None:
+                return pose
+    carriers, T_joint_frame = _place(robot, frame)
+
+    def fill(results: Array, columns: Array) -> None:
+        if carriers == 0:
+            results[...] = T_joint_frame[: results.shape[1]]
+            return
+        for last, _ in zip(joint_frames(robot, columns), range(carriers), strict=False):  # noqa: B007
+            pass
+        last.then(T_joint_frame).write(results)
+
+    return _computed(POSE, robot, (frame, carriers, T_joint_frame), q, fill, options)
 
 
 _NOTHING: Column = (0.0, 0.0, 0.0)
 
 
-def geometric_jacobian(chain: ChainLike, q: ArrayLike, *, frame: str = "tool0") -> Array:
+def geometric_jacobian(
+    chain: ChainLike, q: ArrayLike, *, frame: str = "tool0", **options: Unpack[JacobianOptions]
+) -> Array:
     """Return the Jacobian of a frame in base_link: [velocity; angular velocity] = J · dq/dt.
 
     For a joint that turns about the unit axis z through p the column is [z x (p_frame - p); z], for one that
@@ -229,6 +220,7 @@ def geometric_jacobian(chain: ChainLike, q: ArrayLike, *, frame: str = "tool0") 
         chain: The robot, in any form.
         q: Joint vectors, rad and m, shape (..., n).
         frame: One of ``frame_names``.
+        **options: ``out``, ``threads``: see :class:`BatchOptions`.
 
     Returns:
         Shape (..., 6, n): rows 0-2 velocity of the frame's origin, m/s; rows 3-5 angular velocity, rad/s; both
@@ -236,32 +228,61 @@ def geometric_jacobian(chain: ChainLike, q: ArrayLike, *, frame: str = "tool0") 
 
     Raises:
         UnknownFrameError: The frame is unknown.
-        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
+        ConfigurationError: ``q`` has the wrong shape or holds something that is not finite; or an option is wrong.
     """
-    robot = chain_of(chain)
+    robot = chain if chain.__class__ is KinematicChain else chain_of(chain)
+    if not options:
+        evaluate = robot.code.jacobian.get(frame)
+        if evaluate is not None:
+            jacobian = evaluate(q)
+            if jacobian is not None:
+                return jacobian
     carriers, T_joint_frame = _place(robot, frame)
 
-    def fill(out: Array, columns: Array) -> None:
-        out[...] = 0.0
+    def fill(results: Array, columns: Array) -> None:
+        results[...] = 0.0
         frames = list(joint_frames(robot, columns))[:carriers]
         if not frames:
             return
         target = frames[-1].then(T_joint_frame)
         pairs = zip(robot.joints, frames, strict=False)
         for i, (joint, axis) in enumerate(pair for pair in pairs if pair[0].type.moves):
-            _write(out[:, :, i], axis, target, turns=joint.type.turns, sign=joint.sign * axis.signs[2])
+            _write(results[:, :, i], axis, target, turns=joint.type.turns, sign=joint.sign * axis.signs[2])
 
-    return in_blocks(robot, q, (6, robot.n), fill)
+    return _computed(JACOBIAN, robot, (frame, carriers, T_joint_frame), q, fill, options)
+
+
+def _computed(
+    kind: Kind,
+    robot: KinematicChain,
+    place: tuple[str, int, Array],
+    q: ArrayLike,
+    fill: Fill,
+    options: BatchOptions | JacobianOptions,
+) -> Array:
+    """Compute a pose or a Jacobian of a frame for joint vectors, one or a batch."""
+    out, rows, threads = checked_options(kind, options)
+    vectors, batch = joint_vectors(robot, q)
+    if not batch:
+        result = of_one(kind, robot, *place, vectors[0])[:rows]
+        if out is None:
+            return result if rows == kind.rows else result.copy()
+        require_shape(out, result.shape)[...] = result
+        return out
+    shape = (rows, kind.columns or robot.n)
+    return in_blocks(vectors, batch, shape, fill, out, threads)
 
 
 def _place(chain: KinematicChain, frame: str) -> tuple[int, Array]:
-    """Return how many joints carry a named frame, and its pose in the last of them."""
+    """Return how many joints carry a named frame, and its pose in the last of them, or in base_link."""
     require_frame(chain, frame)
     n = len(chain.joints)
     if frame == "tool0":
         return n, compose(chain.joints[-1].T_joint_dh, chain.T_dhn_tool0)
+    if frame == "dh_0":
+        return 0, chain.T_base_link_dh0
     kind, _, index = frame.partition("_")
-    if kind == "dh" and index != "0":
+    if kind == "dh":
         return int(index), chain.joints[int(index) - 1].T_joint_dh
     return (int(index) if kind == "link" else 0), identity()
 

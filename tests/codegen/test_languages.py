@@ -11,9 +11,9 @@ from dh2sim import Continuous, Fixed, LinkSpec, Prismatic, Revolute, Robot
 from dh2sim.codegen.generate import generate_code
 from dh2sim.codegen.languages import Language, program_text
 from dh2sim.codegen.program import Function, Program, identifier
-from dh2sim.codegen.trace import Trace
 from dh2sim.kinematics.forward import geometric_jacobian
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.kinematics.trace import Trace
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array

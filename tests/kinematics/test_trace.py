@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from dh2sim.codegen.trace import Token, Trace, cosine, count_operations, live_nodes, sine
+from dh2sim.kinematics.trace import Token, Trace, cosine, count_operations, live_nodes, sine
 
 
 def cost(trace: Trace, *outputs: float | Token) -> tuple[int, int, int]:

@@ -1,0 +1,135 @@
+"""How results for many joint vectors are computed: where they are put, in blocks, by threads, by which backend."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Final, Literal, TypeAlias, TypedDict
+
+import numpy as np
+
+from dh2sim.errors import ConfigurationError
+from dh2sim.kinematics.batch_frame import BLOCK
+from dh2sim.kinematics.straight_line import JACOBIAN, Kind
+from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.typing import Array
+
+THREADED: Final = 20_000
+"""Joint vectors from which on threads are started; for fewer, handing over costs more than is gained."""
+Fill: TypeAlias = Callable[[Array, Array], None]
+"""Fills the results of a block, shape (N, *shape of one), from its joint coordinates."""
+
+
+class JacobianOptions(TypedDict, total=False):
+    """How Jacobians are computed."""
+
+    out: Array | None
+    """Takes the result: an array of doubles of the result's shape, which is returned; by default a new one."""
+    threads: int
+    """Number of threads for 20 000 joint vectors and more; 0: as many as there are processors for this process. The
+    bits do not depend on it. Default 1."""
+
+
+class BatchOptions(JacobianOptions, total=False):
+    """How poses are computed."""
+
+    rows: Literal[3, 4]
+    """3 leaves out the last row of each pose, which is 0 0 0 1. Default 4."""
+
+
+def checked_options(kind: Kind, options: BatchOptions | JacobianOptions) -> tuple[Array | None, int, int]:
+    """Return ``out``, the rows of one result, and the number of threads.
+
+    Raises:
+        ConfigurationError: An option is unknown, or has a value that is not allowed.
+    """
+    names = ["out", "threads", *([] if kind is JACOBIAN else ["rows"])]
+    for name in options:
+        if name not in names:
+            raise TypeError(f"unknown option {shown(name)}.{did_you_mean(name, names)} Options: {listed(names)}")
+    rows: object = options.get("rows", kind.rows)
+    if not isinstance(rows, int | np.integer) or rows not in (3, 4, kind.rows):
+        raise ConfigurationError(f"rows must be 3 or 4, got {rows!r}")
+    return options.get("out"), int(rows), thread_count(options.get("threads", 1))
+
+
+def thread_count(threads: int) -> int:
+    """Return a number of threads: that of the processors this process may use in place of 0.
+
+    Raises:
+        ConfigurationError: It is no whole number, or negative.
+    """
+    if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 0:
+        raise ConfigurationError(f"threads must be a whole number, 0 for all processors, got {threads!r}")
+    if threads:
+        return int(threads)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def require_shape(out: Array, shape: tuple[int, ...]) -> Array:
+    """Return an array that is to take a result.
+
+    Raises:
+        ConfigurationError: It is no array of doubles of this shape, or cannot be written to.
+    """
+    if not isinstance(out, np.ndarray):
+        raise ConfigurationError(f"out must be an array of float64 of shape {shape}, got {type(out).__name__}")
+    if out.shape != shape or out.dtype != np.float64 or not out.dtype.isnative:
+        raise ConfigurationError(
+            f"out must be an array of float64 of shape {shape}, got one of {out.dtype} of shape {out.shape}"
+        )
+    if not out.flags.writeable:
+        raise ConfigurationError("out must be an array that can be written to")
+    return out
+
+
+def in_blocks(
+    vectors: Array,
+    batch: tuple[int, ...],
+    shape: tuple[int, ...],
+    fill: Fill,
+    out: Array | None = None,
+    threads: int = 1,
+) -> Array:
+    """Compute something of ``shape`` for every joint vector, a block at a time.
+
+    Args:
+        vectors: Joint vectors, checked, shape (count, n).
+        batch: Shape whose product is count.
+        shape: Shape of one result.
+        fill: Called with the results of a block, shape (N, *shape), to be filled, and its joint
+            coordinates, shape (n, N).
+        out: Takes the result, shape (*batch, *shape); by default a new array.
+        threads: Number of threads, or 0; blocks are the same for any number.
+
+    Returns:
+        Shape (*batch, *shape).
+
+    Raises:
+        ConfigurationError: ``out`` has another shape or type, or ``threads`` is negative.
+    """
+    count, threads = len(vectors), thread_count(threads)
+    if out is not None:
+        require_shape(out, (*batch, *shape))
+        if np.may_share_memory(out, vectors):
+            vectors = vectors.copy()
+    direct = out is not None and out.flags.c_contiguous
+    results = out.reshape(count, *shape) if out is not None and direct else np.empty((count, *shape))
+
+    def compute(start: int) -> None:
+        block = slice(start, start + BLOCK)
+        fill(results[block], np.ascontiguousarray(vectors[block].T))
+
+    starts = range(0, count, BLOCK)
+    if threads == 1 or count < THREADED:
+        for start in starts:
+            compute(start)
+    else:
+        with ThreadPoolExecutor(min(threads, len(starts))) as pool:
+            list(pool.map(compute, starts))
+    if out is None:
+        return results.reshape(*batch, *shape)
+    if not direct:
+        out[...] = results.reshape(*batch, *shape)
+    return out
