@@ -15,14 +15,17 @@ import numpy as np
 
 from dh2sim.errors import EngineError, MismatchError, ModelError
 from dh2sim.files import atomic_files, finish_interrupted
+from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.tree import DYNAMICS as URDF_DYNAMICS
 from dh2sim.formats.urdf.write import to_urdf
+from dh2sim.kinematics.loop_closure import constraint_jacobian
 from dh2sim.kinematics.sampling import scattered_configurations
-from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.kinematics.table_oracle import table_frame_poses, table_mechanism_frames, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
 from dh2sim.messages import listed
+from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import FilledIn, RobotModel
 from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Dynamics
@@ -35,7 +38,9 @@ class Format(StrEnum):
     MJCF = "mjcf"
 
 
-def render(model: RobotModel, formats: Collection[Format], *, dh_frames: bool = True) -> dict[str, bytes]:
+def render(
+    model: RobotModel | MechanismModel, formats: Collection[Format], *, dh_frames: bool = True
+) -> dict[str, bytes]:
     """Return the files of an export.
 
     Args:
@@ -55,7 +60,8 @@ def render(model: RobotModel, formats: Collection[Format], *, dh_frames: bool = 
     if Format.MJCF in formats:
         if model.name.lower() == "scene":
             raise ModelError(f"{model.name}: its MJCF and its scene would both be scene.xml; rename the robot")
-        files[f"{model.name}.xml"] = to_mjcf(model).encode()
+        text = to_mechanism_mjcf(model) if isinstance(model, MechanismModel) else to_mjcf(model)
+        files[f"{model.name}.xml"] = text.encode()
         files["scene.xml"] = to_scene(model).encode()
     for link in model.all_links:
         if link.mesh is not None:
@@ -75,6 +81,7 @@ class Lost(StrEnum):
     GRAVITY = "gravity"
     EXCLUSIONS = "pairs of links that do not collide"
     VELOCITY = "velocity limits"
+    CLOSURES = "joints that close loops"
     APPEARANCE = "colours and textures of meshes"
 
 
@@ -97,8 +104,8 @@ class Loss:
         match self.what:
             case Lost.DYNAMICS:
                 words = f"{self.detail} of {names}"
-            case Lost.VELOCITY:
-                words = f"{self.what} of {names}"
+            case Lost.VELOCITY | Lost.CLOSURES:
+                words = f"{self.what}: {names}" if self.what is Lost.CLOSURES else f"{self.what} of {names}"
             case Lost.CONFIGURATIONS:
                 words = f"{self.what} ({names})"
             case Lost.EXCLUSIONS:
@@ -111,7 +118,7 @@ class Loss:
         return words if self.format is None else f"{self.format.upper()}: {words}"
 
 
-def losses(model: RobotModel, formats: Collection[Format]) -> list[Loss]:
+def losses(model: RobotModel | MechanismModel, formats: Collection[Format]) -> list[Loss]:
     """List what is in the robot file and the formats cannot hold."""
     found: list[Loss] = []
     if Format.URDF in formats:
@@ -125,12 +132,14 @@ def losses(model: RobotModel, formats: Collection[Format]) -> list[Loss]:
     return found
 
 
-def _lost_in_urdf(model: RobotModel) -> Iterator[Loss]:
+def _lost_in_urdf(model: RobotModel | MechanismModel) -> Iterator[Loss]:
     spec, urdf = model.spec, Format.URDF
+    if spec.closures:
+        yield Loss(what=Lost.CLOSURES, format=urdf, where=tuple(closure.name for closure in spec.closures))
     if any(_drives(row.actuator) for row in spec.moving_rows):
         yield Loss(what=Lost.ACTUATORS, format=urdf)
     for key in (field.name for field in fields(Dynamics) if field.name not in URDF_DYNAMICS):
-        if names := tuple(row.name for row in spec.rows if getattr(row.dynamics, key)):
+        if names := tuple(row.name for row in spec.all_rows if getattr(row.dynamics, key)):
             yield Loss(what=Lost.DYNAMICS, format=urdf, where=names, detail=key)
     if spec.configurations:
         yield Loss(what=Lost.CONFIGURATIONS, format=urdf, where=tuple(spec.configurations))
@@ -141,10 +150,10 @@ def _lost_in_urdf(model: RobotModel) -> Iterator[Loss]:
         yield Loss(what=Lost.EXCLUSIONS, format=urdf, where=pairs)
 
 
-def _lost_in_mjcf(model: RobotModel) -> Iterator[Loss]:
+def _lost_in_mjcf(model: RobotModel | MechanismModel) -> Iterator[Loss]:
     names = tuple(
         row.name
-        for row in model.spec.rows
+        for row in model.spec.all_rows
         if row.limits.velocity is not None and row.actuator.type is not ActuatorType.VELOCITY
     )
     if names:
@@ -173,13 +182,15 @@ class Verified:
     """Greatest angle, rad."""
 
 
-def verify(model: RobotModel, folder: Path, formats: Collection[Format]) -> list[Verified]:
+def verify(model: RobotModel | MechanismModel, folder: Path, formats: Collection[Format]) -> list[Verified]:
     """Compare all frames of the files in ``folder`` with the table at scattered configurations.
 
     Raises:
         EngineError: MuJoCo refuses a file.
         MismatchError: a pose differs by more than rounding.
     """
+    if isinstance(model, MechanismModel):
+        return _verify_mechanism(model, folder, formats)
     from dh2sim.engines.mujoco_engine import MujocoEngine
 
     q = scattered_configurations(*model.travel, SAMPLES)
@@ -208,6 +219,46 @@ def verify(model: RobotModel, folder: Path, formats: Collection[Format]) -> list
                 "was written. This is a defect of dh2sim: please report it with the robot file"
             )
         results.append(result)
+    return results
+
+
+def _verify_mechanism(model: MechanismModel, folder: Path, formats: Collection[Format]) -> list[Verified]:
+    """Compare all frames with the tables at scattered configurations, and the loops with ours at home.
+
+    Raises:
+        EngineError: MuJoCo refuses a file.
+        MismatchError: A pose differs by more than rounding, a loop is open, or its constraints have another rank.
+    """
+    from dh2sim.engines.mujoco_mechanism import MujocoMechanism
+
+    lower, upper = (np.array([joint.travel[side] for joint in model.moving_joints]) for side in (0, 1))
+    q = scattered_configurations(lower, upper, SAMPLES)
+    results = []
+    for format_ in formats:
+        engine = MujocoMechanism(folder / f"{model.name}.{'urdf' if format_ is Format.URDF else 'xml'}")
+        names = [joint.name for joint in model.moving_joints]
+        position, rotation = 0.0, 0.0
+        for vector in q:
+            poses = engine.frame_poses(dict(zip(names, vector.tolist(), strict=True)))
+            reference = table_mechanism_frames(model.spec, vector)
+            found = [name for name in reference if name in poses]
+            errors = pose_errors(np.array([poses[k] for k in found]), np.array([reference[k] for k in found]))
+            position = max(position, float(np.max(errors[0])))
+            rotation = max(rotation, float(np.max(errors[1])))
+        allowed = TOLERANCE * max(1.0, model.size)
+        faults = [] if position <= allowed and rotation <= TOLERANCE else ["differs from the table"]
+        if format_ is Format.MJCF and model.tree.closures:
+            gap, freedoms = engine.loops_at_home()
+            own = model.tree.n - int(np.linalg.matrix_rank(constraint_jacobian(model.tree, model.q), tol=1e-8))
+            faults += [f"leaves loops open by {gap:.3g} m"] if gap > 10 * allowed else []
+            faults += [f"leaves {freedoms} freedoms at home instead of {own}"] if freedoms != own else []
+        if faults:
+            raise MismatchError(
+                f"{model.name}: the {format_.value.upper()} {listed(faults, ' and ')} ({position:.3g} m, "
+                f"{rotation:.3g} rad); nothing was written. This is a defect of dh2sim: please report it with the "
+                "robot file"
+            )
+        results.append(Verified(format=format_, position_error=position, rotation_error=rotation))
     return results
 
 
@@ -253,7 +304,7 @@ class Drift:
 
 
 def export_robot(
-    model: RobotModel,
+    model: RobotModel | MechanismModel,
     out: Path,
     *,
     formats: Collection[Format] = ALL_FORMATS,
@@ -315,7 +366,7 @@ _SHOWN = 12
 """Digits of a hash that messages show."""
 
 
-def mixture(model: RobotModel, folder: Path, formats: Collection[Format] = ALL_FORMATS) -> str:
+def mixture(model: RobotModel | MechanismModel, folder: Path, formats: Collection[Format] = ALL_FORMATS) -> str:
     """Return a sentence if the files of a robot come from different robot files, or an empty text.
 
     The first line of each says which, with its SHA-256. Files without such a line were not exported, and are ignored.
@@ -336,7 +387,7 @@ def mixture(model: RobotModel, folder: Path, formats: Collection[Format] = ALL_F
     return f"contains files of different exports: {parts}"
 
 
-def _names(model: RobotModel, formats: Collection[Format]) -> list[str]:
+def _names(model: RobotModel | MechanismModel, formats: Collection[Format]) -> list[str]:
     urdf = [f"{model.name}.urdf"] if Format.URDF in formats else []
     return [*urdf, *([f"{model.name}.xml", "scene.xml"] if Format.MJCF in formats else [])]
 
@@ -355,7 +406,11 @@ def _shortened(origin: str) -> str:
 
 
 def drift(
-    model: RobotModel, out: Path, *, formats: Collection[Format] = ALL_FORMATS, dh_frames: bool = True
+    model: RobotModel | MechanismModel,
+    out: Path,
+    *,
+    formats: Collection[Format] = ALL_FORMATS,
+    dh_frames: bool = True,
 ) -> list[Drift]:
     """Compare ``out``/<name>/ with what an export would write there, byte for byte.
 

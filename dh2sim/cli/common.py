@@ -20,6 +20,7 @@ from dh2sim.errors import Dh2simError, MismatchError, RobotFileError, SettingsEr
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
+    from dh2sim.model.mechanism import MechanismModel
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.robot.spec import RobotSpec
 
@@ -270,7 +271,7 @@ def other_format(file: str) -> str | None:
 
 
 def build_all(robots: Sequence[str], *, strict: bool | None = None) -> list[RobotModel]:
-    """Read robot files and build their models, and report the errors of all of them at once.
+    """Read files of serial robots and build their models, and report the errors of all of them at once.
 
     Args:
         robots: Files or names.
@@ -281,6 +282,36 @@ def build_all(robots: Sequence[str], *, strict: bool | None = None) -> list[Robo
     """
     from dh2sim.model.build import build_model
 
+    models = _all(build_model, _load_distinct(robots))
+    if strict is not None:
+        report_slips(models, strict=strict)
+    return models
+
+
+def build_any(robots: Sequence[str], *, strict: bool | None = None) -> list[RobotModel | MechanismModel]:
+    """Read files of robots and mechanisms and build their models; as ``build_all``.
+
+    Raises:
+        Dh2simError: A file is wrong, two robots have the same name, or a mesh cannot be used.
+    """
+    from dh2sim.model.build import build_model
+    from dh2sim.model.mechanism import MechanismModel, build_mechanism
+
+    def build(spec: RobotSpec) -> RobotModel | MechanismModel:
+        return build_mechanism(spec) if spec.is_mechanism else build_model(spec)
+
+    models = _all(build, _load_distinct(robots))
+    if strict is not None:
+        report_slips([model for model in models if not isinstance(model, MechanismModel)], strict=strict)
+    return models
+
+
+def _load_distinct(robots: Sequence[str]) -> list[RobotSpec]:
+    """Read robot files; each robot needs a folder of its own name.
+
+    Raises:
+        Dh2simError: A file is wrong, or two robots have the same name.
+    """
     specs = load_all(robots)
     first: dict[str, str] = {}
     for robot, spec in zip(robots, specs, strict=True):
@@ -290,10 +321,7 @@ def build_all(robots: Sequence[str], *, strict: bool | None = None) -> list[Robo
                 "its own name"
             )
         first[spec.name] = robot
-    models = _all(build_model, specs)
-    if strict is not None:
-        report_slips(models, strict=strict)
-    return models
+    return specs
 
 
 def report_slips(models: Sequence[RobotModel], *, strict: bool) -> None:

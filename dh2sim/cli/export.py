@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import sys
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, RobotsArgument, StrictOption, build_all, complain
+from dh2sim.cli.common import DONE, FELL_SHORT, RobotsArgument, StrictOption, build_any, complain
 from dh2sim.errors import Dh2simError, OutputError
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.export import ExportReport, Format
+    from dh2sim.model.mechanism import MechanismModel
     from dh2sim.model.robot_model import RobotModel
 
 
@@ -58,7 +59,7 @@ def export(
       dh2sim export robots/*.yaml --check       # in CI: are the files up to date?
     """
     chosen = _formats(formats)
-    models = build_all(robots, strict=strict)
+    models = build_any(robots, strict=strict)
     if check:
         return _check(models, out, chosen, dh_frames=not no_dh_frames)
     from dh2sim.export import export_robot
@@ -99,7 +100,9 @@ def _formats(names: list[str] | None) -> list[Format]:
     return list(dict.fromkeys(chosen))
 
 
-def _check(models: list[RobotModel], out: Path, formats: list[Format], *, dh_frames: bool) -> int:
+def _check(
+    models: Sequence[RobotModel | MechanismModel], out: Path, formats: list[Format], *, dh_frames: bool
+) -> int:
     from dh2sim.export import drift
 
     status = 0
@@ -118,7 +121,7 @@ def _check(models: list[RobotModel], out: Path, formats: list[Format], *, dh_fra
     return status
 
 
-def _print_report(report: ExportReport, out: Path, model: RobotModel) -> None:
+def _print_report(report: ExportReport, out: Path, model: RobotModel | MechanismModel) -> None:
     """Print a table of the files with their errors, then what was lost, estimated and assumed."""
     folder = out / report.name
     errors = {check.format.value: check for check in report.verified}

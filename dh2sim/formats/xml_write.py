@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
 from dh2sim.errors import NotFiniteError
+from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
 
 
@@ -74,7 +75,7 @@ def _comment(text: str) -> str:
     )
 
 
-def provenance(model: RobotModel) -> list[str]:
+def provenance(model: RobotModel | MechanismModel) -> list[str]:
     """Return the lines that every exported file begins with: source, its hash, what was estimated."""
     source = model.spec.source_file
     origin = "a robot made in code" if source is None else f"{source.name} (SHA-256 {source.sha256})"

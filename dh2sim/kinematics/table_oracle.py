@@ -67,6 +67,42 @@ def table_tool_pose(spec: RobotSpec, q: ArrayLike) -> Array:
     return table_frame_poses(spec, q)[..., -1, :, :] @ _pose_matrix(spec.tool)
 
 
+def table_mechanism_frames(spec: RobotSpec, q: ArrayLike) -> dict[str, Array]:
+    """Return the poses of the DH frames of all chains of a mechanism, and of base_link and tool0, in base_link.
+
+    Args:
+        spec: The robot.
+        q: One joint vector, rad and m, shape (n,): main chain, then branches.
+
+    Returns:
+        By name, such as dh_1 or rocker/dh_1; of branches that start from a link's own frame, which no table knows,
+        there is none.
+    """
+    values = np.asarray(q, dtype=np.float64)
+    frames = {"base_link": np.eye(4)}
+    start = _chain_frames(frames, "", _pose_matrix(spec.base.pose), spec.rows, values)
+    frames["tool0"] = frames[f"dh_{len(spec.rows)}"] @ _pose_matrix(spec.tool)
+    for name, branch in spec.branches.items():
+        rest = values[start:]
+        if branch.origin in frames:
+            origin = frames[branch.origin] @ _pose_matrix(branch.pose)
+            _chain_frames(frames, f"{name}/", origin, branch.rows, rest)
+        start += sum(row.type.moves for row in branch.rows)
+    return frames
+
+
+def _chain_frames(frames: dict[str, Array], prefix: str, T: Array, rows: Sequence[Row], q: Array) -> int:
+    """Add the frames of a chain that starts at ``T``; return how many coordinates it has."""
+    frames[f"{prefix}dh_0"] = T
+    count = 0
+    for i, row in enumerate(rows, start=1):
+        coordinate = q[count : count + 1] if row.type.moves else np.zeros(1)
+        count += row.type.moves
+        T = T @ row_matrix(row, coordinate)[..., 0]
+        frames[f"{prefix}dh_{i}"] = T
+    return count
+
+
 def row_matrix(row: Row, q: Array) -> Array:
     """Return A_i, the pose of DH frame i in DH frame i - 1, as the textbooks print it.
 

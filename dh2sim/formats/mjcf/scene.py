@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from typing import cast
 
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.forward import reference_joint_poses
 from dh2sim.kinematics.transforms import compose, identity, move_point
+from dh2sim.kinematics.tree import body_poses
 from dh2sim.model.build import ModelLike, model_of
+from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind
 from dh2sim.typing import Array, read_only
@@ -32,7 +35,7 @@ class _Extent:
     """Height of the foot of the base; None where the arm hangs from it."""
 
 
-def to_scene(model: ModelLike) -> str:
+def to_scene(model: ModelLike | MechanismModel) -> str:
     """Write a scene that includes the robot's MJCF, ``<name>.xml`` beside it.
 
     Args:
@@ -42,8 +45,9 @@ def to_scene(model: ModelLike) -> str:
         The text of the file. The floor is at z = 0, or at the foot of the base if that is lower; below the arm
         where that is lower at home, and then the base stands on a pedestal.
     """
-    model = model_of(model)
-    extent = _extent(model)
+    mechanism = model if isinstance(model, MechanismModel) else None
+    model = mechanism.main if mechanism is not None else model_of(cast("ModelLike", model))
+    extent = _extent(model if mechanism is None else mechanism)
     cell = 10.0 ** math.floor(math.log10(extent.radius))
     floor = 0.0 if extent.foot is None else min(0.0, extent.foot)
     if extent.lowest < floor - 1e-6 * extent.radius:
@@ -72,13 +76,17 @@ def to_scene(model: ModelLike) -> str:
     if extent.foot is not None and floor < extent.foot:
         _pedestal(world, model, floor, extent.foot)
     _camera(world, extent)
-    return document(root, provenance(model)[:2])
+    return document(root, provenance(mechanism or model)[:2])
 
 
-def _extent(model: RobotModel) -> _Extent:
-    poses = [identity(), *reference_joint_poses(model.chain, model.home)]
-    if model.tool is not None:
-        poses.append(compose(poses[-1], model.joints[-1].T_joint_dh))
+def _extent(model: RobotModel | MechanismModel) -> _Extent:
+    main = model.main if isinstance(model, MechanismModel) else model
+    if isinstance(model, MechanismModel):
+        poses = [identity(), *body_poses(model.tree, model.q)]
+    else:
+        poses = [identity(), *reference_joint_poses(model.chain, model.home)]
+    if main.tool is not None:
+        poses.append(compose(poses[len(main.joints)], main.joints[-1].T_joint_dh))
     points, lowest = [], 0.0
     for link, T in zip(model.all_links, poses, strict=True):
         for shape in link.shapes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from dh2sim.formats.mjcf.sites import add_site, placed
 from dh2sim.formats.mjcf.tree import DYNAMICS
@@ -11,13 +12,17 @@ from dh2sim.formats.xml_write import child, document, number, numbers, provenanc
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.mass import LIGHTEST, MassProperties
+from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.spec import ActuatorType, JointType
 from dh2sim.typing import Array
 
+Written: TypeAlias = RobotModel | MechanismModel
+"""What these elements are written of."""
 
-def add_actuators(mujoco: ET.Element, model: RobotModel) -> None:
+
+def add_actuators(mujoco: ET.Element, model: Written) -> None:
     """Add an actuator for every joint that is driven, in the order of the joints."""
     driven = [joint for joint in model.moving_joints if joint.actuator.type is not ActuatorType.NONE]
     if not driven:
@@ -39,7 +44,7 @@ def add_actuators(mujoco: ET.Element, model: RobotModel) -> None:
             element.set("forcerange", numbers([-joint.effort, joint.effort]))
 
 
-def add_sensors(mujoco: ET.Element, model: RobotModel) -> None:
+def add_sensors(mujoco: ET.Element, model: Written) -> None:
     """Add sensors of every joint's position, velocity and actuator force, and of tool0's pose."""
     sensors = child(mujoco, "sensor")
     for suffix, tag in (("position", "jointpos"), ("velocity", "jointvel"), ("torque", "jointactuatorfrc")):
@@ -107,18 +112,19 @@ def to_mjcf(model: ModelLike, options: MjcfOptions = EXPORTED) -> str:
     flags = {**({"energy": "enable"} if options.energy else {}), **({} if options.sensors else {"sensor": "disable"})}
     if flags:
         child(option, "flag", **flags)
-    _defaults(mujoco, model)
-    materials = _assets(mujoco, model)
+    add_defaults(mujoco, model)
+    materials = add_assets(mujoco, model)
     _bodies(mujoco, model, materials, options)
-    _contact(mujoco, model)
+    add_contact(mujoco, model)
     add_actuators(mujoco, model)
     add_sensors(mujoco, model)
     add_keyframes(mujoco, model, floating_base=options.floating_base)
     return document(mujoco, provenance(model))
 
 
-def _defaults(mujoco: ET.Element, model: RobotModel) -> None:
-    outer = child(child(mujoco, "default"), "default", class_=_class(model))
+def add_defaults(mujoco: ET.Element, model: Written) -> None:
+    """Add the default classes."""
+    outer = child(child(mujoco, "default"), "default", class_=class_name(model))
     child(outer, "joint", axis=numbers([0, 0, 1]))
     child(outer, "site", group="4", size=number(0.02 * _site_scale(model)), rgba="0.9 0.9 0.1 1")
     visual = child(outer, "default", class_=f"{model.name}_visual")
@@ -131,17 +137,18 @@ def _defaults(mujoco: ET.Element, model: RobotModel) -> None:
     child(hidden, "geom", group="3")
 
 
-def _class(model: RobotModel) -> str:
+def class_name(model: Written) -> str:
     """Return the name of the robot's default class; MuJoCo has a class main already."""
     return "main_robot" if model.name == "main" else model.name
 
 
-def _site_scale(model: RobotModel) -> float:
+def _site_scale(model: Written) -> float:
     radii = [shape.radius for link in model.all_links for shape in link.shapes if shape.solid]
     return 10.0 * min(radii)
 
 
-def _assets(mujoco: ET.Element, model: RobotModel) -> dict[Color, str]:
+def add_assets(mujoco: ET.Element, model: Written) -> dict[Color, str]:
+    """Add materials and meshes; return the materials' names by colour."""
     asset = child(mujoco, "asset")
     materials: dict[Color, str] = {}
     for link in model.all_links:
@@ -164,25 +171,25 @@ def _assets(mujoco: ET.Element, model: RobotModel) -> dict[Color, str]:
 
 
 def _bodies(mujoco: ET.Element, model: RobotModel, materials: dict[Color, str], options: MjcfOptions) -> None:
-    body = child(child(mujoco, "worldbody"), "body", name=model.base.name, childclass=_class(model))
+    body = child(child(mujoco, "worldbody"), "body", name=model.base.name, childclass=class_name(model))
     if options.floating_base:
-        _inertial(body, model.base.inertial)
+        add_inertial(body, model.base.inertial)
         child(body, "freejoint")  # nameless: any name might be that of a joint of the table
-    _geoms(body, model, model.base, model.chain.T_base_link_dh0, materials)
+    add_geoms(body, model, model.base, model.chain.T_base_link_dh0, materials)
     add_site(body, "dh_0", model.chain.T_base_link_dh0, model.base.inertial if options.floating_base else None)
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
         body = child(body, "body", name=link.name, **placed(joint.T_parent_joint))
-        _inertial(body, link.inertial or (LIGHTEST if joint.type.moves else None))
+        add_inertial(body, link.inertial or (LIGHTEST if joint.type.moves else None))
         if joint.type is not JointType.FIXED:
-            _joint(body, joint)
-        _geoms(body, model, link, joint.T_joint_dh, materials)
+            add_joint(body, joint)
+        add_geoms(body, model, link, joint.T_joint_dh, materials)
         frames = [(f"dh_{i}", joint.T_joint_dh)] if i < len(model.links) else _last_frames(model)
         for name, T in frames:
             add_site(body, name, T, link.inertial)
     if model.tool is not None:
         body = child(body, "body", name=model.tool.name, **placed(model.joints[-1].T_joint_dh))
-        _inertial(body, model.tool.inertial)
-        _geoms(body, model, model.tool, identity(), materials)
+        add_inertial(body, model.tool.inertial)
+        add_geoms(body, model, model.tool, identity(), materials)
 
 
 def _last_frames(model: RobotModel) -> list[tuple[str, Array]]:
@@ -196,7 +203,8 @@ def _moved(T: Array) -> dict[str, str]:
     return {name: text for name, text in placed(T).items() if text not in ("0.0 0.0 0.0", "1.0 0.0 0.0 0.0")}
 
 
-def _inertial(body: ET.Element, properties: MassProperties | None) -> None:
+def add_inertial(body: ET.Element, properties: MassProperties | None) -> None:
+    """Add the mass properties of a body; zeros for one that weighs nothing."""
     if properties is None:  # without this MuJoCo takes the body's place in its parent for its principal frame
         child(body, "inertial", pos=numbers([0, 0, 0]), mass=number(0), diaginertia=numbers([0, 0, 0]))
         return
@@ -208,8 +216,11 @@ def _inertial(body: ET.Element, properties: MassProperties | None) -> None:
         inertial.set("fullinertia", numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]))
 
 
-def _joint(body: ET.Element, joint: JointModel) -> None:
+def add_joint(body: ET.Element, joint: JointModel, reference: float = 0.0) -> None:
+    """Add the joint of a body; ``reference`` is the coordinate at which the body is where the file puts it."""
     element = child(body, "joint", name=joint.name, type="hinge" if joint.type.turns else "slide")
+    if reference:
+        element.set("ref", number(reference))
     if joint.sign < 0:
         element.set("axis", numbers([0, 0, -1]))
     if joint.position_range is not None:
@@ -221,9 +232,10 @@ def _joint(body: ET.Element, joint: JointModel) -> None:
             element.set(attribute, number(value))
 
 
-def _geoms(
-    body: ET.Element, model: RobotModel, link: LinkModel, T_link_dh: Array, materials: dict[Color, str]
+def add_geoms(
+    body: ET.Element, model: Written, link: LinkModel, T_link_dh: Array, materials: dict[Color, str]
 ) -> None:
+    """Add the shapes of a link, and its mesh."""
     if link.mesh is not None:
         material = materials[link.color]
         child(
@@ -258,7 +270,8 @@ def _geom(body: ET.Element, class_: str, shape: Shape, material: str, weight: di
     child(body, "geom", class_=class_, **attributes, **weight, **_moved(shape.T_link_shape))
 
 
-def _contact(mujoco: ET.Element, model: RobotModel) -> None:
+def add_contact(mujoco: ET.Element, model: Written) -> None:
+    """Add the pairs of links that do not collide."""
     if model.excluded:
         contact = child(mujoco, "contact")
         for pair in model.excluded:

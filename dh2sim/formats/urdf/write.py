@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from collections.abc import Iterable
 from dataclasses import replace
+from typing import cast
 
 from dh2sim.formats.urdf.tree import DYNAMICS
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.transforms import compose, identity, invert, pose_from_rpy, rpy_from_rotation
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.mass import LIGHTEST, MassProperties
-from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
+from dh2sim.model.mechanism import BranchModel, MechanismModel
+from dh2sim.model.robot_model import Color, JointModel, LinkModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.spec import JointType
 from dh2sim.typing import Array, read_only
@@ -24,7 +27,7 @@ T_FLANGE_DHN = pose_from_rpy([0, 0, 0], [0, math.pi / 2, 0])
 T_DHN_FLANGE = invert(T_FLANGE_DHN)
 
 
-def to_urdf(model: ModelLike, *, dh_frames: bool = True) -> str:
+def to_urdf(model: ModelLike | MechanismModel, *, dh_frames: bool = True) -> str:
     """Write a robot as URDF.
 
     Args:
@@ -36,10 +39,11 @@ def to_urdf(model: ModelLike, *, dh_frames: bool = True) -> str:
         other readers ignore, makes MuJoCo keep the fixed links as bodies and give no mass to the base. Massless links
         have an ``inertial`` of zeros, but for the root, where KDL warns of any.
     """
-    model = model_of(model)
+    mechanism = model if isinstance(model, MechanismModel) else None
+    model = mechanism.main if mechanism is not None else model_of(cast("ModelLike", model))
     robot = ET.Element("robot", name=model.name)
     child(child(robot, "mujoco"), "compiler", fusestatic="false", inertiafromgeom="false")
-    materials = _materials(model)
+    materials = _materials(model.all_links if mechanism is None else mechanism.all_links)
     for color, name in materials.items():
         child(child(robot, "material", name=name), "color", rgba=numbers(color))
     _link(robot, model.base, model.chain.T_base_link_dh0, materials, model.base.inertial)
@@ -48,23 +52,44 @@ def to_urdf(model: ModelLike, *, dh_frames: bool = True) -> str:
         _frame(robot, "dh_0", "base_link", model.chain.T_base_link_dh0)
     parent = model.base.name
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True), start=1):
-        _joint(robot, joint, parent, link.name)
-        _link(robot, link, joint.T_joint_dh, materials, link.inertial or (LIGHTEST if joint.type.moves else MASSLESS))
-        if dh_frames:
-            _frame(robot, f"dh_{i}", link.name, joint.T_joint_dh)
+        _row(robot, link, joint, parent, materials, f"dh_{i}" if dh_frames else "")
         parent = link.name
+    if mechanism is not None:
+        for branch in mechanism.branches:
+            _branch(robot, branch, mechanism.body_name(branch.body), materials, dh_frames=dh_frames)
     if model.tool is not None:
         _fixed_joint(robot, parent, model.tool.name, model.joints[-1].T_joint_dh)
         _link(robot, model.tool, identity(), materials, model.tool.inertial or MASSLESS)
     _frame(robot, "flange", parent, compose(model.joints[-1].T_joint_dh, T_DHN_FLANGE))
     _frame(robot, "tool0", "flange", compose(T_FLANGE_DHN, model.chain.T_dhn_tool0))
-    header = [*provenance(model), *(entry.sentence for entry in model.assumptions)]
+    whole = mechanism or model
+    header = [*provenance(whole), *(entry.sentence for entry in whole.assumptions)]
     return '<?xml version="1.0" encoding="utf-8"?>\n' + document(robot, header)
 
 
-def _materials(model: RobotModel) -> dict[Color, str]:
+def _row(
+    robot: ET.Element, link: LinkModel, joint: JointModel, parent: str, materials: dict[Color, str], frame: str
+) -> None:
+    """Add the joint and the link of a row, and its DH frame where that has a name."""
+    _joint(robot, joint, parent, link.name)
+    _link(robot, link, joint.T_joint_dh, materials, link.inertial or (LIGHTEST if joint.type.moves else MASSLESS))
+    if frame:
+        _frame(robot, frame, link.name, joint.T_joint_dh)
+
+
+def _branch(
+    robot: ET.Element, branch: BranchModel, parent: str, materials: dict[Color, str], *, dh_frames: bool
+) -> None:
+    if dh_frames:
+        _frame(robot, f"{branch.name}/dh_0", parent, branch.T_body_dh0)
+    for i, (link, joint) in enumerate(zip(branch.links, branch.joints, strict=True), start=1):
+        _row(robot, link, joint, parent, materials, f"{branch.name}/dh_{i}" if dh_frames else "")
+        parent = link.name
+
+
+def _materials(links: Iterable[LinkModel]) -> dict[Color, str]:
     materials: dict[Color, str] = {}
-    for link in model.all_links:
+    for link in links:
         for color in (link.color, link.joint_color):
             materials.setdefault(color, f"color_{len(materials) + 1}")
     return materials
