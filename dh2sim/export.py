@@ -250,7 +250,7 @@ def _verify_mechanism(model: MechanismModel, folder: Path, formats: Collection[F
         if format_ is Format.MJCF and model.tree.closures:
             gap, freedoms = engine.loops_at_home()
             own = model.tree.n - int(np.linalg.matrix_rank(constraint_jacobian(model.tree, model.q), tol=1e-8))
-            faults += [f"leaves loops open by {gap:.3g} m"] if gap > 10 * allowed else []
+            faults += [f"leaves loops open by {gap:.3g} m"] if gap > allowed else []
             faults += [f"leaves {freedoms} freedoms at home instead of {own}"] if freedoms != own else []
         if faults:
             raise MismatchError(

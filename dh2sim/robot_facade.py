@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from dh2sim.inverse.textbook import Explanation
     from dh2sim.kinematics.batches import BatchOptions, JacobianOptions
     from dh2sim.kinematics.chain import KinematicChain, SpecLike
+    from dh2sim.model.mechanism import MechanismModel
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.model.slips import Slip
     from dh2sim.simulate.options import RolloutKeywords
@@ -326,6 +327,22 @@ class Robot:
         return build_model(self.spec)
 
     @cached_property
+    def mechanism(self) -> MechanismModel:
+        """A mechanism with shapes, masses, limits and actuators, its loops closed.
+
+        Raises:
+            MeshError: A mesh file cannot be used.
+        """
+        from dh2sim.model.mechanism import build_mechanism
+
+        return build_mechanism(self.spec)
+
+    @property
+    def _written(self) -> RobotModel | MechanismModel:
+        """What is exported and checked."""
+        return self.mechanism if self.spec.is_mechanism else self.model
+
+    @cached_property
     def configurations(self) -> Mapping[str, Array]:
         """Named joint vectors, rad and m, each of shape (n,): ``zero``, ``home`` and those of the robot file."""
         return self.spec.named_configurations
@@ -515,13 +532,14 @@ class Robot:
         """Return the URDF; with ``dh_frames`` it has a link for every DH frame. Meshes are written by ``export``."""
         from dh2sim.formats.urdf.write import to_urdf
 
-        return to_urdf(self.model, dh_frames=dh_frames)
+        return to_urdf(self._written, dh_frames=dh_frames)
 
     def mjcf(self) -> str:
         """Return the MJCF. Meshes are written by ``export``."""
+        from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
         from dh2sim.formats.mjcf.write import to_mjcf
 
-        return to_mjcf(self.model)
+        return to_mechanism_mjcf(self.mechanism) if self.spec.is_mechanism else to_mjcf(self.model)
 
     def mjmodel(self) -> mujoco.MjModel:
         """Return the robot compiled by MuJoCo, without floor or light.
@@ -534,13 +552,13 @@ class Robot:
         """
         import mujoco
 
-        meshes = {link.mesh.file_name: link.mesh.data for link in self.model.all_links if link.mesh is not None}
+        meshes = {link.mesh.file_name: link.mesh.data for link in self._written.all_links if link.mesh is not None}
         with mujoco_warnings() as warned:
             try:
                 compiled = mujoco.MjModel.from_xml_string(self.mjcf(), meshes)
             except ValueError as error:
                 raise EngineError(f"{self.name}: MuJoCo refuses the model: {' '.join(str(error).split())}") from error
-        for sentence in warning_sentences(warned, [joint.name for joint in self.model.moving_joints]):
+        for sentence in warning_sentences(warned, [joint.name for joint in self._written.moving_joints]):
             warnings.warn(f"{self.name}: {sentence}", RuntimeWarning, stacklevel=2)
         return compiled
 
@@ -570,7 +588,7 @@ class Robot:
         from dh2sim.export import Format, export_robot
 
         wanted = list(dict.fromkeys(member(Format, format_, "format") for format_ in formats))
-        return export_robot(self.model, Path(out), formats=wanted, dh_frames=dh_frames, verified=verify)
+        return export_robot(self._written, Path(out), formats=wanted, dh_frames=dh_frames, verified=verify)
 
     def validate(
         self,
@@ -598,6 +616,12 @@ class Robot:
         from dh2sim.importing.sources import ImportOptions
         from dh2sim.validate.run import validate_robot
 
+        if self.spec.is_mechanism:
+            from dh2sim.validate.mechanism import validate_mechanism
+
+            if source is not None:
+                raise Dh2simError(f"{self.name}: a mechanism has no source to be compared with")
+            return validate_mechanism(self.mechanism, samples=samples, seed=seed, tolerance=tolerance)
         options = ImportOptions(base=base, tip=tip)
         return validate_robot(
             self.model, samples=samples, seed=seed, tolerance=tolerance, source=source, source_options=options

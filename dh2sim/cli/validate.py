@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import FELL_SHORT, RobotsArgument, StrictOption, build_all, complain, tolerance_of
+from dh2sim.cli.common import FELL_SHORT, RobotsArgument, StrictOption, build_any, complain, tolerance_of
 from dh2sim.cli.output import json_text, make_console, print_whole, progress_bar
 from dh2sim.errors import Dh2simError, OutputError
 from dh2sim.extras import require_extra
@@ -19,6 +19,7 @@ from dh2sim.messages import printable
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from dh2sim.model.mechanism import MechanismModel
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.validate.report import Check, RobotReport, ValidationReport
 
@@ -92,17 +93,29 @@ def validate(
     if source is None and (base is not None or tip is not None):
         option = "--base" if tip is None else "--tip"
         raise typer.BadParameter("only with --source", param_hint=option)
-    models = build_all(robots, strict=strict)
+    models = build_any(robots, strict=strict)
     if folder is not None:
         _require_folders(robots, models, folder)
     from dh2sim.importing.sources import ImportOptions
+    from dh2sim.model.mechanism import MechanismModel
+    from dh2sim.validate.mechanism import validate_mechanism
     from dh2sim.validate.report import ValidationReport, to_junit
     from dh2sim.validate.run import engine_samples, validate_robot
 
-    poses = sum(engine_samples(samples, len(model.joints)) for model in models)
+    for model in models:
+        if isinstance(model, MechanismModel) and (dynamics or source is not None):
+            option = "--dynamics" if dynamics else "--source"
+            raise Dh2simError(f"{model.name}: {option} is for serial robots; this one is a mechanism")
+    serial = [model for model in models if not isinstance(model, MechanismModel)]
+    poses = sum(engine_samples(samples, len(model.joints)) for model in serial)
     with progress_bar("comparing", "poses", poses) as advance:
         reports = []
         for model in models:
+            if isinstance(model, MechanismModel):
+                where = None if folder is None else folder / model.name
+                made = validate_mechanism(model, samples=samples, seed=seed, tolerance=tolerance, folder=where)
+                reports.append(made)
+                continue
             found = validate_robot(
                 model,
                 samples=samples,
@@ -134,7 +147,7 @@ def _simulated(model: RobotModel, report: RobotReport, seed: int) -> RobotReport
     return replace(report, checks=(*report.checks, *check_motion(model, seed=seed)))
 
 
-def _require_folders(robots: list[str], models: list[RobotModel], folder: Path) -> None:
+def _require_folders(robots: list[str], models: Sequence[RobotModel | MechanismModel], folder: Path) -> None:
     missing = [
         f"there is no folder '{folder / model.name}'; write it with 'dh2sim export {robot} --out {folder}'"
         for robot, model in zip(robots, models, strict=True)

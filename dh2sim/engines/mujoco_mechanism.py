@@ -32,18 +32,19 @@ class MujocoMechanism:
         self._urdf = path.suffix == ".urdf"
 
     def frame_poses(self, q: Mapping[str, float]) -> dict[str, Array]:
-        """Return the poses of all sites, or bodies of a URDF, by name, with joints at the coordinates given."""
+        """Return the poses of all bodies, and of the sites of an MJCF, by name, with joints where they are given."""
         model, data = self._model, self._data
         for name, value in q.items():
             data.qpos[model.joint(name).qposadr[0]] = value
         mujoco.mj_kinematics(model, data)
-        count = model.nbody if self._urdf else model.nsite
+        found = [(model.body(k).name, data.body(k)) for k in range(model.nbody)]
+        if not self._urdf:
+            found += [(model.site(k).name, data.site(k)) for k in range(model.nsite)]
         poses = {}
-        for k in range(count):
-            of, own = (data.body(k), model.body(k)) if self._urdf else (data.site(k), model.site(k))
+        for name, of in found:
             T = np.eye(4)
             T[:3, :3], T[:3, 3] = of.xmat.reshape(3, 3), of.xpos
-            poses[own.name] = T
+            poses[name] = T
         return poses
 
     def loops_at_home(self) -> tuple[float, int]:

@@ -29,6 +29,9 @@ class Quantity(StrEnum):
     TRACKING = "tracking"
     INVERSE = "inverse dynamics"
     SELF_CONTACT = "self-contact"
+    CLOSED = "loops at home"
+    FREEDOMS = "freedoms of loops"
+    LOOP_GAP = "loops in motion"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -60,7 +60,7 @@ def test_a_mechanism_is_exported_and_verified(name: str, tmp_path: Path) -> None
         assert max(check.position_error, check.rotation_error) < 2e-14
     engine = MujocoMechanism(tmp_path / model.name / f"{model.name}.xml")
     gap, freedoms = engine.loops_at_home()
-    assert gap < 1e-12 * 10
+    assert gap < 1e-12
     if name != "four_bar":  # odd twists: no constraint is redundant
         assert freedoms == model.tree.n - 6 + FREEDOMS[ClosureType(name)]
     assert drift(model, tmp_path) == []

@@ -1,0 +1,62 @@
+"""Mechanisms are validated: the tree's poses, and the loops at home and in motion."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from dh2sim import Robot
+from dh2sim.robot.catalog import builtin_mechanisms
+from tests.program import dh2sim
+
+LOOPS = ["loops at home", "freedoms of loops", "loops in motion"]
+COSTLY = [name if name == "four_bar" else pytest.param(name, marks=pytest.mark.slow) for name in builtin_mechanisms()]
+
+
+@pytest.mark.parametrize("name", COSTLY)
+def test_mechanisms_that_come_with_dh2sim_match_their_tables(name: str) -> None:
+    robot = Robot.load(name)
+    if not robot.spec.is_mechanism:
+        pytest.skip("a serial robot")
+    report = robot.validate()
+    assert report.ok, [check for check in report.checks if not check.ok]
+    poses = [check for check in report.checks if check.quantity == "pose"]
+    assert [check.engine for check in poses] == ["dh2sim", "mujoco-mjcf", "mujoco-urdf"]
+    if robot.spec.closures:
+        assert [check.quantity for check in report.checks if check.reference == "loops"] == LOOPS
+
+
+def _changed(path: Path, old: str, new: str) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def test_a_constraint_that_is_missing_or_moved_fails(tmp_path: Path) -> None:
+    Robot.load("four_bar").export(tmp_path)
+    path = tmp_path / "four_bar" / "four_bar.xml"
+    exported = path.read_text(encoding="utf-8")
+    _changed(path, '<connect name="C_1"', '<connect active="false" name="C_1"')
+    _changed(path, '<connect name="C_2"', '<connect active="false" name="C_2"')
+    failed = _failed(tmp_path)
+    assert failed == ["freedoms of loops"]
+    path.write_text(exported, encoding="utf-8")
+    _changed(path, '<body name="rocker/link_1" pos="2.0', '<body name="rocker/link_1" pos="2.001')
+    assert _failed(tmp_path)[:2] == ["pose", "loops at home"]
+
+
+def _failed(folder: Path) -> list[str]:
+    run = dh2sim("validate", "four_bar", "--dir", folder, "--json", "-")
+    assert run.status == 1
+    [robot] = json.loads(run.out)["robots"]
+    return [check["quantity"] for check in robot["engines"] if check["ok"] is False]
+
+
+def test_physics_checks_are_of_serial_robots() -> None:
+    run = dh2sim("validate", "four_bar", "--dynamics")
+    assert (run.status, run.err) == (
+        2,
+        "dh2sim: four_bar: --dynamics is for serial robots; this one is a mechanism\n",
+    )
