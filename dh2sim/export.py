@@ -81,6 +81,7 @@ class Lost(StrEnum):
     GRAVITY = "gravity"
     EXCLUSIONS = "pairs of links that do not collide"
     VELOCITY = "velocity limits"
+    ACCELERATION = "limits of acceleration and jerk"
     CLOSURES = "joints that close loops"
     APPEARANCE = "colours and textures of meshes"
 
@@ -104,7 +105,7 @@ class Loss:
         match self.what:
             case Lost.DYNAMICS:
                 words = f"{self.detail} of {names}"
-            case Lost.VELOCITY | Lost.CLOSURES:
+            case Lost.VELOCITY | Lost.ACCELERATION | Lost.CLOSURES:
                 words = f"{self.what}: {names}" if self.what is Lost.CLOSURES else f"{self.what} of {names}"
             case Lost.CONFIGURATIONS:
                 words = f"{self.what} ({names})"
@@ -125,6 +126,9 @@ def losses(model: RobotModel | MechanismModel, formats: Collection[Format]) -> l
         found += _lost_in_urdf(model)
     if Format.MJCF in formats:
         found += _lost_in_mjcf(model)
+    limited = [row for row in model.spec.rows if row.limits.acceleration is not None or row.limits.jerk is not None]
+    if limited:
+        found.append(Loss(what=Lost.ACCELERATION, format=None, where=tuple(row.name for row in limited)))
     for link in model.all_links:
         if link.mesh is not None and link.mesh.converted_from is not None:
             suffix = link.mesh.converted_from

@@ -192,8 +192,8 @@ class Number(Kind):
     """None for a number that is in SI units everywhere."""
     size: Magnitude = field(default=ANY, kw_only=True)
     """How large it may be, where the dimension does not say so."""
-    rate: bool = field(default=False, kw_only=True)
-    """Whether it is one of the dimension per second."""
+    rate: int = field(default=0, kw_only=True)
+    """How often it is one of the dimension per second: 1 for a velocity."""
     above: float | None = field(default=None, kw_only=True)
     """It must be greater than this."""
     least: float | None = field(default=None, kw_only=True)
@@ -255,7 +255,7 @@ class Number(Kind):
         if self.dimension is None:
             return f" {self.size.unit}".rstrip(), 1.0
         unit = scope.angle if self.magnitude(turns=scope.turns) is ANGLE else scope.length
-        return f" {unit}{'/s' if self.rate else ''}", IN_SI[unit]
+        return f" {unit}{_PER_SECOND[self.rate]}", IN_SI[unit]
 
     def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
         """Return the number in SI units."""
@@ -318,6 +318,7 @@ def number_hint(text: str, dimension: Dimension | None, loc: Loc, scope: Scope) 
     return f"{here}: write {converted}, or set 'units: {{{what.removesuffix('s')}: {unit}}}' for all"
 
 
+_PER_SECOND: Final = ("", "/s", "/s²", "/s³")
 _SLACK: Final = 1 + 1e-9
 """By which a number may pass its bound: another unit and back is rounding."""
 _ANY: Final = Number()

@@ -233,9 +233,17 @@ class Limits:
     ] = None
     velocity: Annotated[
         float | None,
-        Number("In the file's angle or length unit per second.", Dimension.COORDINATE, rate=True, above=0),
+        Number("In the file's angle or length unit per second.", Dimension.COORDINATE, rate=1, above=0),
     ] = None
     effort: Annotated[float | None, Number("N·m or N.", size=EFFORT, above=0)] = None
+    acceleration: Annotated[
+        float | None,
+        Number("Of trajectories, in the file's angle or length unit per s².", Dimension.COORDINATE, rate=2, above=0),
+    ] = None
+    jerk: Annotated[
+        float | None,
+        Number("Of trajectories, in the file's angle or length unit per s³.", Dimension.COORDINATE, rate=3, above=0),
+    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -68,9 +68,15 @@ def robot_limits(model: RobotModel) -> MotionLimits:
     """
     joints = model.moving_joints
     velocity = [joint.velocity for joint in joints]
-    acceleration = [v / RISE for v in velocity]
-    jerk = [a / ONSET for a in acceleration]
-    assumed = [name for name in QUANTITIES if any(name in joint.assumed for joint in joints) or name != "velocity"]
+    given = [joint.limits for joint in joints]
+    acceleration = [own.acceleration or v / RISE for v, own in zip(velocity, given, strict=True)]
+    jerk = [own.jerk or a / ONSET for a, own in zip(acceleration, given, strict=True)]
+    open_ = {
+        "velocity": any("velocity" in joint.assumed for joint in joints),
+        "acceleration": any(own.acceleration is None for own in given),
+        "jerk": any(own.jerk is None for own in given),
+    }
+    assumed = [name for name in QUANTITIES if open_[name]]
     ranges = [joint.position_range or (-math.inf, math.inf) for joint in joints]
     return MotionLimits(
         joints=tuple(joint.name for joint in joints),

@@ -10,6 +10,8 @@ from typing import Final, Self
 import numpy as np
 
 from dh2sim.errors import TrajectoryError
+from dh2sim.kinematics.chain import KinematicChain
+from dh2sim.kinematics.forward import geometric_jacobian
 from dh2sim.trajectory.curves import Curve, PiecewisePolynomial
 from dh2sim.trajectory.limits import INSIDE, QUANTITIES, MotionLimits
 from dh2sim.trajectory.profiles import Profile, quintic, state_to_state, trapezoid
@@ -196,6 +198,14 @@ def needed_stretch(
     speed = float(np.abs(motion.law.derivatives(motion.times())[1, :, 0]).max())
     powers += [speed * moved / limit for limit, moved in _tool(limits, tool) if math.isfinite(limit)]
     return float(max(powers))
+
+
+def tool_rates(chain: KinematicChain, motion: Motion) -> tuple[float, float]:
+    """Return the greatest speed of tool0, m/s, and of its turning, rad/s, at the times that show a motion."""
+    q, qd, _, _ = motion.at(motion.times())
+    twist = (geometric_jacobian(chain, q) @ qd[:, :, None])[:, :, 0]
+    speed, turn = (float(np.linalg.norm(part, axis=1).max()) for part in (twist[:, :3], twist[:, 3:]))
+    return speed, turn
 
 
 def require_inside(motion: Motion, limits: MotionLimits, where: str) -> None:

@@ -20,7 +20,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.trajectory.curves import Curve, PiecewisePolynomial, cubic_spline, straight
 from dh2sim.trajectory.follow import CannotFollowError, follow
 from dh2sim.trajectory.limits import INSIDE, LimitValue, MotionLimits, requested_limits, robot_limits
-from dh2sim.trajectory.motion import Motion, exceeded, fastest, require_inside
+from dh2sim.trajectory.motion import Motion, exceeded, fastest, require_inside, tool_rates
 from dh2sim.trajectory.profiles import Profile, state_to_state
 from dh2sim.trajectory.tool_paths import ToolPath, arc, circle, line
 from dh2sim.trajectory.trajectory import Passage, Trajectory
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 _STILL: Final = 1e-12
 """rad or m: shorter motions are rounding."""
+_TOOL_MARGIN: Final = 1.001
+"""The tool's greatest speed in a motion of the joints is sampled, and known to that."""
 _LEFT_OPEN: Final[Mapping[Free, str]] = {
     "roll": "the roll about z of tool0 is left open",
     "rotation": "the orientation is left open",
@@ -265,8 +267,17 @@ class _Planner:
         if self._options.profile is Profile.JERK:
             v, a, j = self._limits.rates * INSIDE
             law = state_to_state(q, goal, velocity=v, acceleration=a, jerk=j)
-            return Motion(duration=law.end, law=law)
-        return self._fastest(straight(q, goal))
+            return self._for_tool(Motion(duration=law.end, law=law))
+        return self._for_tool(self._fastest(straight(q, goal)))
+
+    def _for_tool(self, motion: Motion) -> Motion:
+        """Return a motion of the joints, slowed down as far as limits of the tool's speed require."""
+        bounds = (self._limits.tool_speed, self._limits.tool_turn)
+        if not any(map(math.isfinite, bounds)):
+            return motion
+        rates = tool_rates(self._model.chain, motion)
+        excess = max(rate / bound for rate, bound in zip(rates, bounds, strict=True))
+        return motion.stretched(max(1.0, excess * _TOOL_MARGIN))
 
     def _fastest(self, path: Curve, tool: tuple[float, float] = (0.0, 0.0)) -> Motion:
         if self._options.profile is Profile.OPTIMAL:
@@ -296,7 +307,7 @@ class _Planner:
             shares = knots[1:] / knots[-1]
         else:
             knots = np.concatenate([[0.0], np.cumsum(steps)])
-            motion = self._fastest(cubic_spline(knots, points))
+            motion = self._for_tool(self._fastest(cubic_spline(knots, points)))
             shares = np.append(motion.when(knots[1:-1]) / motion.duration, 1.0)
         require_inside(motion, self._limits, "the curve between the waypoints")
         passed = [

@@ -14,7 +14,7 @@ from dh2sim.errors import SettingsError
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.trajectory.curves import ORDERS
 from dh2sim.trajectory.limits import QUANTITIES, MotionLimits
-from dh2sim.trajectory.motion import Motion, Peaks, peaks_of
+from dh2sim.trajectory.motion import Motion, Peaks, peaks_of, tool_rates
 from dh2sim.trajectory.profiles import Profile
 from dh2sim.typing import Array, read_only
 
@@ -157,16 +157,8 @@ class Trajectory:
     @cached_property
     def tool_peaks(self) -> tuple[float, float]:
         """The greatest speed of tool0's origin, m/s, and of its turning, rad/s, as sampled."""
-        from dh2sim.kinematics.forward import geometric_jacobian
-
-        greatest = [0.0, 0.0]
-        for motion in self.motions:
-            q, qd, _, _ = motion.at(motion.times())
-            twist = (geometric_jacobian(self.model.chain, q) @ qd[:, :, None])[:, :, 0]
-            for part in (0, 1):
-                rate = np.linalg.norm(twist[:, 3 * part : 3 * part + 3], axis=1).max()
-                greatest[part] = max(greatest[part], float(rate))
-        return greatest[0], greatest[1]
+        found = [tool_rates(self.model.chain, motion) for motion in self.motions]
+        return max((speed for speed, _ in found), default=0.0), max((turn for _, turn in found), default=0.0)
 
     @cached_property
     def torques(self) -> Array:

@@ -95,7 +95,7 @@ def test_a_good_axis_is_no_cause_for_complaint() -> None:
         ),
         (
             "{type: prismatic, direction: [0, 0, 1], limits: {lower: 0}}",
-            "3:52: axes[0].limits: unknown key 'lower'. Allowed keys: position, velocity, effort",
+            "3:52: axes[0].limits: unknown key 'lower'. Allowed keys: position, velocity, effort, acceleration, jerk",
         ),
         (
             "{type: continuous, point: [0, 0, 0], direction: [0, 0, 1], limits: {position: [0, 1]}}",

@@ -100,11 +100,13 @@ def test_the_error_of_a_file_without_a_mapping_says_what_belongs_there(text: str
         ("{type: revolute, flip: 1}", "4:26: joints[0].flip: expected true or false, found 1"),
         (
             "{type: revolute, limits: 2}",
-            "4:28: joints[0].limits: expected a mapping with the keys position, velocity, effort, found 2",
+            "4:28: joints[0].limits: expected a mapping with the keys position, velocity, effort, "
+            "acceleration, jerk, found 2",
         ),
         (
             "{type: revolute, limits: }",
-            "4:20: joints[0].limits: expected a mapping with the keys position, velocity, effort, found nothing",
+            "4:20: joints[0].limits: expected a mapping with the keys position, velocity, effort, "
+            "acceleration, jerk, found nothing",
         ),
         (
             "{type: revolute, limits: {position: 3}}",

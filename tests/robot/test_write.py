@@ -39,6 +39,8 @@ from tests.strategies import joint_vectors_for, lengths, names, poses, robot_spe
 NOT_WRITTEN = ("source_file", "parameters", "location", "units")
 """Units are chosen by who writes."""
 IN_UNITS = (
+    "acceleration",
+    "jerk",
     "a",
     "alpha",
     "beta",

@@ -107,4 +107,4 @@ def test_samples_end_where_the_trajectory_does() -> None:
     assert planned.sample(samples=2).time.tolist() == [0.0, planned.duration]
     for wrong in ({"rate": 0.0}, {"rate": 1e12}, {"samples": 1}, {"rate": 1.0, "samples": 5}):
         with pytest.raises(SettingsError):
-            planned.sample(**wrong)  # type: ignore[arg-type]
+            planned.sample(**wrong)

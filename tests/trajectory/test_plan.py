@@ -10,10 +10,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dh2sim import Robot
-from dh2sim.errors import SettingsError, TrajectoryError
+from dh2sim.errors import RobotFileError, SettingsError, TrajectoryError
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.trajectory.plan import plan_trajectory
 from dh2sim.typing import Array
@@ -399,3 +400,41 @@ def test_a_jerk_limited_motion_of_six_joints_is_planned_in_a_millisecond() -> No
         puma.trajectory([home, other], profile="jerk")
         least = min(least, time.perf_counter() - start)
     assert least <= 1e-3
+
+
+def test_limits_of_acceleration_and_jerk_come_from_the_robot_file_or_are_assumed() -> None:
+    panda = plan_trajectory(model("franka_panda"), ["home", "home"]).limits
+    assert panda.assumed == ()
+    assert panda.acceleration.tolist() == [15, 7.5, 10, 12.5, 15, 20, 20]
+    assert panda.jerk.tolist() == [7500, 3750, 5000, 6250, 7500, 10000, 10000]
+    puma = plan_trajectory(model("puma560"), ["home", "home"]).limits
+    assert puma.assumed == ("velocity", "acceleration", "jerk")
+    np.testing.assert_allclose(puma.acceleration, puma.velocity / 0.25)
+    np.testing.assert_allclose(puma.jerk, puma.acceleration / 0.1)
+
+
+def test_limits_in_a_robot_file_are_in_its_units() -> None:
+    text = """
+name: one
+convention: standard
+units: {angle: deg, length: mm}
+joints:
+  - {type: revolute, a: 100, limits: {velocity: 90, acceleration: 180, jerk: 1800}}
+  - {type: prismatic, limits: {position: [0, 500], velocity: 200, acceleration: 1000, jerk: 5000}}
+"""
+    limits = plan_trajectory(build_model(parse_robot(text)), [[0, 0.1], [1, 0.2]]).limits
+    np.testing.assert_allclose(limits.acceleration, [math.pi, 1.0], rtol=1e-15)
+    np.testing.assert_allclose(limits.jerk, [10 * math.pi, 5.0], rtol=1e-15)
+    with pytest.raises(RobotFileError, match=r"limits.jerk: must be greater than 0, found -1"):
+        parse_robot(text.replace("jerk: 5000", "jerk: -1"))
+
+
+@pytest.mark.parametrize("profile", ["jerk", "quintic"])
+def test_the_speed_of_the_tool_is_limited_in_motions_of_the_joints_too(profile: str) -> None:
+    home, other = near_home("puma560", 0.5)
+    planned = plan_trajectory(model("puma560"), [home, other], profile=profile, limits={"tool_speed": 0.2})
+    t = np.linspace(0.0, planned.duration, 4001)
+    positions = table_tool_pose(robot("puma560"), planned.at(t)[0])[:, :3, 3]
+    speed = np.linalg.norm(np.diff(positions, axis=0), axis=1) / np.diff(t)
+    assert 0.99 * 0.2 < speed.max() <= 0.2
+    assert planned.limiting[0] == "tool0"
