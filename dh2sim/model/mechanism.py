@@ -45,7 +45,7 @@ class MechanismModel:
     """The main chain, as a serial robot."""
     branches: tuple[BranchModel, ...]
     excluded: tuple[ExcludedPair, ...]
-    """Pairs of links that do not collide: those of one loop never do."""
+    """Pairs of links that do not collide: those of loops never do."""
 
     @property
     def name(self) -> str:
@@ -224,16 +224,17 @@ def _renamed(link: LinkModel, branch: str) -> LinkModel:
 
 
 def _excluded(model: MechanismModel) -> tuple[ExcludedPair, ...]:
-    """Return the pairs of the main chain, of neighbours on branches, and of the links of each loop."""
+    """Return the pairs of the main chain, of neighbours on branches, and of the links of all loops."""
     pairs = {(pair.link1, pair.link2): pair.reason for pair in model.main.excluded}
     tree = model.tree
     for branch in model.branches:
         names = [model.body_name(branch.body), *(link.name for link in branch.links)]
         for a, b in itertools.pairwise(names):
             pairs.setdefault((a, b), Reason.ADJACENT)
-    for closure in tree.closures:
-        loop = {*tree.path(tree.frame(closure.a).body), *tree.path(tree.frame(closure.b).body)}
-        names = [model.body_name(body) for body in sorted(loop | {BASE})]
+    ends = [tree.frame(frame).body for closure in tree.closures for frame in (closure.a, closure.b)]
+    loops = {body for end in ends for body in tree.path(end)}
+    if loops:
+        names = [model.body_name(body) for body in sorted(loops | {BASE})]
         for a, b in itertools.combinations(names, 2):
             pairs.setdefault((a, b), Reason.DEFAULT)
     return tuple(ExcludedPair(link1=a, link2=b, reason=reason) for (a, b), reason in pairs.items())
