@@ -37,8 +37,10 @@ _HOMES = {
     "SymbolicForm": "symbolic.request",
     "ToolSpec": "robot.spec",
     "Trajectory": "trajectory.trajectory",
+    "Workspace": "workspace.workspace",
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
+    "compute_workspace": "workspace.workspace",
     "convert_robot": "importing.convert",
     "draw_robot": "draw.diagram.drawing",
     "explain_inverse_kinematics": "inverse.textbook",
@@ -116,6 +118,8 @@ if TYPE_CHECKING:
     from dh2sim.trajectory.files import read_trajectory as read_trajectory
     from dh2sim.trajectory.plan import plan_trajectory as plan_trajectory
     from dh2sim.trajectory.trajectory import Trajectory as Trajectory
+    from dh2sim.workspace.workspace import Workspace as Workspace
+    from dh2sim.workspace.workspace import compute_workspace as compute_workspace
 
     __version__: str
 else:

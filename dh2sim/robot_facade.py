@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from dh2sim.trajectory.trajectory import Trajectory
     from dh2sim.validate.report import RobotReport
     from dh2sim.view.server import Viewer
+    from dh2sim.workspace.workspace import Workspace, WorkspaceKeywords
 
 FilePath: TypeAlias = str | os.PathLike[str]
 _READERS: Final = {
@@ -496,6 +497,26 @@ class Robot:
         from dh2sim.trajectory.plan import plan_trajectory
 
         return plan_trajectory(self.model, waypoints, **options)
+
+    def workspace(self, **options: Unpack[WorkspaceKeywords]) -> Workspace:
+        """Find what a frame's origin reaches inside the limits.
+
+        Args:
+            **options: As for :func:`dh2sim.compute_workspace`: ``frame``, ``size`` of the voxels, ``samples``,
+                ``seed``, ``threads``, ``section`` for the section with its exact boundary, ``dexterity`` for the
+                shares of orientations that are reached, ``orientations``.
+
+        Returns:
+            The :class:`Workspace`: ``centers``, ``count``, ``manipulability`` and ``q`` of its voxels, ``extremes``,
+            ``section``, ``dexterity``, ``area`` or ``volume``.
+
+        Raises:
+            SettingsError: An option is wrong, or asks for too much.
+            ConfigurationError: The arm has no section, or no choice of orientations.
+        """
+        from dh2sim.workspace.workspace import compute_workspace
+
+        return compute_workspace(self.model, **options)
 
     def explain_ik(self, T: ArrayLike) -> Explanation:
         """Derive the configurations that reach a pose as a textbook does, in steps with the numbers.

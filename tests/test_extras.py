@@ -89,6 +89,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("view", "view rpr --export page.html", "the viewer"),
         ("plot", "plot run.zarr", "plotting"),
         ("plot", "frames axes.yaml -q --picture frames.svg", "a picture of frames"),
+        ("plot", "workspace rpr -o reach.svg", "drawing a workspace"),
         ("video", "render run.zarr", "rendering"),
         ("video", "render rpr", "rendering"),
         ("data", "runs run.zarr --to parquet", "Parquet"),
@@ -146,6 +147,7 @@ def test_nothing_is_simulated_that_could_not_be_returned(folder: Path) -> None:
         "rollout rpr --out other.zarr --rollouts 2 --steps 5",
         "runs run.zarr",
         "trajectory rpr home home -o motion.csv",
+        "workspace rpr --section --samples 500 -o reach.csv",
     ],
 )
 def test_the_core_works_without_any_extra(folder: Path, tmp_path: Path, command: str) -> None:

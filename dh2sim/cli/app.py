@@ -45,6 +45,7 @@ COMMANDS: Final = {
         many=("--limits",),
         bare=("--limits",),
     ),
+    "workspace": Command("workspace", "workspace", "Find what a robot reaches, and its boundary."),
     "symbolic": Command("symbolic", "symbolic", "Print kinematics in symbols, as a textbook does."),
     "info": Command("info", "info", "Print the table, frames, mass and reach."),
     "view": Command("view", "view", "Show a robot in the browser, and edit its table."),
@@ -79,6 +80,7 @@ Examples:
   dh2sim fk stanford 17 -40 0.5 63 34 -23
   dh2sim jacobian stanford home
   dh2sim ik puma560 --at home        all ways to get there
+  dh2sim workspace puma560 --section -o reach.svg
   dh2sim trajectory puma560 home zero -o motion.csv
   dh2sim symbolic puma560            its pose in symbols
   dh2sim draw stanford               a drawing of it

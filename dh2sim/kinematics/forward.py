@@ -191,7 +191,7 @@ def frame_pose(chain: ChainLike, frame: str, q: ArrayLike, **options: Unpack[Bat
             pose = evaluate(q)
             if pose is not None:
                 return pose
-    carriers, T_joint_frame = _place(robot, frame)
+    carriers, T_joint_frame = frame_place(robot, frame)
 
     def fill(results: Array, columns: Array) -> None:
         if carriers == 0:
@@ -237,7 +237,7 @@ def geometric_jacobian(
             jacobian = evaluate(q)
             if jacobian is not None:
                 return jacobian
-    carriers, T_joint_frame = _place(robot, frame)
+    carriers, T_joint_frame = frame_place(robot, frame)
 
     def fill(results: Array, columns: Array) -> None:
         results[...] = 0.0
@@ -273,7 +273,7 @@ def _computed(
     return in_blocks(vectors, batch, shape, fill, out, threads)
 
 
-def _place(chain: KinematicChain, frame: str) -> tuple[int, Array]:
+def frame_place(chain: KinematicChain, frame: str) -> tuple[int, Array]:
     """Return how many joints carry a named frame, and its pose in the last of them, or in base_link."""
     require_frame(chain, frame)
     n = len(chain.joints)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -9,14 +11,14 @@ from dh2sim.errors import ConfigurationError
 from dh2sim.typing import Array
 
 
-def random_configurations(lower: ArrayLike, upper: ArrayLike, count: int, seed: int) -> Array:
+def random_configurations(lower: ArrayLike, upper: ArrayLike, count: int, seed: int | Sequence[int]) -> Array:
     """Draw joint vectors uniformly; the same seed gives the same vectors.
 
     Args:
         lower: Least coordinates, rad and m, shape (n,).
         upper: Greatest coordinates, rad and m, shape (n,).
         count: How many to draw.
-        seed: Seed of NumPy's default generator.
+        seed: Seed of NumPy's default generator, or several numbers that are one together.
 
     Returns:
         Shape (count, n).

@@ -27,6 +27,7 @@ COMMANDS = (
     "jacobian",
     "ik",
     "trajectory",
+    "workspace",
     "symbolic",
     "info",
     "view",
