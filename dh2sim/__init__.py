@@ -19,6 +19,7 @@ _HOMES = {
     "KinematicChain": "kinematics.chain",
     "Limits": "robot.spec",
     "LinkSpec": "robot.spec",
+    "Mobility": "mobility.result",
     "PayloadSpec": "robot.spec",
     "Pose": "robot.spec",
     "Prismatic": "robot.table_rows",
@@ -44,6 +45,7 @@ _HOMES = {
     "convert_robot": "importing.convert",
     "draw_robot": "draw.diagram.drawing",
     "explain_inverse_kinematics": "inverse.textbook",
+    "find_mobility": "mobility.robot_mechanism",
     "find_slips": "model.slips",
     "forward_kinematics": "kinematics.forward",
     "frame_poses": "kinematics.forward",
@@ -91,6 +93,8 @@ if TYPE_CHECKING:
     from dh2sim.kinematics.frame_assignment.recover import recover_table as recover_table
     from dh2sim.kinematics.serial_chain import SerialChain as SerialChain
     from dh2sim.kinematics.serial_chain import SerialJoint as SerialJoint
+    from dh2sim.mobility.result import Mobility as Mobility
+    from dh2sim.mobility.robot_mechanism import find_mobility as find_mobility
     from dh2sim.model.build import build_model as build_model
     from dh2sim.model.robot_model import RobotModel as RobotModel
     from dh2sim.model.slips import find_slips as find_slips

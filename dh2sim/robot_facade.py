@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from dh2sim.inverse.textbook import Explanation
     from dh2sim.kinematics.batches import BatchOptions, JacobianOptions
     from dh2sim.kinematics.chain import KinematicChain, SpecLike
+    from dh2sim.mobility.result import Mobility
     from dh2sim.model.mechanism import MechanismModel
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.model.slips import Slip
@@ -407,6 +408,16 @@ class Robot:
         from dh2sim.kinematics.forward import geometric_jacobian
 
         return geometric_jacobian(self.chain, self._vectors(q), frame=frame, **options)
+
+    def mobility(self) -> Mobility:
+        """Count the degrees of freedom, and find out by rank and by walking along the loops what they are.
+
+        Raises:
+            AssemblyError: Loops cannot be closed.
+        """
+        from dh2sim.mobility.robot_mechanism import find_mobility
+
+        return find_mobility(self.spec)
 
     def symbolic(self, what: What | str = "pose", **options: Unpack[SymbolicKeywords]) -> SymbolicForm:
         """Return the robot's kinematics or dynamics in symbols, compared with numbers; ``print`` shows it.

@@ -47,6 +47,7 @@ COMMANDS: Final = {
     ),
     "workspace": Command("workspace", "workspace", "Find what a robot reaches, and its boundary."),
     "symbolic": Command("symbolic", "symbolic", "Print kinematics in symbols, as a textbook does."),
+    "mobility": Command("mobility", "mobility", "Count degrees of freedom, and find the true ones."),
     "info": Command("info", "info", "Print the table, frames, mass and reach."),
     "view": Command("view", "view", "Show a robot in the browser, and edit its table."),
     "import": Command("importing", "import_robot", "Make a robot file from a URDF, an MJCF or a table."),
@@ -83,6 +84,7 @@ Examples:
   dh2sim workspace puma560 --section -o reach.svg
   dh2sim trajectory puma560 home zero -o motion.csv
   dh2sim symbolic puma560            its pose in symbols
+  dh2sim mobility four_bar           its degrees of freedom, counted and true
   dh2sim draw stanford               a drawing of it
   dh2sim view stanford --export stanford.html
   dh2sim import arm.urdf -o arm.yaml

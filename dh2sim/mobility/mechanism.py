@@ -148,8 +148,12 @@ class Mechanism:
 
     def screws_of(self, joints: Iterable[int]) -> Array:
         """Return the rows of ``screws`` of some joints, shape (their freedoms, 6)."""
+        return np.asarray(self.screws[self.freedoms_of(joints)])
+
+    def freedoms_of(self, joints: Iterable[int]) -> list[int]:
+        """Return the indices of the freedoms of some joints."""
         wanted = set(joints)
-        return np.asarray(self.screws[[i for i, owner in enumerate(self.owners) if owner in wanted]])
+        return [i for i, owner in enumerate(self.owners) if owner in wanted]
 
     @cached_property
     def loops(self) -> tuple[Loop, ...]:

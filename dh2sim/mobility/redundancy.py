@@ -9,7 +9,7 @@ import numpy as np
 
 from dh2sim.mobility.constraints import LoopEquations, Rank, rank_of
 from dh2sim.mobility.mechanism import Mechanism
-from dh2sim.mobility.screws import common_motions, row_space
+from dh2sim.mobility.screws import algebra, common_motions, row_space
 from dh2sim.mobility.walk import walk
 from dh2sim.typing import Array
 
@@ -81,30 +81,53 @@ def _along(
 def idle_freedoms(mechanism: Mechanism) -> tuple[IdleFreedom, ...]:
     """Return the freedoms that move only links within a limb, as a rod between two ball joints spins about itself.
 
-    Two joints of a limb must allow the same motion. Where both are on the ground, all that moves would move with it,
-    which is not idle.
+    Two joints of a limb must allow the same motion; revolute joints one after the other whose axes meet count as one,
+    as robot files have ball joints in rows. Where both are on the ground, all that moves would move with it, which is
+    not idle.
     """
     found: list[IdleFreedom] = []
-    starts = np.cumsum([0, *(joint.freedoms for joint in mechanism.joints)])
     in_loops = {k for loop in mechanism.loops for k in loop.joints}
     for limb in limbs(mechanism):
         if not in_loops.issuperset(limb.joints):
             continue
-        for length in range(1, len(limb.links) + 1):
-            for first in range(len(limb.links) - length + 1):
-                i, j = limb.joints[first], limb.joints[first + length]
-                if 0 in mechanism.joints[i].links and 0 in mechanism.joints[j].links:
-                    continue
-                a, b = mechanism.screws_of([i]), mechanism.screws_of([j])
-                for screw in common_motions(a, b):
-                    motion = np.zeros(mechanism.freedoms)
-                    motion[starts[i] : starts[i + 1]] = np.linalg.lstsq(a.T, screw, rcond=None)[0]
-                    motion[starts[j] : starts[j + 1]] = np.linalg.lstsq(b.T, screw, rcond=None)[0]
-                    motions = [idle.motion for idle in found]
-                    if len(row_space(np.array([*motions, motion]))) > len(found):
-                        links = limb.links[first : first + length]
-                        found.append(IdleFreedom(links=links, joints=(i, j), motion=motion))
+        for first, second in _pairs_of_joints(mechanism, limb):
+            ends = [set(mechanism.joints[limb.joints[k]].links) for k in (first.start, second.stop - 1)]
+            if all(0 in end for end in ends):
+                continue
+            sides = [mechanism.freedoms_of(limb.joints[side]) for side in (first, second)]
+            a, b = (mechanism.screws[side] for side in sides)
+            for screw in common_motions(a, b):
+                motion = np.zeros(mechanism.freedoms)
+                for side, screws in zip(sides, (a, b), strict=True):
+                    motion[side] = np.linalg.lstsq(screws.T, screw, rcond=None)[0]
+                if len(row_space(np.array([*(idle.motion for idle in found), motion]))) > len(found):
+                    links = limb.links[first.stop - 1 : second.start]
+                    ends_at = (limb.joints[first.stop - 1], limb.joints[second.start])
+                    found.append(IdleFreedom(links=links, joints=ends_at, motion=motion))
     return tuple(found)
+
+
+def _pairs_of_joints(mechanism: Mechanism, limb: Limb) -> list[tuple[slice, slice]]:
+    """Return pairs of joints of a limb, or of two or three that make a ball joint one after the other; small first.
+
+    Pairs that are one ball joint together are left out: what they share is the motion of a spherical linkage.
+    """
+    count = len(limb.joints)
+    ranges = [slice(i, i + size) for size in (1, 2, 3) for i in range(count - size + 1)]
+    single = [one for one in ranges if one.stop - one.start == 1 or _one_centre(mechanism, limb.joints[one])]
+    pairs = [
+        (a, b)
+        for a in single
+        for b in single
+        if a.stop <= b.start and not _one_centre(mechanism, limb.joints[a] + limb.joints[b])
+    ]
+    return sorted(pairs, key=lambda pair: pair[1].stop - pair[1].start + pair[0].stop - pair[0].start)
+
+
+def _one_centre(mechanism: Mechanism, joints: tuple[int, ...]) -> bool:
+    """Whether joints move about one point and nothing else."""
+    basis = algebra(mechanism.screws_of(joints))
+    return len(basis) == 3 == np.linalg.matrix_rank(basis[:, :3], tol=1e-6)
 
 
 def redundant_limbs(mechanism: Mechanism, finite: int) -> tuple[Limb, ...]:

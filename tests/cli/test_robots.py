@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.catalog import builtin_mechanisms, builtin_robots
 from tests.program import Outcome, dh2sim
 from tests.robot_files import small, write
 
 COMMANDS = ("export", "validate", "fk", "info")
-KNOWN = f"Robots that come with dh2sim: {', '.join(builtin_robots())}"
+KNOWN = f"Robots that come with dh2sim: {', '.join([*builtin_robots(), *builtin_mechanisms()])}"
 
 
 @pytest.mark.parametrize("command", COMMANDS)
