@@ -127,7 +127,7 @@ def _pairs_of_joints(mechanism: Mechanism, limb: Limb) -> list[tuple[slice, slic
 def _one_centre(mechanism: Mechanism, joints: tuple[int, ...]) -> bool:
     """Whether joints move about one point and nothing else."""
     basis = algebra(mechanism.screws_of(joints))
-    return len(basis) == 3 == np.linalg.matrix_rank(basis[:, :3], tol=1e-6)
+    return bool(len(basis) == 3 == np.linalg.matrix_rank(basis[:, :3], tol=1e-6))
 
 
 def redundant_limbs(mechanism: Mechanism, finite: int) -> tuple[Limb, ...]:
