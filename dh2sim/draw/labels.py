@@ -72,7 +72,8 @@ def place_labels(labels: Sequence[Label], ink: Array) -> list[PlacedLabel]:
     for label in labels:
         half = 0.5 * np.array(label.box) + PADDING
         candidates = [_candidate(label, half, k, radius) for radius in RADII for k in range(ANGLES)]
-        costs = [_cost(label, half, centre, radius, boxes, ink) for centre, radius in candidates]
+        near = _near(ink, candidates, half)
+        costs = [_cost(label, half, centre, radius, boxes, near) for centre, radius in candidates]
         centre, radius = candidates[int(np.argmin(np.round(costs, 6)))]
         boxes.append(np.concatenate([centre - half, centre + half]))
         placed.append(PlacedLabel(label=label, centre=centre, distance=radius))
@@ -87,15 +88,22 @@ def _candidate(label: Label, half: Array, step: int, radius: float) -> tuple[Arr
     return label.anchor + (label.clear + radius + inside) * way, radius
 
 
+def _near(ink: Array, candidates: Sequence[tuple[Array, float]], half: Array) -> Array:
+    """Return the points of the drawing that a label may cover in some place."""
+    centres = np.array([centre for centre, _ in candidates])
+    inside = (ink >= centres.min(axis=0) - half) & (ink <= centres.max(axis=0) + half)
+    return ink[inside.all(axis=1)]
+
+
 def _cost(label: Label, half: Array, centre: Array, radius: float, boxes: Sequence[Array], ink: Array) -> float:
     way = centre - label.anchor
     cosine = float(way @ label.towards) / float(np.linalg.norm(way) * np.linalg.norm(label.towards) + 1e-12)
     cost = 0.1 * radius + TURNED * (1.0 - (abs(cosine) if label.either else cosine))
     cost += COVERED * int(np.sum(np.all(np.abs(ink - centre) <= half, axis=1)))
-    for box in boxes:
-        width = min(centre[0] + half[0], box[2]) - max(centre[0] - half[0], box[0])
-        height = min(centre[1] + half[1], box[3]) - max(centre[1] - half[1], box[1])
-        if width > 0.0 and height > 0.0:
+    if boxes:
+        low, high = np.split(np.array(boxes), 2, axis=1)
+        sides = np.minimum(centre + half, high) - np.maximum(centre - half, low)
+        for width, height in sides[(sides > 0.0).all(axis=1)]:
             cost += OVERLAP + float(width * height)
     return cost
 

@@ -58,55 +58,63 @@ def _directions(flat: Array) -> float:
     """Rate how well projected directions, shape (number, 2), are seen and distinguished."""
     lengths = np.linalg.norm(flat, axis=1)
     least = min(_LONG, float(lengths.min())) / _LONG
-    angles = [
-        math.asin(min(1.0, abs(float(a[0] * b[1] - a[1] * b[0])) / float(la * lb + 1e-12)))
-        for (a, la), (b, lb) in itertools.combinations(zip(flat, lengths, strict=True), 2)
-    ]
-    return least + min([_OPEN, *angles]) / _OPEN
+    i, j = np.triu_indices(len(flat), 1)
+    if not i.size:
+        return least + 1.0
+    a, b = flat[i], flat[j]
+    crossed = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / (lengths[i] * lengths[j] + 1e-12)
+    angle = math.asin(min(1.0, float(crossed.min())))
+    return least + min(_OPEN, angle) / _OPEN
 
 
 def _distances(scene: Scene, view: ParallelView, size: float) -> float:
     """Rate how far points are from each other, and from lengths that they do not belong to."""
     points = view.project(np.array(scene.origins))
     enough = _ENOUGH * size
-    apart = [min(enough, float(np.linalg.norm(a - b))) / enough for a, b in itertools.combinations(points, 2)] or [
-        1.0
-    ]
-    beside = [1.0]
-    for segment in scene.segments:
-        start, end = view.project([segment.start, segment.end])
-        for origin, point in zip(scene.origins, points, strict=True):
-            if min(_gap(origin, segment.start), _gap(origin, segment.end)) > SAME * size:
-                beside.append(min(enough, _to_segment(point, start, end)) / enough)
-    return min(apart) + float(np.mean(apart)) + min(beside)
+    i, j = np.triu_indices(len(points), 1)
+    apart = np.minimum(enough, _norms(points[i] - points[j])) / enough if i.size else np.ones(1)
+    starts, ends = _ends(scene)
+    beside = 1.0
+    if len(starts):
+        origins = np.array(scene.origins)[:, None]
+        others = np.minimum(_norms(origins - starts), _norms(origins - ends)) > SAME * size
+        gaps = _to_segments(points[:, None], view.project(starts), view.project(ends))
+        beside = float(np.min(gaps, where=others, initial=enough)) / enough
+    return float(apart.min()) + float(apart.mean()) + beside
 
 
 def _crossings(scene: Scene, view: ParallelView) -> int:
-    """Return how many lengths cross each other in the picture."""
-    flat = [view.project([segment.start, segment.end]) for segment in scene.segments]
-    return sum(_cross(a, b) for a, b in itertools.combinations(flat, 2))
+    """Return how many lengths cross each other in the picture: the interiors of two segments meet on the paper."""
+    starts, ends = _ends(scene)
+    i, j = np.triu_indices(len(starts), 1)
+    if not i.size:
+        return 0
+    starts, ends = view.project(starts), view.project(ends)
+    p, q, r, s = starts[i], ends[i], starts[j], ends[j]
+    sides = np.array([_side(p, q, r), _side(p, q, s), _side(r, s, p), _side(r, s, q)])
+    clear = np.abs(sides).min(axis=0) > 1e-9 * (_norms(p - q) + _norms(r - s)) ** 2
+    return int(np.sum(clear & (sides[0] * sides[1] < 0.0) & (sides[2] * sides[3] < 0.0)))
 
 
-def _cross(a: Array, b: Array) -> bool:
-    """Return whether the interiors of two segments, each of shape (2, 2), meet on the paper."""
-    (p, q), (r, s) = a, b
-    sides = [_side(p, q, r), _side(p, q, s), _side(r, s, p), _side(r, s, q)]
-    least = 1e-9 * (_gap(p, q) + _gap(r, s)) ** 2
-    if min(map(abs, sides)) <= least:
-        return False
-    return sides[0] * sides[1] < 0.0 and sides[2] * sides[3] < 0.0
+def _ends(scene: Scene) -> tuple[Array, Array]:
+    """Return the starts and the ends of all lengths, shape (number, 3) each."""
+    segments = scene.segments
+    starts = np.array([segment.start for segment in segments]).reshape(-1, 3)
+    return starts, np.array([segment.end for segment in segments]).reshape(-1, 3)
 
 
-def _side(start: Array, end: Array, point: Array) -> float:
+def _side(start: Array, end: Array, point: Array) -> Array:
     way, there = end - start, point - start
-    return float(way[0] * there[1] - way[1] * there[0])
+    return np.asarray(way[..., 0] * there[..., 1] - way[..., 1] * there[..., 0])
 
 
-def _gap(a: Array, b: Array) -> float:
-    return float(np.linalg.norm(a - b))
+def _norms(vectors: Array) -> Array:
+    return np.asarray(np.sqrt(np.sum(vectors**2, axis=-1)))
 
 
-def _to_segment(point: Array, start: Array, end: Array) -> float:
-    way = end - start
-    share = float((point - start) @ way) / (float(way @ way) or 1.0)
-    return _gap(point, start + min(1.0, max(0.0, share)) * way)
+def _to_segments(points: Array, starts: Array, ends: Array) -> Array:
+    """Return the distances of points from segments."""
+    ways = ends - starts
+    lengths = np.sum(ways * ways, axis=-1)
+    shares = np.sum((points - starts) * ways, axis=-1) / np.where(lengths > 0.0, lengths, 1.0)
+    return _norms(points - starts - np.clip(shares, 0.0, 1.0)[..., None] * ways)
