@@ -1,6 +1,10 @@
-"""``python -m dh2sim``."""
+"""``python -m dh2sim``, and the program ``dh2sim``."""
 
-from dh2sim.cli.main import main
+import signal
+
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback of Python's own until ``main`` handles signals
+
+from dh2sim.cli.main import main  # noqa: E402
 
 if __name__ == "__main__":
     main()

@@ -14,6 +14,7 @@ import numpy as np
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import reference_joint_poses
+from dh2sim.kinematics.transforms import move_point
 from dh2sim.model.mass import MassProperties, in_frame, shift_inertia
 from dh2sim.model.shapes import neat
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, JointType
@@ -36,19 +37,25 @@ def gravity_loads(
     """
     poses = reference_joint_poses(chain, q)
     moving = [i for i, joint in enumerate(chain.joints) if joint.type.moves]
-    placed = [(i, body) for i, body in enumerate(_outboard(poses, bodies)) if body is not None]
+    placed = [
+        (i, body.mass, move_point(pose, body.com))
+        for i, (pose, body) in enumerate(zip(poses, bodies, strict=True))
+        if body is not None
+    ]
     if not placed or not moving:
         return (0.0,) * len(moving)
     # by joint and body; element by element, which rounds as plain arithmetic does
-    com, mass = np.array([body.com for _, body in placed]), np.array([body.mass for _, body in placed])
+    com, mass = np.array([com for _, _, com in placed]), np.array([mass for _, mass, _ in placed])
     turns = np.array([[chain.joints[i].type.turns] for i in moving])
-    x, y, z = (np.array([[chain.joints[i].sign * float(poses[i][k, 2])] for i in moving]) for k in range(3))
-    u, v, w = (com[:, k] - np.array([[poses[i][k, 3]] for i in moving]) for k in range(3))
+    sign, frames = np.array([[chain.joints[i].sign] for i in moving]), np.array([poses[i] for i in moving])
+    x, y, z = (sign * frames[:, k, 2, None] for k in range(3))
+    u, v, w = (com[:, k] - frames[:, k, 3, None] for k in range(3))
     moved = [np.where(turns, *pair) for pair in ((y * w - z * v, x), (z * u - x * w, y), (x * v - y * u, z))]
     weight = [mass * float(g) for g in gravity]
-    terms = (-(weight[0] * moved[0] + weight[1] * moved[1] + weight[2] * moved[2])).tolist()
-    first = [bisect_left([k for k, _ in placed], i) for i in moving]
-    return tuple(math.fsum(row[start:]) + 0.0 for row, start in zip(terms, first, strict=True))
+    terms = -(weight[0] * moved[0] + weight[1] * moved[1] + weight[2] * moved[2])
+    rows = [i for i, _, _ in placed]
+    first = [bisect_left(rows, i) for i in moving]
+    return tuple(math.fsum(row[start:].tolist()) + 0.0 for row, start in zip(terms, first, strict=True))
 
 
 def seen_inertias(chain: KinematicChain, bodies: Sequence[MassProperties | None], q: Array) -> tuple[float, ...]:

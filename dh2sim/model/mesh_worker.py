@@ -37,14 +37,45 @@ def answer(request: bytes) -> bytes:
     """
     suffix, _, data = request.partition(b"\n")
     try:
-        surface = _read(suffix.decode(), data)
+        facts, stl = _surface(suffix.decode(), data)
+    except _UnreadableError as error:
+        facts, stl = {"refused": " ".join(str(error).split())}, b""
+    return json.dumps(facts).encode() + b"\n" + stl
+
+
+class _UnreadableError(Exception):
+    """A file holds no mesh; the text says why."""
+
+
+def _surface(suffix: str, data: bytes) -> tuple[dict[str, Any], bytes]:
+    """Return facts of a mesh, and its triangles as a binary STL file.
+
+    Raises:
+        _UnreadableError: The file is malformed or too large.
+    """
+    try:
+        _check_file(suffix, data)
+        vertices, faces = read_collada(data) if suffix == ".dae" else (None, None)
+    except ValueError as error:
+        raise _UnreadableError(str(error)) from error
+    try:
+        surface = trimesh.Trimesh(vertices, faces, process=False) if suffix == ".dae" else _read(suffix, data)
+        return _measured(surface)
     except MemoryError:
         raise
-    except Exception as error:  # trimesh's readers raise many types
-        return json.dumps({"refused": " ".join(str(error).split()) or type(error).__name__}).encode() + b"\n"
+    except _UnreadableError:
+        raise
+    except Exception as error:  # trimesh's readers raise many types, with words of Python or NumPy
+        name = suffix[1:].upper()
+        raise _UnreadableError(f"it is not a valid {name} file, or only a part of one") from error
+
+
+def _measured(surface: Any) -> tuple[dict[str, Any], bytes]:
     facts: dict[str, Any] = {"faces": len(getattr(surface, "faces", ()))}
     stl = b""
     if 0 < facts["faces"] <= MAX_FACES:
+        if not 0 <= surface.faces.min() <= surface.faces.max() < len(surface.vertices):
+            raise _UnreadableError("a face refers to a corner that is not there")
         corners: Array = np.asarray(surface.vertices)[np.unique(surface.faces)]
         # STL files hold single precision
         facts["finite"] = bool((np.abs(corners) <= np.finfo(np.float32).max).all())
@@ -52,18 +83,23 @@ def answer(request: bytes) -> bytes:
             facts["corners"] = len(np.unique(corners.astype(np.float32), axis=0))
             facts["area"] = float(surface.area)
             stl = bytes(surface.export(file_type="stl"))
-    return json.dumps(facts).encode() + b"\n" + stl
+    return facts, stl
 
 
-def _read(suffix: str, data: bytes) -> Any:
+def _check_file(suffix: str, data: bytes) -> None:
+    """Check how much a file says that it holds.
+
+    Raises:
+        ValueError: It is too much.
+    """
     match suffix:
-        case ".dae":
-            vertices, faces = read_collada(data)
-            return trimesh.Trimesh(vertices, faces, process=False)
         case ".glb":
             check_glb(data)
         case ".ply":
             check_ply(data)
+
+
+def _read(suffix: str, data: bytes) -> Any:
     return trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False, skip_materials=True)
 
 

@@ -12,10 +12,13 @@ from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 from dh2sim.messages import Loc, listed, path_of, shown
-from dh2sim.robot.fields import COORDINATE, WRONG, Scope, Tree, is_reserved, name_problem
+from dh2sim.robot.fields import COORDINATE, IN_SI, WRONG, Scope, Tree, is_reserved, name_problem
+from dh2sim.robot.magnitudes import LENGTH, shown_size
 
 _SLACK: Final = 1e-12
 """By which a configuration may pass a limit, of the larger of the two limits' sizes."""
+_WHOLE_SLACK: Final = 1.0 + 1e-9
+"""By which the lengths of a robot may pass their bound together, times."""
 _GAINS: Final = {"kp": ("position",), "kv": ("position", "velocity")}
 """The actuators that a gain is for."""
 _SIZES: Final = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
@@ -63,6 +66,7 @@ def check(robot: Tree, scope: Scope) -> None:
     check_actuators(robot, rows, scope)
     _check_tool(robot.get("tool"), scope)
     _check_masses(robot, rows, scope)
+    _check_whole_length(robot, rows, scope)
 
 
 def trees(tree: Any, key: str) -> list[Tree]:
@@ -237,6 +241,27 @@ def _check_last_mass(rows: Sequence[PlacedRow], tool: Tree, scope: Scope) -> Non
     if tool.get("mass", 0) == 0 and ("mass" in tool or "shape" not in tool):
         message = f"{rows[last].name} would move nothing that has mass; 0 is for links between others"
         scope.report((*rows[last].loc, "link", "mass"), f"{message}, or before a tool that has a mass")
+
+
+def _check_whole_length(robot: Tree, rows: Sequence[PlacedRow], scope: Scope) -> None:
+    """The lengths of a robot are not too large together: those of neighbours add up when an export is imported."""
+    most = LENGTH.most / IN_SI[scope.length]
+    lengths = [(("base",), _part(robot, "base").get("xyz"))]
+    lengths += [(placed.loc, [placed.row.get("a", 0.0), placed.row.get("d", 0.0)]) for placed in rows]
+    lengths.append((("tool",), _part(robot, "tool").get("xyz")))
+    total = 0.0
+    for loc, values in lengths:
+        total += _length(values)
+        if total > most * _WHOLE_SLACK:
+            message = f"the lengths up to here add up to {total:.6g} {scope.length}"
+            scope.report(loc, f"{message}; those of a robot may be {shown_size(most)} {scope.length} together")
+            return
+
+
+def _length(values: Any) -> float:
+    """Return the size of a vector; 0 for one that is wrong or not given."""
+    known = isinstance(values, list) and all(isinstance(value, int | float) for value in values)
+    return math.hypot(*values) if known else 0.0
 
 
 def _part(tree: Tree, key: str) -> Tree:

@@ -120,3 +120,14 @@ def test_the_schema_has_the_bounds() -> None:
 @pytest.mark.parametrize(("value", "text"), [(1e6, "1e6"), (-1e6, "-1e6"), (1e-15, "1e-15"), (0.001, "0.001")])
 def test_bounds_are_written_as_in_robot_files(value: float, text: str) -> None:
     assert shown_size(value) == text
+
+
+LONG = HEAD + "joints:\n  - {type: revolute, a: 6e5}\n  - {type: fixed, d: 3e5}\n  - {type: revolute, a: %s}\n"
+
+
+def test_lengths_that_are_too_large_together_are_refused_at_the_row_where_they_are() -> None:
+    assert complaints(LONG % "2e5") == [
+        "r.yaml:6:5: joints[2]: the lengths up to here add up to 1.1e+06 m; those of a robot may be 1e6 m together"
+    ]
+    assert complaints("units: {length: mm}\n" + (LONG % "2e5")) == []
+    assert complaints(LONG % "1e5") == []
