@@ -92,7 +92,7 @@ def _near(ink: Array, candidates: Sequence[tuple[Array, float]], half: Array) ->
     """Return the points of the drawing that a label may cover in some place."""
     centres = np.array([centre for centre, _ in candidates])
     inside = (ink >= centres.min(axis=0) - half) & (ink <= centres.max(axis=0) + half)
-    return ink[inside.all(axis=1)]
+    return np.asarray(ink[inside.all(axis=1)])
 
 
 def _cost(label: Label, half: Array, centre: Array, radius: float, boxes: Sequence[Array], ink: Array) -> float:

@@ -246,7 +246,7 @@ def _check_last_mass(rows: Sequence[PlacedRow], tool: Tree, scope: Scope) -> Non
 def _check_whole_length(robot: Tree, rows: Sequence[PlacedRow], scope: Scope) -> None:
     """The lengths of a robot are not too large together: those of neighbours add up when an export is imported."""
     most = LENGTH.most / IN_SI[scope.length]
-    lengths = [(("base",), _part(robot, "base").get("xyz"))]
+    lengths: list[tuple[Loc, Any]] = [(("base",), _part(robot, "base").get("xyz"))]
     lengths += [(placed.loc, [placed.row.get("a", 0.0), placed.row.get("d", 0.0)]) for placed in rows]
     lengths.append((("tool",), _part(robot, "tool").get("xyz")))
     total = 0.0
