@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,6 +53,8 @@ def builtin_path(name: str) -> Path | None:
 
 def builtin_groups() -> dict[str, tuple[str, ...]]:
     """Return the names of the robots that come with dh2sim, by what kind of robot they are."""
+    import tomllib
+
     file = _folder() / _GROUPS
     listed = tomllib.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
     return {group: tuple(names) for group, names in listed.items()}
