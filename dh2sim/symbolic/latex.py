@@ -21,7 +21,7 @@ _MOST_ALIGNED: Final = 60
 """Lines that are aligned with one another: TeX keeps all of them in memory."""
 _NEW_LINE: Final = " \\\\\n"
 _GREEK: Final = frozenset(
-    "alpha beta gamma delta epsilon eta theta kappa lambda mu phi psi rho tau".split()  # noqa: SIM905
+    "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu xi phi psi rho tau".split()  # noqa: SIM905
 )
 
 

@@ -7,6 +7,7 @@ over atoms without relations are equal only if their terms are.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from typing import Final, TypeAlias
@@ -109,6 +110,13 @@ class Polynomial:
         for _ in range(exponent):
             result = result * self
         return result
+
+    def value(self, values: Mapping[Atom, float]) -> float:
+        """Return the value for values of its atoms."""
+        return math.fsum(
+            math.prod([float(number), *(values[atom] ** power for atom, power in monomial)])
+            for monomial, number in self.terms.items()
+        )
 
     def derivative(self, of_atom: Callable[[Atom], Polynomial]) -> Polynomial:
         """Return the derivative, given that of every atom."""

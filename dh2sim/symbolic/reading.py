@@ -18,11 +18,14 @@ from dh2sim.robot.expressions import ExpressionError, evaluate, evaluate_in
 from dh2sim.robot.spec import AngleUnit, Convention, Pose, RobotSpec, Row
 from dh2sim.robot.yaml_tree import Node, Report, compose
 from dh2sim.symbolic.angles import Angle, slide
+from dh2sim.symbolic.constant_rows import constant_runs
 from dh2sim.symbolic.polynomial import ONE, ZERO, NotPolynomialError, Polynomial, Rational, exact_number, simple
-from dh2sim.symbolic.table import METRES, Letter, Motion, SymbolicTable
+from dh2sim.symbolic.table import METRES, Letter, Motion, Run, SymbolicTable
 
 _SNAP: Final = 4e-16
 """Share by which a double may differ from the multiple of 15 degrees that it stands for."""
+_SNAP_PRODUCT: Final = 4e-15
+"""The same of an angle that was computed of others."""
 
 
 def symbolic_table(spec: RobotSpec, *, letters: bool = False, numbers: bool = False) -> SymbolicTable:
@@ -53,7 +56,9 @@ def symbolic_table(spec: RobotSpec, *, letters: bool = False, numbers: bool = Fa
         frames[f"dh_{i}"] = len(motions)
     motions += reader.pose_motions(spec.tool.pose, "tool")
     frames["tool0"] = len(motions)
-    return SymbolicTable(spec=spec, motions=motions, frames=frames, letters=reader.used_letters(motions))
+    runs = [] if letters else reader.constant_runs(motions, frames)
+    used = reader.used_letters([*motions, *(motion for run in runs for motion in run.motions)])
+    return SymbolicTable(spec=spec, motions=motions, frames=frames, letters=used, runs=runs)
 
 
 class _Expressions:
@@ -222,7 +227,7 @@ class _Reader:
         except (ArithmeticError, ValueError):
             result = None
         if result is not None:
-            own = _value(result, self._spec.parameters)
+            own = result.value({"pi": math.pi, **self._spec.parameters})
             return result if _same(to_si(own), value) else None
         own = evaluate(node.value, self._spec.parameters)
         return (" ".join(node.value.split()), own) if _same(to_si(own), value) else None
@@ -234,6 +239,21 @@ class _Reader:
             name += "_"
         self._named[name] = Letter(name, value, kind, text)
         return name
+
+    def constant_runs(self, motions: Sequence[Motion], frames: Mapping[str, int]) -> list[Run]:
+        """Return the stretches of fixed rows that are shorter as one transform."""
+
+        def angle(value: float, letter: str) -> Angle:
+            exact = _simple_degrees(value, _SNAP_PRODUCT)
+            return (
+                Angle(degrees=exact) if exact is not None else Angle.of(names={self._name(letter, value, "angle"): 1})
+            )
+
+        def length(value: float, letter: str) -> Polynomial:
+            return Polynomial.atom(self._name(letter, value, "length"))
+
+        fixed = [i for i, row in enumerate(self._spec.rows, start=1) if not row.type.moves]
+        return list(constant_runs(motions, frames, fixed, dict(self._named), angle, length)) if fixed else []
 
     def used_letters(self, motions: Sequence[Motion]) -> dict[str, Letter]:
         """Return the constants that motions use."""
@@ -264,19 +284,11 @@ def _same(left: float, right: float) -> bool:
     return math.isclose(left, right, rel_tol=1e-12, abs_tol=1e-15)
 
 
-def _simple_degrees(angle: float) -> int | None:
+def _simple_degrees(angle: float, share: float = _SNAP) -> int | None:
     """Return the multiple of 15 degrees that an angle, rad, is to within rounding, or None."""
     twelfths = round(angle / (math.pi / 12))
     near = twelfths * math.pi / 12
-    return 15 * twelfths if abs(angle - near) <= _SNAP * max(1.0, abs(near)) else None
-
-
-def _value(polynomial: Polynomial, parameters: Mapping[str, float]) -> float:
-    """Return the value of a polynomial over parameters and pi."""
-    return math.fsum(
-        math.prod([float(number), *(({"pi": math.pi} | dict(parameters))[atom] ** power for atom, power in monomial)])
-        for monomial, number in polynomial.terms.items()
-    )
+    return 15 * twelfths if abs(angle - near) <= share * max(1.0, abs(near)) else None
 
 
 def _shift(x: Polynomial = ZERO, y: Polynomial = ZERO, z: Polynomial = ZERO) -> Motion:

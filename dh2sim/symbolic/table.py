@@ -66,6 +66,14 @@ class Motion(NamedTuple):
         return Motion(self.kind, -self.angle, (-x, -y, -z))
 
 
+class Run(NamedTuple):
+    """A stretch of constant motions, and the motions, with the same product, that stand for them."""
+
+    start: int
+    end: int
+    motions: Sequence[Motion]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SymbolicTable:
     """A robot's table in symbols.
@@ -80,6 +88,8 @@ class SymbolicTable:
     """How many motions lead from base_link to each frame: base_link, dh_0 … dh_n, link_1 … link_n, tool0."""
     letters: Mapping[str, Letter]
     """The constants that occur, by name, parameters of the file first."""
+    runs: Sequence[Run] = ()
+    """Stretches of motions that are shorter as others, in order."""
 
     @property
     def unit(self) -> LengthUnit:
@@ -104,8 +114,16 @@ class SymbolicTable:
         """
         start, end = self._index(source), self._index(target)
         if start <= end:
-            return list(self.motions[start:end])
-        return [motion.inverse for motion in reversed(self.motions[end:start])]
+            return self._between(start, end)
+        return [motion.inverse for motion in reversed(self._between(end, start))]
+
+    def _between(self, start: int, end: int) -> list[Motion]:
+        motions: list[Motion] = []
+        for run in self.runs:
+            if start <= run.start and run.end <= end:
+                motions += [*self.motions[start : run.start], *run.motions]
+                start = run.end
+        return [*motions, *self.motions[start:end]]
 
     def pose(self, source: str = "base_link", target: str = "tool0", *, fold: Fold = Fold.PARALLEL) -> Matrix:
         """Return the pose of frame ``target`` in frame ``source``: 4 rows of 4 polynomials.
@@ -165,10 +183,14 @@ def constant_value(table: SymbolicTable, atom: Atom) -> float | None:
         return None if letter is None else letter.value
     if not trig.angle.is_constant:
         return None
-    angle = math.radians(trig.angle.degrees) + math.fsum(
-        float(n) * table.letters[name].value for name, n in trig.angle.names
-    )
+    angle = constant_angle(trig.angle, table.letters)
     return math.cos(angle) if trig.function == "cos" else math.sin(angle)
+
+
+def constant_angle(angle: Angle, letters: Mapping[str, Letter]) -> float:
+    """Return the value, rad, of an angle that does not depend on the configuration."""
+    named = math.fsum(float(n) * letters[name].value for name, n in angle.names)
+    return math.radians(angle.degrees) + named
 
 
 def transform(motions: Sequence[Motion], fold: Fold) -> Matrix:
