@@ -35,12 +35,9 @@ def branch_names(robot: ChainLike, q: ArrayLike) -> tuple[str, ...]:
     form = _form(chain)
     if isinstance(form, str) or not len(vectors):
         return ("",) * len(vectors)
-    # those that differ by whole turns have the same name
+    # rounded, so that those that differ by whole turns have the same name
     turns = np.array([joint.type.turns for joint in chain.moving_joints])
-    places = np.round(np.where(turns, np.mod(vectors, 2.0 * np.pi), vectors), 9)
-    _, first, which = np.unique(places, axis=0, return_index=True, return_inverse=True)
-    names = [branch_name(form, np.asarray(vector)) for vector in vectors[first]]
-    return tuple(names[i] for i in which.ravel())
+    return names_of_form(form, np.round(np.where(turns, np.mod(vectors, 2.0 * np.pi), vectors), 12))
 
 
 @lru_cache(maxsize=32)
@@ -48,6 +45,6 @@ def _form(chain: KinematicChain) -> TextbookForm | str:
     return textbook_form(arm_axes(chain, ABOUT))
 
 
-def branch_name(form: TextbookForm, q: Array) -> str:
-    """Return the name of one configuration's branch, q of shape (n,), rad and m."""
-    return ", ".join(form.names(q))
+def names_of_form(form: TextbookForm, q: Array) -> tuple[str, ...]:
+    """Return the name of each configuration's branch, q of shape (k, n), rad and m."""
+    return tuple(", ".join(parts) for parts in form.names(q))

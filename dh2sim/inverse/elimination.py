@@ -88,10 +88,16 @@ class Found:
     """Coordinates of all joints in the arm's units, shape (M, n)."""
     sigma: Array
     """Least singular value of the Jacobian of the joints that move, in the arm's units, shape (M,)."""
+    J: Array = field(repr=False)
+    """Jacobians of all joints in the arm's units, shape (M, 6, n)."""
 
     def of(self, chosen: Indices | Flags) -> Found:
         """Return some of them, by index or bool."""
-        return Found(pose=self.pose[chosen], q=self.q[chosen], sigma=self.sigma[chosen])
+        return Found(pose=self.pose[chosen], q=self.q[chosen], sigma=self.sigma[chosen], J=self.J[chosen])
+
+    def among(self, poses: Indices) -> Found:
+        """Return the same solutions with their poses' indices among others."""
+        return Found(pose=poses[self.pose], q=self.q, sigma=self.sigma, J=self.J)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -124,27 +130,28 @@ class Method:
             block = slice(start, start + _BLOCK)
             values = {joint: q if len(q) == 1 else q[block] for joint, q in locked.items()}
             found = self._solve_block(T[block], values)
-            blocks.append(Found(pose=found.pose + start, q=found.q, sigma=found.sigma))
+            blocks.append(found.among(np.arange(start, start + _BLOCK)))
         return _joined(blocks, self.arm.n)
 
     def _held(self, T: Array, locked: Mapping[int, Array]) -> Found:
         """Return the configuration in which all joints are locked, for the poses that it reaches."""
         q = np.stack([np.broadcast_to(locked[joint], (len(T),)) for joint in range(self.arm.n)], axis=1)
-        error = np.linalg.norm(pose_error(pose_and_jacobian(self.arm, q)[0], T), axis=1)
-        (reached,) = np.nonzero(error < REACHED)
-        return Found(pose=reached, q=q[reached], sigma=np.ones(len(reached)))
+        frame, J = pose_and_jacobian(self.arm, q)
+        (reached,) = np.nonzero(np.linalg.norm(pose_error(frame, T), axis=1) < REACHED)
+        return Found(pose=reached, q=q[reached], sigma=np.ones(len(reached)), J=J[reached])
 
     def _solve_block(self, T: Array, locked: Mapping[int, Array]) -> Found:
         found = self.solve_by(self.eliminations[0], T, locked) if self.eliminations else _joined([], self.arm.n)
         for other in (*self.eliminations[1:], None):
             again = np.flatnonzero(self.doubtful(found, len(T)))
+            if not len(again):
+                break
             if other is None or other is not self.eliminations[1]:
-                again = self._ill(again, found, T, locked)
+                again = self._ill(again, found, T, locked, last=other is None)
             if len(again):
                 values = {joint: q if len(q) == 1 else q[again] for joint, q in locked.items()}
                 more = self._searched(T[again], values) if other is None else self.solve_by(other, T[again], values)
-                more = Found(pose=again[more.pose], q=more.q, sigma=more.sigma)
-                found = self.distinct(_joined([found, more], self.arm.n))
+                found = self.distinct(_joined([found, more.among(again)], self.arm.n))
         return found
 
     def doubtful(self, found: Found, poses: int) -> Flags:
@@ -166,14 +173,24 @@ class Method:
             (regular % 2 == 1) & (regular == all_of_them) & (bool(self.eliminations) and not self.virtual)
         )
 
-    def _ill(self, again: Indices, found: Found, T: Array, locked: Mapping[int, Array]) -> Indices:
-        """Return doubtful poses, without those that are well-conditioned and have no solution: out of reach."""
-        none = again[np.bincount(found.pose, minlength=len(T))[again] == 0]
-        if not len(none) or not self.eliminations:
+    def _ill(
+        self, again: Indices, found: Found, T: Array, locked: Mapping[int, Array], *, last: bool
+    ) -> Indices:
+        """Return doubtful poses, without those that are well-conditioned and have no solution: out of reach.
+
+        Nor are those searched at the last that have singular solutions where an elimination is well-conditioned:
+        these are among its eigenvalues.
+        """
+        counts = np.bincount(found.pose, minlength=len(T))[again]
+        asked = again[(counts % 2 == 0) if last else (counts == 0)]
+        if not len(asked) or not self.eliminations:
             return again
-        values = {joint: q if len(q) == 1 else q[none] for joint, q in locked.items()}
-        condition = self.eliminations[0].condition(close_loop(self.arm, T[none], values, self.virtual))
-        return np.setdiff1d(again, none[condition < _ILL])
+        values = {joint: q if len(q) == 1 else q[asked] for joint, q in locked.items()}
+        loop = close_loop(self.arm, T[asked], values, self.virtual)
+        condition = self.eliminations[0].condition(loop)
+        for other in self.eliminations[1:] if last else ():
+            condition = np.minimum(condition, other.condition(loop))
+        return np.setdiff1d(again, asked[condition < _ILL])
 
     def _searched(self, T: Array, locked: Mapping[int, Array]) -> Found:
         """Return what Levenberg-Marquardt finds from scattered starts: the last resort where the arm is singular."""
@@ -200,31 +217,36 @@ class Method:
 
     def polished(self, pose: Indices, q: Array, T: Array, gate: float = _GATE) -> Found:
         """Return the distinct solutions that configurations lead to, if their errors are below the gate."""
-        q, error = polish(self.arm, q, T[pose], self.moving, gate=gate)
+        q, error, J = polish(self.arm, q, T[pose], self.moving, gate=gate)
         extent = 1.0 + np.abs(q[:, np.logical_not(self.arm.turns)]).max(axis=1, initial=0.0)  # rounding grows with it
         reached = error < extent * REACHED
-        pose, q, error, extent = pose[reached], q[reached], error[reached], extent[reached]
-        J = pose_and_jacobian(self.arm, q)[1][:, :, self.moving]
-        sigma = np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1], dtype=np.float64)
+        J, error, extent = J[reached], error[reached], extent[reached]
+        sigma = np.asarray(np.linalg.svd(J[:, :, self.moving], compute_uv=False)[:, -1], dtype=np.float64)
+        found = Found(pose=pose[reached], q=q[reached], sigma=sigma, J=J)
         if not self.virtual:
-            sharp = (error < extent * CONVERGED) | (sigma < _BLUNT)
-            pose, q, sigma = pose[sharp], q[sharp], sigma[sharp]
-        return self.distinct(Found(pose=pose, q=q, sigma=sigma))
+            found = found.of((error < extent * CONVERGED) | (sigma < _BLUNT))
+        return self.distinct(found)
 
     def distinct(self, found: Found) -> Found:
         """Return solutions without those that are the same but for whole turns, in the order of their poses."""
         turns = np.array(self.arm.turns)
-        found = Found(pose=found.pose, q=np.where(turns, _wrapped(found.q), found.q), sigma=found.sigma)
+        q = np.where(turns, _wrapped(found.q), found.q)
         weights = 1.0 + np.sqrt(2.0 + np.arange(self.arm.n))  # no two joints count alike
-        key = np.where(turns, np.sin(found.q + weights), found.q) @ weights
-        found = found.of(np.lexsort([key, found.pose]))
-        new = np.ones(len(found.pose), dtype=np.bool_)
-        tolerance = np.where(found.sigma < NEARLY_SINGULAR, SAME_IF_SINGULAR, SAME)
+        key = np.where(turns, np.sin(q + weights), q) @ weights
+        order = np.lexsort([key, found.pose])
+        pose, q, key, sigma = found.pose[order], q[order], key[order], found.sigma[order]
+        tolerance = np.where(sigma < NEARLY_SINGULAR, SAME_IF_SINGULAR, SAME)
+        farthest = 2.0 * float(weights.sum()) * tolerance  # keys of equal solutions are no farther from each other
+        new = np.ones(len(pose), dtype=np.bool_)
         for lag in range(1, min(_NEIGHBOURS, len(new) - 1) + 1):
-            gap = found.q[lag:] - found.q[:-lag]
+            near = np.flatnonzero((pose[lag:] == pose[:-lag]) & (key[lag:] - key[:-lag] <= farthest[lag:]))
+            if not len(near):
+                break
+            gap = q[near + lag] - q[near]
             apart = np.abs(np.where(turns, _wrapped(gap), gap)).max(axis=1)
-            new[lag:] &= (found.pose[lag:] != found.pose[:-lag]) | (apart > tolerance[lag:])
-        return found.of(new)
+            new[near[apart <= tolerance[near + lag]] + lag] = False
+        order = order[new]
+        return Found(pose=pose[new], q=q[new], sigma=sigma[new], J=found.J[order])
 
 
 def choose_method(arm: Arm, moving: Flags, ranges: Array) -> Method:
@@ -258,7 +280,7 @@ def _tried(
     T[:, :3], T[:, 3, 3] = pose_and_jacobian(arm, q)[0], 1.0
     locked = {int(joint): q[:, joint] for joint in np.flatnonzero(np.logical_not(moving))}
     loop = close_loop(arm, T, locked, virtual)
-    drawn = Found(pose=np.arange(len(q)), q=q, sigma=np.ones(len(q)))
+    drawn = Found(pose=np.arange(len(q)), q=q, sigma=np.ones(len(q)), J=pose_and_jacobian(arm, q)[1])
     bare = Method(arm=arm, moving=moving, ranges=ranges, virtual=virtual, eliminations=(), found_share=0.0)
     trials: list[_Trial] = []
     share = 0.0
@@ -386,9 +408,10 @@ def _wrapped(q: Array) -> Array:
 
 def _joined(parts: list[Found], n: int) -> Found:
     if not parts:
-        return Found(pose=np.zeros(0, dtype=np.int64), q=np.zeros((0, n)), sigma=np.zeros(0))
+        return Found(pose=np.zeros(0, dtype=np.int64), q=np.zeros((0, n)), sigma=np.zeros(0), J=np.zeros((0, 6, n)))
     return Found(
         pose=np.concatenate([part.pose for part in parts]),
         q=np.concatenate([part.q for part in parts]),
         sigma=np.concatenate([part.sigma for part in parts]),
+        J=np.concatenate([part.J for part in parts]),
     )

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from dh2sim.inverse.elimination import CONVERGED, NEARLY_SINGULAR, Found
-from dh2sim.inverse.loop import Arm, Flags, pose_and_jacobian
+from dh2sim.inverse.loop import Arm, Flags
 from dh2sim.inverse.polish import polish
 from dh2sim.inverse.self_motion import SELF_MOTION, Path, follow, lies_on, null_directions
 from dh2sim.typing import Array
@@ -28,18 +28,31 @@ MOST: Final = 16
 """Families that are followed of one pose: where they have two parameters, there are endless ones."""
 
 
-def split_families(arm: Arm, T: Array, moving: Flags, found: Found) -> tuple[Found, list[Path]]:
-    """Separate the isolated solutions of a pose from the families, and follow these.
+def split_families(arm: Arm, T: Array, moving: Flags, found: Found) -> tuple[Found, dict[int, list[Path]]]:
+    """Separate isolated solutions from families, and follow these.
 
     Args:
         arm: The arm.
-        T: The pose, its position in units of the arm's length, shape (4, 4).
+        T: Poses, positions in units of the arm's length, shape (N, 4, 4).
         moving: Which joints are not locked, bool, shape (n,).
-        found: The solutions of the pose.
+        found: The solutions of the poses.
 
     Returns:
-        The isolated ones, and the families' curves.
+        The isolated ones, and the families' curves by the index of their pose.
     """
+    isolated = np.ones(len(found.q), dtype=np.bool_)
+    families = {}
+    for pose in dict.fromkeys(found.pose[found.sigma <= NEARLY_SINGULAR].tolist()):
+        own = np.flatnonzero(found.pose == pose)
+        alone, paths = _split(arm, T[pose], moving, found.of(own))
+        isolated[own] = alone
+        if paths:
+            families[pose] = paths
+    return found.of(isolated), families
+
+
+def _split(arm: Arm, T: Array, moving: Flags, found: Found) -> tuple[Flags, list[Path]]:
+    """Return which solutions of one pose, shape (4, 4), are isolated, and the curves of the others."""
     turns = np.array(arm.turns)
     isolated = np.ones(len(found.q), dtype=np.bool_)
     paths: list[Path] = []
@@ -47,21 +60,20 @@ def split_families(arm: Arm, T: Array, moving: Flags, found: Found) -> tuple[Fou
     for i in np.argsort(found.sigma, kind="stable"):
         if found.sigma[i] > NEARLY_SINGULAR:
             break
-        values = np.linalg.svd(pose_and_jacobian(arm, found.q[i : i + 1])[1][0][:, moving], compute_uv=False)
-        several = int((values < SINGULAR).sum()) > 1
+        several = int((np.linalg.svd(found.J[i][:, moving], compute_uv=False) < SINGULAR).sum()) > 1
         if (several and flat) or any(lies_on(path.q, found.q[i], turns, closed=path.closed) for path in paths):
             isolated[i] = False
         elif found.sigma[i] <= SINGULAR and len(paths) < MOST and _goes_on(arm, found.q[i], T, moving):
             isolated[i] = False
             paths.append(follow(arm, found.q[i], T, moving))
             flat |= several
-    return found.of(isolated), paths
+    return isolated, paths
 
 
 def _goes_on(arm: Arm, q: Array, T: Array, moving: Flags) -> bool:
     """Return whether there are other configurations near a singular one that reach its pose."""
     there = q + STEP * null_directions(arm, q, moving)
-    back, error = polish(arm, there, np.broadcast_to(T, (len(there), 4, 4)), moving)
+    back, error, _ = polish(arm, there, np.broadcast_to(T, (len(there), 4, 4)), moving)
     return bool(((error < CONVERGED) & (np.linalg.norm(back - q, axis=1) > 0.5 * STEP)).any())
 
 

@@ -154,10 +154,10 @@ def joint_motion(turns: bool, q: Array) -> Array:
 
 def inverse_poses(T: Array) -> Array:
     """Return the inverses of poses, shape (..., 4, 4)."""
-    inverse = np.zeros_like(T)
+    inverse = np.zeros(T.shape)
     R = np.swapaxes(T[..., :3, :3], -1, -2)
     inverse[..., :3, :3] = R
-    inverse[..., :3, 3] = -np.einsum("...ij,...j->...i", R, T[..., :3, 3])
+    inverse[..., :3, 3:] = -(R @ T[..., :3, 3:])
     inverse[..., 3, 3] = 1.0
     return inverse
 

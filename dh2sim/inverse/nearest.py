@@ -12,7 +12,7 @@ from dh2sim.inverse.goals import Free
 from dh2sim.inverse.numeric import NumericSolver, goal_angles, goal_distances
 from dh2sim.inverse.reach import SLACK, amount_text, beyond_limits
 from dh2sim.inverse.solutions import Solutions
-from dh2sim.kinematics.chain import ChainLike, chain_of
+from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of
 from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
@@ -22,13 +22,22 @@ NOT_COMPLETE: Final = "Found numerically: there may be other solutions."
 
 
 def numeric_solutions(
-    spec: RobotSpec, solver: NumericSolver, T: Array, q0: Array, *, free: Free | None, size: float, rank: int
+    spec: RobotSpec,
+    chain: KinematicChain,
+    solver: NumericSolver,
+    T: Array,
+    q0: Array,
+    *,
+    free: Free | None,
+    size: float,
+    rank: int,
 ) -> list[Solutions]:
     """Return for each goal the solution that descents from several starts find first.
 
     Args:
         spec: The robot.
-        solver: Of its chain.
+        chain: Its chain.
+        solver: Of the chain.
         T: Goals for tool0 in base_link, shape (N, 4, 4), their rotations orthonormal.
         q0: Where the first descent starts, rad and m, shape (n,).
         free: What the goals leave open.
@@ -40,7 +49,7 @@ def numeric_solutions(
     """
     found = solver.search(T, q0, free=free)
     residuals = goal_residuals(spec, found.q, T, free=free, size=size)
-    sigmas = goal_sigma_min(spec, found.q, free=free, size=size, rank=rank)
+    sigmas = goal_sigma_min(chain, found.q, free=free, size=size, rank=rank)
     inside = (beyond_limits(spec.moving_rows, found.q) == 0.0).all(axis=1)
     return [
         replace(
@@ -113,12 +122,24 @@ def goal_sigma_min(robot: ChainLike, q: Array, *, free: Free | None, size: float
     ``rank`` is that of a general configuration: further singular values are always zero.
     """
     chain = chain_of(robot)
+    turns = np.array([joint.type.turns for joint in chain.moving_joints], dtype=np.bool_)
+    R = forward_kinematics(chain, q)[:, :3, :3] if free == "roll" else None
     J = np.array(geometric_jacobian(chain, q))
-    J[:, :3] /= size
-    J[:, :, [i for i, joint in enumerate(chain.moving_joints) if not joint.type.turns]] *= size
+    J[:, :3, turns] /= size
+    return least_singular_values(J, R, free=free, rank=rank)
+
+
+def least_singular_values(J: Array, R: Array | None, *, free: Free | None, rank: int) -> Array:
+    """Return the least singular values of the rows of Jacobians that a goal asks for, shape (N,).
+
+    Args:
+        J: Geometric Jacobians, lengths in units of the arm's size, shape (N, 6, n).
+        R: Orientations of tool0, shape (N, 3, 3); used where the roll is free.
+        free: What the goal leaves open.
+        rank: Of the rows that it asks for, at a general configuration.
+    """
     if free == "rotation":
         J = J[:, :3]
-    elif free == "roll":
-        axes = np.swapaxes(forward_kinematics(chain, q)[:, :3, :2], 1, 2)
-        J = np.concatenate([J[:, :3], axes @ J[:, 3:]], axis=1)
+    elif free == "roll" and R is not None:
+        J = np.concatenate([J[:, :3], np.swapaxes(R[:, :, :2], 1, 2) @ J[:, 3:]], axis=1)
     return np.asarray(np.linalg.svd(J, compute_uv=False)[:, rank - 1])

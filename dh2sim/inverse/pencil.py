@@ -61,9 +61,10 @@ class Pencil:
     def candidates(self, loop: Loop) -> Candidates:
         """Return configurations near all solutions of N poses, and some that are none."""
         ring = loop.variant(self.first, backwards=self.backwards)
-        right = self._right_side(ring)
+        ends = self._ends(ring)
+        right = self._right_side(ring, ends[1])
         with np.errstate(all="ignore"):
-            t, v = _eigenpairs(self._matrices(ring, right))
+            t, v = _eigenpairs(self._matrices(ring, ends[0], right))
             half = np.arctan(t)
         largest = np.take_along_axis(v, np.abs(v).argmax(1)[:, None], 1)[:, 0]
         poses, k = np.nonzero((np.abs(half.imag) < _GATE) & (np.abs(largest) > 0.0))
@@ -74,7 +75,7 @@ class Pencil:
         for joint, angle in zip(self._left, psi, strict=False):
             q[:, joint] = self._coordinate(ring, joint, angle)
         with np.errstate(all="ignore"):
-            pose, q = self._completed(ring, right, poses, q)
+            pose, q = self._completed(ring, ends[0], right, poses, q)
         sane = np.isfinite(q).all(axis=1) & (np.abs(q).max(axis=1, initial=0.0) < 1e6)
         pose, q = pose[sane], q[sane]
         ordered = np.empty_like(q)
@@ -84,7 +85,8 @@ class Pencil:
     def condition(self, loop: Loop) -> Array:
         """Return the condition numbers of the matrices that are divided by, shape (N,): huge if singular."""
         ring = loop.variant(self.first, backwards=self.backwards)
-        values = np.linalg.svd(self._matrices(ring, self._right_side(ring))[2], compute_uv=False)
+        ends = self._ends(ring)
+        values = np.linalg.svd(self._matrices(ring, ends[0], self._right_side(ring, ends[1]))[2], compute_uv=False)
         return np.asarray(values[:, 0] / np.maximum(values[:, -1], 1e-300 + 1e-300 * values[:, 0]))
 
     @property
@@ -112,9 +114,8 @@ class Pencil:
         centres = [np.stack([0.0 * h, 0.0 * h, h, 1.0 + 0.0 * h], axis=-1)[..., None] for h in wrist_centre(ring)]
         return ring.links[2] @ centres[0], behind @ centres[1]
 
-    def _right_side(self, ring: Loop) -> _RightSide:
+    def _right_side(self, ring: Loop, seen: Array) -> _RightSide:
         """Return the equations' coefficients of products of the joints that are eliminated linearly."""
-        seen = self._ends(ring)[1]
         for joint in self._linear:
             seen = _stacked(inverse_poses(ring.links[joint]), _sampled(self.motions[joint], seen))
         values = _numbers(seen)
@@ -130,9 +131,9 @@ class Pencil:
             values=S,
         )
 
-    def _matrices(self, ring: Loop, right: _RightSide) -> Array:
+    def _matrices(self, ring: Loop, seen: Array, right: _RightSide) -> Array:
         """Return the coefficients of 1, t, t² of the square matrix that is singular at solutions, (3, N, s, s)."""
-        seen, joints = self._ends(ring)[0], sorted(self._left)
+        joints = sorted(self._left)
         for joint in reversed(joints):
             seen = _sampled(self.motions[joint], seen)
             if joint != joints[0]:
@@ -149,10 +150,11 @@ class Pencil:
         size = square.shape[-1]
         return square if 2 * rows == size else self.mixing[:size, : 2 * rows] @ square
 
-    def _completed(self, ring: Loop, right: _RightSide, pose: Indices, q: Array) -> tuple[Indices, Array]:
+    def _completed(
+        self, ring: Loop, seen: Array, right: _RightSide, pose: Indices, q: Array
+    ) -> tuple[Indices, Array]:
         """Return the candidates with the coordinates of all joints, given those on the left."""
         links = [K if len(K) == 1 else K[pose] for K in ring.links]
-        seen = self._ends(ring)[0]
         seen = seen if len(seen) == 1 else seen[pose]
         joints = sorted(self._left)
         motions = {joint: joint_motion(ring.turns[joint], q[:, joint]) for joint in joints}
@@ -241,7 +243,7 @@ def build_pencil(
             _kronecker([_in_half_tangents(ring.turns[joint], float(phases[joint])) for joint in others]).T,
         ),
     )
-    rank = pencil._right_side(ring).rank
+    rank = pencil._right_side(ring, pencil._ends(ring)[1]).rank
     return replace(pencil, rank=rank) if 2 * (rows - rank) >= size else None
 
 

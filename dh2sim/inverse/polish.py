@@ -21,7 +21,7 @@ _LONGEST = 1.0
 """Longest step of a coordinate, rad or lengths of the arm."""
 
 
-def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) -> tuple[Array, Array]:
+def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) -> tuple[Array, Array, Array]:
     """Return configurations moved to where they reach their poses, and how far from that they still are.
 
     The damping is proportional to the square of what is left, so that convergence is quadratic at regular solutions.
@@ -37,7 +37,7 @@ def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) 
             do those that are not near their poses soon. Without it, all are moved, and longer.
 
     Returns:
-        Coordinates, shape (M, n), and norms of the errors, shape (M,).
+        Coordinates, shape (M, n), norms of the errors, shape (M,), and Jacobians there, shape (M, 6, n).
     """
     q = np.array(q)
     frame, J = pose_and_jacobian(arm, q)
@@ -45,7 +45,7 @@ def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) 
     norm = np.linalg.norm(error, axis=1)
     damping = np.full(len(q), 1e-6)
     active = np.flatnonzero((norm > _DONE) & (norm < gate))
-    J, error = J[active][:, :, moving], error[active]
+    all_J, J, error = J, J[active][:, :, moving], error[active]
     diagonal = np.arange(int(moving.sum()))
     patient = gate == math.inf
     for attempt in range(_PATIENT_STEPS if patient else _STEPS):
@@ -63,7 +63,7 @@ def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) 
         norm_trial = np.linalg.norm(error_trial, axis=1)
         better = norm_trial < norm[active]
         took = active[better]
-        q[took], norm[took] = trial[better], norm_trial[better]
+        q[took], norm[took], all_J[took] = trial[better], norm_trial[better], J_trial[better]
         J[better], error[better] = J_trial[better][:, :, moving], error_trial[better]
         damping[active] = np.where(better, 0.1 * damping[active], 10.0 * np.maximum(damping[active], 1e-8))
         # near the end an attempt that does not help is the end
@@ -71,4 +71,4 @@ def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) 
         if attempt >= _SOON and not patient:
             keep &= norm[active] < _NEAR
         active, J, error = active[keep], J[keep], error[keep]
-    return q, norm
+    return q, norm, all_J

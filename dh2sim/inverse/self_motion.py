@@ -80,13 +80,14 @@ class _Curve:
         q, direction, step = start, first, FIRST
         points = [start]
         while len(points) < MOST:
-            there = self._onto(q + step * direction)
-            ahead = None if there is None else self._direction(there, direction)
-            if there is None or ahead is None or float(ahead @ direction) < STRAIGHT:
+            reached = self._onto(q + step * direction)
+            ahead = None if reached is None else self._direction(reached[1], direction)
+            if reached is None or ahead is None or float(ahead @ direction) < STRAIGHT:
                 step *= 0.5
                 if step < SHORTEST:
                     return np.array(points), False
                 continue
+            there = reached[0]
             if len(points) > 3 and self._passes(start, q, there) and float(ahead @ first) > 0.5:
                 return np.array(points), True
             if (np.abs(there - start) > np.where(self._turns, WOUND, FAR)).any():
@@ -99,33 +100,37 @@ class _Curve:
         """Return a unit vector along a curve through ``q``: of several, one that goes on."""
         directions = null_directions(self._arm, q, self._moving)
         for direction in directions if len(directions) > 1 else ():
-            there = self._onto(q + FIRST * direction)
-            if there is not None and float(np.linalg.norm(there - q - FIRST * direction)) < 0.1 * FIRST:
+            reached = self._onto(q + FIRST * direction)
+            if reached is not None and float(np.linalg.norm(reached[0] - q - FIRST * direction)) < 0.1 * FIRST:
                 return np.asarray(direction)
         return np.asarray(directions[-1])
 
-    def _direction(self, q: Array, before: Array) -> Array:
-        """Return the unit vector along the curve: of several, where the arm is singular, the one that goes on."""
-        null = _null_space(self._arm, q, self._moving)
-        direction = np.zeros(len(q))
+    def _direction(self, J: Array, before: Array) -> Array:
+        """Return the unit vector along the curve, given the Jacobian of the joints that move: the one that goes on."""
+        null = _null_space(J)
+        direction = np.zeros(len(before))
         direction[self._moving] = null.T @ (null @ before[self._moving])
         length = float(np.linalg.norm(direction))
         return direction / length if length > 0.0 else direction
 
-    def _onto(self, q: Array) -> Array | None:
-        """Return the point of the curve near ``q``, or None if it is not found in few steps."""
+    def _onto(self, q: Array) -> tuple[Array, Array] | None:
+        """Return the point of the curve near ``q``, and the Jacobian of the joints that move; None if it is far."""
         q = q.copy()
         for _ in range(6):
-            frame, J = pose_and_jacobian(self._arm, q[None])
-            error = pose_error(frame, self._T)[0]
+            error, J = self._error(q)
             if float(np.abs(error).max()) <= ON_POSE:
-                return q
-            move = np.linalg.lstsq(J[0][:, self._moving], error, rcond=FLAT)[0]
+                return q, J
+            move = np.linalg.lstsq(J, error, rcond=FLAT)[0]
             if float(np.abs(move).max(initial=0.0)) > 4.0 * LONGEST:
                 return None
             q[self._moving] += move
-        frame, _ = pose_and_jacobian(self._arm, q[None])
-        return q if float(np.abs(pose_error(frame, self._T)).max()) <= 100.0 * ON_POSE else None
+        error, J = self._error(q)
+        return (q, J) if float(np.abs(error).max()) <= 100.0 * ON_POSE else None
+
+    def _error(self, q: Array) -> tuple[Array, Array]:
+        """Return what is left to the pose, shape (6,), and the Jacobian of the joints that move."""
+        frame, J = pose_and_jacobian(self._arm, q[None])
+        return pose_error(frame, self._T)[0], J[0][:, self._moving]
 
     def _passes(self, start: Array, q: Array, there: Array) -> bool:
         """Return whether a step leads past the start, angles modulo whole turns."""
@@ -146,7 +151,7 @@ def null_directions(arm: Arm, q: Array, moving: NDArray[np.bool_]) -> Array:
     Where there are several, each moves as few joints as possible: curves along them close, as those along mixtures of
     turns in line with each other need not.
     """
-    rows = np.array(_null_space(arm, q, moving))
+    rows = np.array(_null_space(pose_and_jacobian(arm, q[None])[1][0][:, moving]))
     for i in range(len(rows) if len(rows) > 1 else 0):
         row, column = divmod(int(np.abs(rows[i:]).argmax()), rows.shape[1])
         rows[[i, i + row]] = rows[[i + row, i]]
@@ -158,9 +163,9 @@ def null_directions(arm: Arm, q: Array, moving: NDArray[np.bool_]) -> Array:
     return directions
 
 
-def _null_space(arm: Arm, q: Array, moving: NDArray[np.bool_]) -> Array:
-    """Return an orthonormal basis of it, or the least vector where there is none, of the joints that move."""
-    _, values, vectors = np.linalg.svd(pose_and_jacobian(arm, q[None])[1][0][:, moving])
+def _null_space(J: Array) -> Array:
+    """Return an orthonormal basis of a Jacobian's null space, or the least vector where there is none."""
+    _, values, vectors = np.linalg.svd(J)
     rank = int((values > FLAT).sum())
     return np.asarray(vectors[min(rank, len(vectors) - 1) :])
 
@@ -174,10 +179,11 @@ def lies_on(points: Array, q: Array, turns: NDArray[np.bool_], *, closed: bool) 
         turns: Which joints turn, bool, shape (n,).
         closed: Whether the curve goes on from the last point to the first.
     """
-    points = np.concatenate([points, points[:1]]) if closed else points
     gaps = np.where(turns, (q - points + np.pi) % (2.0 * np.pi) - np.pi, q - points)
     nearest = int(np.einsum("mi,mi->m", gaps, gaps).argmin())
-    ends = points[[max(nearest - 1, 0), min(nearest + 1, len(points) - 1)]] - points[nearest]
+    neighbours = np.array([nearest - 1, nearest + 1])
+    neighbours = neighbours % len(points) if closed else np.clip(neighbours, 0, len(points) - 1)
+    ends = points[neighbours] - points[nearest]
     ends = np.where(turns, (ends + np.pi) % (2.0 * np.pi) - np.pi, ends)
     for end in ends:
         length = float(end @ end)

@@ -17,8 +17,15 @@ from dh2sim.inverse.branches import branch_names
 from dh2sim.inverse.elimination import Found, Method, choose_method
 from dh2sim.inverse.families import family_kind, moving_joints, split_families
 from dh2sim.inverse.goals import Free, read_goals, require_free
-from dh2sim.inverse.loop import Arm, Flags, Indices, build_arm, joint_rank
-from dh2sim.inverse.nearest import goal_residuals, goal_sigma_min, miss_text, no_solutions, numeric_solutions
+from dh2sim.inverse.loop import Arm, Flags, Indices, build_arm, joint_rank, pose_and_jacobian
+from dh2sim.inverse.nearest import (
+    goal_residuals,
+    goal_sigma_min,
+    least_singular_values,
+    miss_text,
+    no_solutions,
+    numeric_solutions,
+)
 from dh2sim.inverse.numeric import NumericSolver, arm_size
 from dh2sim.inverse.reach import limits_reason, position_limits, why_unreachable
 from dh2sim.inverse.redundancy import SAMPLES, curves_and_nearest, joints_to_lock, self_motions
@@ -70,6 +77,7 @@ class InverseSolver:
         """Unit of length of residuals and singular values, m: a bound on the distance from base_link to tool0."""
         turns = np.array([row.type.turns for row in rows], dtype=np.bool_)
         self._turns = Turns(lower, upper, turns, np.where(turns, 1.0, self.size))
+        self._turning = turns
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a pickle holds: the table, and what is built."""
@@ -110,7 +118,7 @@ class InverseSolver:
 
         Returns:
             The :class:`Solutions` of one pose, or a list of those of N poses. For one pose alone branches are named,
-            families of solutions at a singularity are followed, and how far a pose is out of reach is found out.
+            and how far a pose is out of reach is found out.
 
         Raises:
             ConfigurationError: A pose is no rigid transform, ``q0`` has the wrong shape, or a joint to lock is
@@ -135,21 +143,28 @@ class InverseSolver:
             arm, scaled = method.arm, method.arm.scaled_poses(poses)
             found = method.solve(scaled, _scaled_locks(arm, locked))
             lacking = method.lacking(found, len(poses))
-            paths: list[Path] = []
-            if goals.ndim == 2:
-                found, paths = split_families(arm, scaled[0], method.moving, found)
+            found, families = split_families(arm, scaled, method.moving, found)
             results = self._results(method, found, poses, near, free, limits=limits)
             for i in np.flatnonzero(lacking):
                 results[i] = replace(results[i], complete=False, notes=(*results[i].notes, ODD))
-            if paths:
-                count = len(found.q)
-                results = [self._with_families(results[0], count, arm, paths, poses[0], near, free, limits=limits)]
+            for i, paths in families.items():
+                count = int((found.pose == i).sum())
+                results[i] = self._with_families(results[i], count, arm, paths, poses[i], near, free, limits=limits)
         if goals.ndim == 3:
             return results
         [alone] = results
         if not len(alone) and not alone.reason:
             alone = self._unreached(alone, poses[0], near, locked, free, limits=limits)
-        return replace(alone, branch=branch_names(self._chain, alone.q)) if len(alone) else alone
+        return replace(alone, branch=self._names(alone)) if len(alone) else alone
+
+    def _names(self, found: Solutions) -> tuple[str, ...]:
+        """Return the names of branches; isolated solutions that differ by whole turns have the same."""
+        if found.curves:
+            return branch_names(self._chain, found.q)
+        first = {same: k for k, same in reversed(list(enumerate(found.same.tolist())))}
+        names = branch_names(self._chain, found.q[list(first.values())])
+        named = dict(zip(first, names, strict=True))
+        return tuple(named[same] for same in found.same.tolist())
 
     def joints_to_lock(self, free: Free | None = None) -> tuple[str, ...]:
         """Return the names of the joints to lock so that solutions are isolated: none for most arms of six joints."""
@@ -170,7 +185,8 @@ class InverseSolver:
                 for pose, lock in zip(T, each, strict=True)
             ]
         solver = self._numeric_solver(locked, limits=limits)
-        return numeric_solutions(self._spec, solver, T, q0, free=free, size=self.size, rank=self._rank(free))
+        rank = self._rank(free)
+        return numeric_solutions(self._spec, self._chain, solver, T, q0, free=free, size=self.size, rank=rank)
 
     def _unreached(
         self,
@@ -332,7 +348,7 @@ class InverseSolver:
         if method.arm.goal_joints:
             true &= _first_of_equal(found.pose, q, self._turns)
         found, q, residual = found.of(true), q[true], residual[true]
-        sigma, all_q = goal_sigma_min(self._chain, q, free=free, size=self.size, rank=self._rank(free)), q
+        sigma, all_q = self._sigma_min(method.arm, found, free), q
         if limits:
             which, q = self._turns.allowed(q, q0)
         else:
@@ -343,7 +359,7 @@ class InverseSolver:
         inside = self._turns.inside(q)
         ends = np.searchsorted(pose, np.arange(len(poses) + 1))
         reasons = [""] * len(poses)
-        for k in np.setdiff1d(found.pose, pose):
+        for k in set(found.pose.tolist()).difference(pose.tolist()):
             reasons[k] = limits_reason(self._spec, self._turns.placed(all_q[found.pose == k], q0))
         first = np.searchsorted(found.pose, np.arange(len(poses)))
         complete = method.found_share == 1.0
@@ -361,6 +377,13 @@ class InverseSolver:
             )
             for i, (start, end) in enumerate(pairwise(ends))
         ]
+
+    def _sigma_min(self, arm: Arm, found: Found, free: Free | None) -> Array:
+        """Return the least singular values of the goal's Jacobian at an arm's solutions, shape (M,)."""
+        J = np.array(found.J[:, :, : len(self.names)])
+        J[:, :3, self._turning] *= arm.length / self.size
+        R = pose_and_jacobian(arm, found.q)[0][:, :, :3] if free == "roll" else None
+        return least_singular_values(J, R, free=free, rank=self._rank(free))
 
     def _arm(self, free: Free | None) -> Arm:
         if free not in self._built:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.inverse.branches import branch_name
+from dh2sim.inverse.branches import names_of_form
 from dh2sim.inverse.textbook_axes import EXACT, arm_axes, wrapped
 from dh2sim.inverse.textbook_forms import textbook_form
 from dh2sim.inverse.textbook_steps import Line, Signs, Step, Worksheet
@@ -149,10 +149,9 @@ def explain_inverse_kinematics(robot: SpecLike, T: ArrayLike) -> Explanation:
     for branch in form.solve(sheet, goal):
         q = read_only([x if joint.slides else wrapped(x) for x, joint in zip(branch.q, axes.joints, strict=True)])
         position, rotation = (float(error) for error in pose_errors(table_tool_pose(spec, q), goal))
+        [name] = names_of_form(form, q[None])
         found.append(
-            TextbookBranch(
-                q=q, name=branch_name(form, q), signs=branch.signs, position_error=position, rotation_error=rotation
-            )
+            TextbookBranch(q=q, name=name, signs=branch.signs, position_error=position, rotation_error=rotation)
         )
     small = _EXACT_ENOUGH if tolerance == EXACT else 100.0 * tolerance
     branches = tuple(b for b in found if b.position_error <= small * axes.size and b.rotation_error <= small)

@@ -19,6 +19,7 @@ from dh2sim.inverse.textbook_parts import (
     MEASURED,
     UNDETERMINED,
     FromAngle,
+    Names,
     PartialBranch,
     Shoulder,
     acos_text,
@@ -61,8 +62,8 @@ class ArmPart(Protocol):
         """Write the steps to a point in base_link, m, shape (3,), and return every way to get there."""
         ...
 
-    def names(self, q: Array, W: Array) -> tuple[str, ...]:
-        """Return the names of a configuration's branch, given where the point is, m, shape (3,), in base_link."""
+    def names(self, q: Array, W: Array) -> list[Names]:
+        """Return the names of branches, q of shape (k, n), given where the point is, m, in base_link, shape (k, 3)."""
         ...
 
 
@@ -136,12 +137,12 @@ class ElbowArm:
     def _v(self) -> str:
         return "v = z - d1" if self.d1 else "v = z"
 
-    def names(self, q: Array, W: Array) -> tuple[str, ...]:
-        """Return the names of a configuration's branch, given where the point is, m, shape (3,), in base_link."""
-        rho, _ = self.shoulder.rho(float(q[0]), W)
-        gamma = self.bend.at_zero + self.bend.sense * float(q[2])
-        ahead = rho - self.a1
-        return (*self.shoulder.name(rho), *elbow_name(gamma if ahead >= 0.0 else -gamma, ("below", "above")))
+    def names(self, q: Array, W: Array) -> list[Names]:
+        """Return the names of branches, q of shape (k, n), given where the point is, m, in base_link, shape (k, 3)."""
+        return [
+            (self.shoulder.name(rho), elbow_name(gamma if rho >= self.a1 else -gamma, ("below", "above")))
+            for rho, gamma in zip(self.shoulder.rho(q, W), self.bend.angles(q), strict=True)
+        ]
 
 
 def elbow_arm(axes: ArmAxes, W0: Array) -> ElbowArm | None:
@@ -265,10 +266,12 @@ class SphericalArm:
             found.append(PartialBranch(signs=signs, q=(q1, q2, out - self.c)))
         return found
 
-    def names(self, q: Array, W: Array) -> tuple[str, ...]:
-        """Return the names of a configuration's branch, given where the point is, m, shape (3,), in base_link."""
-        rho, _ = self.shoulder.rho(float(q[0]), W)
-        return (*self.shoulder.name(rho), *slide_name(float(q[2]) + self.c, self.shoulder.tolerance))
+    def names(self, q: Array, W: Array) -> list[Names]:
+        """Return the names of branches, q of shape (k, n), given where the point is, m, in base_link, shape (k, 3)."""
+        return [
+            (self.shoulder.name(rho), *slide_name(slide + self.c, self.shoulder.tolerance))
+            for rho, slide in zip(self.shoulder.rho(q, W), q[:, 2].tolist(), strict=True)
+        ]
 
 
 def spherical_arm(axes: ArmAxes, W0: Array) -> SphericalArm | None:
@@ -348,10 +351,10 @@ class CylindricalArm:
             found.append(PartialBranch(signs=signs, q=tuple(q)))
         return found
 
-    def names(self, q: Array, W: Array) -> tuple[str, ...]:
-        """Return the names of a configuration's branch, given where the point is, m, shape (3,), in base_link."""
+    def names(self, q: Array, W: Array) -> list[Names]:
+        """Return the names of branches, q of shape (k, n), given where the point is, m, in base_link, shape (k, 3)."""
         del W
-        return tuple(slide_name(float(q[2]) + self.c, self.shoulder.tolerance))
+        return [slide_name(slide + self.c, self.shoulder.tolerance) for slide in q[:, 2].tolist()]
 
 
 def cylindrical_arm(axes: ArmAxes, W0: Array) -> CylindricalArm | None:
@@ -410,10 +413,10 @@ class CartesianArm:
             sheet.line(f"q{i}", here - zero, METRE, sheet.length(here) + term(sheet.length(-zero)))
         return [PartialBranch(signs=(), q=tuple((along - self.at_zero).tolist()))]
 
-    def names(self, q: Array, W: Array) -> tuple[str, ...]:
+    def names(self, q: Array, W: Array) -> list[Names]:
         """Return no names: there is one branch."""
-        del q, W
-        return ()
+        del W
+        return [()] * len(q)
 
 
 def cartesian_arm(axes: ArmAxes, W0: Array) -> CartesianArm | None:

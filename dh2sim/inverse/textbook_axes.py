@@ -90,25 +90,27 @@ class ArmAxes:
         axis = self.joints[joint]
         return np.asarray(axis.point + axis.direction * float(axis.direction @ (point - axis.point)))
 
-    def motion(self, joint: int, coordinate: float) -> Array:
-        """Return how a joint, counted from 0, moves what it carries from where that is at zero, shape (4, 4).
+    def motion(self, joint: int, coordinate: float | Array) -> Array:
+        """Return how a joint, counted from 0, moves what it carries from where that is at zero, shape (..., 4, 4).
 
         Source: K. M. Lynch, F. C. Park, Modern Robotics, 2017, section 4.1.1: exp([S] q), S in the base's frame.
         """
-        axis = self.joints[joint]
-        T = np.eye(4)
+        axis, q = self.joints[joint], np.asarray(coordinate, dtype=np.float64)
+        T = np.zeros((*q.shape, 4, 4))
+        T[..., range(4), range(4)] = 1.0
         if axis.slides:
-            T[:3, 3] = coordinate * axis.direction
+            T[..., :3, 3] = q[..., None] * axis.direction
         else:
-            T[:3, :3] = rotation(axis.direction, coordinate)
-            T[:3, 3] = axis.point - T[:3, :3] @ axis.point
+            T[..., :3, :3] = rotation(axis.direction, q)
+            T[..., :3, 3] = axis.point - T[..., :3, :3] @ axis.point
         return T
 
-    def motions(self, q: Sequence[float]) -> Array:
-        """Return how the first joints together move what they carry, exp([S1] q1) … , shape (4, 4)."""
+    def motions(self, q: Sequence[float] | Array) -> Array:
+        """Return how the first joints together move what they carry, exp([S1] q1) …, for q of shape (..., m)."""
+        coordinates = np.asarray(q, dtype=np.float64)
         T = np.eye(4)
-        for joint, coordinate in enumerate(q):
-            T = T @ self.motion(joint, coordinate)
+        for joint in range(coordinates.shape[-1]):
+            T = T @ self.motion(joint, coordinates[..., joint])
         return T
 
     def base_frame(self, joint: int) -> Array:
@@ -169,12 +171,13 @@ def arm_axes(chain: KinematicChain, tolerance: float = EXACT) -> ArmAxes:
     )
 
 
-def rotation(axis: Array, angle: float) -> Array:
-    """Return the rotation by an angle, rad, about a unit vector, shape (3, 3): Rodrigues' formula."""
+def rotation(axis: Array, angle: float | Array) -> Array:
+    """Return the rotations by angles, rad, about a unit vector, shape (..., 3, 3): Rodrigues' formula."""
     x, y, z = (float(value) for value in axis)
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    half = math.sin(0.5 * angle)
-    return np.asarray(np.eye(3) + math.sin(angle) * K + 2.0 * half * half * (K @ K))
+    turned = np.asarray(angle, dtype=np.float64)[..., None, None]
+    half = np.sin(0.5 * turned)
+    return np.asarray(np.eye(3) + np.sin(turned) * K + 2.0 * half * half * (K @ K))
 
 
 def turn_about(axis: Array, one: Array, other: Array) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from dh2sim.inverse.textbook_arms import ArmPart, arm_part
 from dh2sim.inverse.textbook_axes import ArmAxes
 from dh2sim.inverse.textbook_offset_wrist import OffsetWristArm, offset_wrist_arm
-from dh2sim.inverse.textbook_parts import PartialBranch, placed_point
+from dh2sim.inverse.textbook_parts import Names, PartialBranch, placed_point
 from dh2sim.inverse.textbook_planar import PlanarArm, planar_arm
 from dh2sim.inverse.textbook_steps import Worksheet
 from dh2sim.inverse.textbook_wrists import Wrist, wrist
@@ -45,13 +45,15 @@ class TextbookArm:
             branches = self.wrist.solve(sheet, branches, T[:3, :3])
         return branches
 
-    def names(self, q: Array) -> tuple[str, ...]:
-        """Return the names of a configuration's branch."""
-        found: tuple[str, ...] = ()
+    def names(self, q: Array) -> list[Names]:
+        """Return the names of configurations' branches, q of shape (k, n)."""
+        found: list[Names] = [()] * len(q)
         if self.arm is not None:
-            T = self.axes.motions(q[:3].tolist())
-            found = self.arm.names(q, T[:3, :3] @ self.W0 + T[:3, 3])
-        return found if self.wrist is None else (*found, *self.wrist.names(q))
+            T = self.axes.motions(q[:, :3])
+            found = self.arm.names(q, T[:, :3, :3] @ self.W0 + T[:, :3, 3])
+        if self.wrist is None:
+            return found
+        return [(*arm, *hand) for arm, hand in zip(found, self.wrist.names(q), strict=True)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,9 +72,9 @@ class WholePlanarArm:
         self.planar.describe(sheet)
         return self.planar.solve_pose(sheet, T)
 
-    def names(self, q: Array) -> tuple[str, ...]:
-        """Return the names of a configuration's branch."""
-        return self.planar.names(q, np.zeros(3))
+    def names(self, q: Array) -> list[Names]:
+        """Return the names of configurations' branches, q of shape (k, n)."""
+        return self.planar.names(q, np.zeros((len(q), 3)))
 
 
 TextbookForm: TypeAlias = TextbookArm | WholePlanarArm | OffsetWristArm

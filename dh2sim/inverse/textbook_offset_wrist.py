@@ -15,6 +15,7 @@ import numpy as np
 from dh2sim.inverse.textbook_axes import ArmAxes, norm, rotation, turn_about, wrapped
 from dh2sim.inverse.textbook_parts import (
     FromAngle,
+    Names,
     PartialBranch,
     Shoulder,
     acos_text,
@@ -208,21 +209,26 @@ class OffsetWristArm:
             found.append(PartialBranch(signs=signs, q=(q1, q2, q3, q4, q5, q6)))
         return found
 
-    def names(self, q: Array) -> tuple[str, ...]:
-        """Return the names of a configuration's branch."""
-        T = self.axes.motions(q[:5].tolist())
-        W = T[:3, :3] @ self.W0 + T[:3, 3]
-        rho, _ = self.shoulder.rho(float(q[0]), W)
-        T3 = self.axes.motions(q[:3].tolist())
-        P4 = T3[:3, :3] @ self.axes.joints[3].point + T3[:3, 3]
-        ahead = self.shoulder.rho(float(q[0]), P4)[0] - self.a1
-        gamma = self.bend.at_zero + self.bend.sense * float(q[2])
-        sine = self.outwards * math.sin(self.tilt.at_zero + self.tilt.sense * float(q[4]))
-        return (
-            *self.shoulder.name(rho),
-            *elbow_name(gamma if ahead >= 0.0 else -gamma, ("below", "above")),
-            wrist_name(sine),
-        )
+    def names(self, q: Array) -> list[Names]:
+        """Return the names of configurations' branches, q of shape (k, n)."""
+        T3 = self.axes.motions(q[:, :3])
+        P4 = T3[:, :3, :3] @ self.axes.joints[3].point + T3[:, :3, 3]
+        T4 = T3 @ self.axes.motion(3, q[:, 3])
+        W = T4[:, :3, :3] @ self.W0 + T4[:, :3, 3]  # joint 5 does not move it
+        return [
+            (
+                self.shoulder.name(rho),
+                elbow_name(gamma if ahead >= self.a1 else -gamma, ("below", "above")),
+                wrist_name(self.outwards * math.sin(tilt)),
+            )
+            for rho, ahead, gamma, tilt in zip(
+                self.shoulder.rho(q, W),
+                self.shoulder.rho(q, P4),
+                self.bend.angles(q),
+                self.tilt.angles(q),
+                strict=True,
+            )
+        ]
 
 
 def offset_wrist_arm(axes: ArmAxes) -> OffsetWristArm | None:

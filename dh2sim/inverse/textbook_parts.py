@@ -9,9 +9,8 @@ Lengths and angles are measured on the mechanism at zero: no letter depends on w
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -28,6 +27,10 @@ _STRAIGHT: Final = 1e-6
 """Sine of a bend, or share of the arm's size, within which it is none: double solutions are known to about 1e-8."""
 UNDETERMINED: Final = 1e-11
 """Share of the arm's size, within which a point is on an axis."""
+
+
+Names: TypeAlias = tuple[str, ...]
+"""What the parts of one configuration's branch are called."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +111,11 @@ class FromAngle:
             return f"q{self.joint} = -{self.letter}"
         parts = (self.letter, f"{self.letter}0") if self.sense == 1 else (f"{self.letter}0", self.letter)
         return f"q{self.joint} = {parts[0]} - {parts[1]}"
+
+    def angles(self, q: Array) -> list[float]:
+        """Return the angle, rad, in joint vectors of shape (k, n)."""
+        angles: list[float] = (self.at_zero + self.sense * q[:, self.joint - 1]).tolist()
+        return angles
 
     def describe(self, sheet: Worksheet) -> None:
         """Write what the angle is at zero, where it is not zero."""
@@ -216,27 +224,27 @@ class Shoulder:
             ways.append((signs, plane.write(sheet, angle, text, signs), rho, float(z)))
         return ways
 
-    def rho(self, q1: float, W: Array) -> tuple[float, float]:
-        """Return where a point in base_link is in the plane: along f and along z, m."""
-        x, y, z = self.T_base_link_arm[:3, :3].T @ (W - self.T_base_link_arm[:3, 3])
-        angle = self.azimuth.at_zero + self.azimuth.sense * q1
-        return float(x * math.cos(angle) + y * math.sin(angle)), float(z)
+    def rho(self, q: Array, W: Array) -> list[float]:
+        """Return where points in base_link, shape (k, 3), are along f in configurations of shape (k, n), m."""
+        x, y, _ = ((W - self.T_base_link_arm[:3, 3]) @ self.T_base_link_arm[:3, :3]).T
+        angle = self.azimuth.at_zero + self.azimuth.sense * q[:, self.azimuth.joint - 1]
+        along: list[float] = (x * np.cos(angle) + y * np.sin(angle)).tolist()
+        return along
 
-    def name(self, rho: float) -> Iterator[str]:
-        """Yield the shoulder's name, given the point's coordinate along f, m.
+    def name(self, rho: float) -> str:
+        """Return the shoulder's name, given the point's coordinate along f, m.
 
         Seen from the base towards the point: the arm beside axis 1 is its left or right one. Where the plane holds
         axis 1, the arm reaches to its front or over its back, if joint 2 is before the axis; else axis 2 points
         left or right.
         """
         if abs(rho) <= _STRAIGHT * self.size:
-            yield "shoulder singular"
-        elif abs(self.offset) > self.tolerance:
-            yield "left" if rho * self.offset > 0.0 else "right"
-        elif abs(self.front) > self.tolerance:
-            yield "front" if rho * self.front > 0.0 else "back"
-        else:
-            yield "left" if rho * self.sense > 0.0 else "right"
+            return "shoulder singular"
+        if abs(self.offset) > self.tolerance:
+            return "left" if rho * self.offset > 0.0 else "right"
+        if abs(self.front) > self.tolerance:
+            return "front" if rho * self.front > 0.0 else "back"
+        return "left" if rho * self.sense > 0.0 else "right"
 
 
 def law_of_cosines(
@@ -301,12 +309,11 @@ def first_link_angle(
     return math.atan2(across, along) - math.atan2(opposite, adjacent), text
 
 
-def elbow_name(bend: float, names: tuple[str, str]) -> Iterator[str]:
-    """Yield the name of a bend, rad, for its positive and negative side, or that it is straight or folded."""
+def elbow_name(bend: float, names: tuple[str, str]) -> str:
+    """Return the name of a bend, rad, for its positive and negative side, or that it is straight or folded."""
     if abs(math.sin(bend)) > _STRAIGHT:
-        yield names[0] if math.sin(bend) > 0.0 else names[1]
-    else:
-        yield "elbow straight" if math.cos(bend) > 0.0 else "elbow folded"
+        return names[0] if math.sin(bend) > 0.0 else names[1]
+    return "elbow straight" if math.cos(bend) > 0.0 else "elbow folded"
 
 
 def wrist_name(sine: float) -> str:
@@ -348,7 +355,6 @@ def length_of(axes: ArmAxes, value: float) -> float:
     return 0.0 if abs(value) <= 1e-12 * axes.size else value
 
 
-def slide_name(out: float, tolerance: float) -> Iterator[str]:
-    """Yield the name of a slide's branch, given how far it is pulled out, m."""
-    if abs(out) > tolerance:
-        yield "slide out" if out > 0.0 else "slide back"
+def slide_name(out: float, tolerance: float) -> Names:
+    """Return the name of a slide's branch, if it has one, given how far it is pulled out, m."""
+    return () if abs(out) <= tolerance else ("slide out",) if out > 0.0 else ("slide back",)

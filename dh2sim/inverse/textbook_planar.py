@@ -14,6 +14,7 @@ import numpy as np
 from dh2sim.inverse.textbook_axes import ArmAxes, norm, wrapped
 from dh2sim.inverse.textbook_parts import (
     FromAngle,
+    Names,
     PartialBranch,
     acos_text,
     elbow_name,
@@ -146,10 +147,10 @@ class PlanarArm:
             whole.append(PartialBranch(signs=branch.signs, q=tuple(q[joint] for joint in sorted(q))))
         return whole
 
-    def names(self, q: Array, W: Array) -> tuple[str, ...]:  # noqa: ARG002
-        """Return the names of a configuration's branch: where the elbow is, seen from the base towards the point."""
-        bend = self.bend.at_zero + self.bend.sense * float(q[self.turns[1]])
-        return tuple(elbow_name(bend, ("elbow down", "elbow up") if self.slide is None else ("right", "left")))
+    def names(self, q: Array, W: Array) -> list[Names]:  # noqa: ARG002
+        """Return the names of configurations' branches: where the elbow is, seen from the base towards the point."""
+        names = ("elbow down", "elbow up") if self.slide is None else ("right", "left")
+        return [(elbow_name(bend, names),) for bend in self.bend.angles(q)]
 
 
 def _minus(sense: int) -> str:

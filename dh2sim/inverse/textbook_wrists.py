@@ -14,7 +14,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from dh2sim.inverse.textbook_axes import ArmAxes, rotation, turn_about
-from dh2sim.inverse.textbook_parts import FromAngle, PartialBranch, from_angle, with_signs, wrist_name
+from dh2sim.inverse.textbook_parts import FromAngle, Names, PartialBranch, from_angle, with_signs, wrist_name
 from dh2sim.inverse.textbook_steps import RAD, Signs, Worksheet, number
 from dh2sim.typing import Array
 
@@ -43,9 +43,9 @@ class Wrist:
         """Write the steps to a rotation of tool0, shape (3, 3), and return every way to get there."""
         raise NotImplementedError
 
-    def names(self, q: Array) -> tuple[str, ...]:  # noqa: ARG002
-        """Return the names of a configuration's branch."""
-        return ()
+    def names(self, q: Array) -> list[Names]:
+        """Return the names of configurations' branches, q of shape (k, n)."""
+        return [()] * len(q)
 
 
 def _entries(sheet: Worksheet, E: Array, places: tuple[tuple[int, int], ...], signs: Signs) -> None:
@@ -113,10 +113,9 @@ class SphericalWrist(Wrist):
                 found.append(PartialBranch(signs=signs, q=(*branch.q, first, second, third)))
         return found
 
-    def names(self, q: Array) -> tuple[str, ...]:
-        """Return the names of a configuration's branch: which way the middle joint bends the stretched wrist."""
-        sine = self.outwards * math.sin(self.bend.at_zero + float(q[self.first + 1]))
-        return (wrist_name(sine),)
+    def names(self, q: Array) -> list[Names]:
+        """Return the names of configurations' branches: which way the middle joint bends the stretched wrist."""
+        return [(wrist_name(self.outwards * math.sin(bend)),) for bend in self.bend.angles(q)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -119,13 +119,17 @@ def row_matrix(row: Row, q: Array) -> Array:
         Shape (4, 4, N).
     """
     coordinate = -q if row.flip else q
-    theta = row.theta + coordinate if row.type.turns else np.full(q.shape, row.theta)
-    d = row.d + coordinate if row.type.moves and not row.type.turns else np.full(q.shape, row.d)
+    theta = row.theta + coordinate if row.type.turns else np.asarray(row.theta)
+    d = row.d + coordinate if row.type.moves and not row.type.turns else np.asarray(row.d)
     ct, st = np.cos(theta), np.sin(theta)
     ca, sa, cb, sb = (np.asarray(f(angle)) for angle in (row.alpha, row.beta) for f in (math.cos, math.sin))
-    zero, one, a = np.zeros(q.shape), np.ones(q.shape), np.full(q.shape, row.a)
-    matrix = _entries(row.convention, (ct, st), (ca, sa), (cb, sb), a, d, zero, one)
-    return np.array([*matrix, [zero, zero, zero, one]])
+    zero, one, a = np.asarray(0.0), np.asarray(1.0), np.asarray(row.a)
+    matrix = np.zeros((4, 4, *q.shape))
+    matrix[3, 3] = 1.0
+    for i, entries in enumerate(_entries(row.convention, (ct, st), (ca, sa), (cb, sb), a, d, zero, one)):
+        for k, entry in enumerate(entries):
+            matrix[i, k] = entry
+    return matrix
 
 
 def _entries(

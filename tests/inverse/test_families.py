@@ -66,3 +66,19 @@ def test_a_straight_elbow_and_a_wrist_in_line_are_one_curve_and_no_point_of_it_b
 def test_a_wrist_alone_has_a_wrist_singularity() -> None:
     solutions = solved("spherical_wrist", [0.4, 0.0, 0.3])
     assert [curve.kind for curve in solutions.curves] == ["wrist singularity"]
+
+
+def test_in_a_batch_of_poses_each_has_the_curves_that_it_has_alone() -> None:
+    spec = robot("puma560")
+    q = np.array([[0.3, -0.6, 0.5, 0.9, 0.0, -0.4], [0.3, -0.6, 0.5, 0.9, 0.7, -0.4], [-0.5, 0.2, 0.9, 0.1, 0.0, 0.8]])
+    T = table_tool_pose(spec, q)
+    solver = InverseSolver(spec)
+    together = solver.solve(T, limits=False)
+    assert [len(solutions.curves) for solutions in together] == [1, 0, 1]
+    for pose, solutions in zip(T, together, strict=True):
+        alone = solver.solve(pose, limits=False)
+        assert solutions.notes == alone.notes
+        np.testing.assert_allclose(solutions.q, alone.q, rtol=0.0, atol=1e-9)
+        for curve, other in zip(solutions.curves, alone.curves, strict=True):
+            assert (curve.kind, curve.closed) == (other.kind, other.closed) == ("wrist singularity", True)
+            np.testing.assert_allclose(curve.q, other.q, rtol=0.0, atol=1e-9)

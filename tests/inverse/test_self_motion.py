@@ -10,7 +10,7 @@ import pytest
 
 from dh2sim.inverse.loop import build_arm
 from dh2sim.inverse.redundancy import joints_to_lock
-from dh2sim.inverse.self_motion import Path, inside
+from dh2sim.inverse.self_motion import Path, inside, lies_on
 from dh2sim.inverse.solutions import Curve, Solutions
 from dh2sim.inverse.solver import inverse_kinematics
 from dh2sim.kinematics.chain import build_chain
@@ -53,6 +53,14 @@ def test_every_solution_with_a_joint_locked_lies_on_a_closed_curve(name: str) ->
     for value in (-1.234, 0.4321, 2.0123):
         for other in inverse_kinematics(spec, T, lock={model(name).moving_joints[-1].name: value}, limits=False):
             assert min(apart(other, curve) for curve in answer.curves) <= 0.06
+
+
+@pytest.mark.parametrize("angle", [0.3, 6.27, -0.02, 0.0])
+def test_a_closed_curve_holds_the_points_between_its_last_and_its_first(angle: float) -> None:
+    circle = np.linspace(0.0, 2.0 * math.pi, 150, endpoint=False)[:, None] * [1.0, 0.0, -1.0]
+    turns = np.ones(3, dtype=np.bool_)
+    assert lies_on(circle, angle * np.array([1.0, 0.0, -1.0]), turns, closed=True)
+    assert not lies_on(circle, angle * np.array([1.0, 0.0, -1.0]) + [0.0, 0.02, 0.0], turns, closed=True)
 
 
 def test_no_curve_is_returned_twice() -> None:
