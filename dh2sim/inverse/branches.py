@@ -37,7 +37,8 @@ def branch_names(robot: ChainLike, q: ArrayLike) -> tuple[str, ...]:
         return ("",) * len(vectors)
     # rounded, so that those that differ by whole turns have the same name
     turns = np.array([joint.type.turns for joint in chain.moving_joints])
-    return names_of_form(form, np.round(np.where(turns, np.mod(vectors, 2.0 * np.pi), vectors), 12))
+    places = np.where(turns, np.mod(vectors, 2.0 * np.pi), vectors)
+    return names_of_form(form, np.asarray(np.round(places, 12), dtype=np.float64))
 
 
 @lru_cache(maxsize=32)

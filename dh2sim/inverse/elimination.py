@@ -173,9 +173,7 @@ class Method:
             (regular % 2 == 1) & (regular == all_of_them) & (bool(self.eliminations) and not self.virtual)
         )
 
-    def _ill(
-        self, again: Indices, found: Found, T: Array, locked: Mapping[int, Array], *, last: bool
-    ) -> Indices:
+    def _ill(self, again: Indices, found: Found, T: Array, locked: Mapping[int, Array], *, last: bool) -> Indices:
         """Return doubtful poses, without those that are well-conditioned and have no solution: out of reach.
 
         Nor are those searched at the last that have singular solutions where an elimination is well-conditioned:

@@ -106,7 +106,7 @@ class _Curve:
         return np.asarray(directions[-1])
 
     def _direction(self, J: Array, before: Array) -> Array:
-        """Return the unit vector along the curve, given the Jacobian of the joints that move: the one that goes on."""
+        """Return the unit vector along the curve that goes on, given the Jacobian of the joints that move."""
         null = _null_space(J)
         direction = np.zeros(len(before))
         direction[self._moving] = null.T @ (null @ before[self._moving])

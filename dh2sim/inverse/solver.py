@@ -147,9 +147,9 @@ class InverseSolver:
             results = self._results(method, found, poses, near, free, limits=limits)
             for i in np.flatnonzero(lacking):
                 results[i] = replace(results[i], complete=False, notes=(*results[i].notes, ODD))
-            for i, paths in families.items():
-                count = int((found.pose == i).sum())
-                results[i] = self._with_families(results[i], count, arm, paths, poses[i], near, free, limits=limits)
+            for k, paths in families.items():
+                count = int((found.pose == k).sum())
+                results[k] = self._with_families(results[k], count, arm, paths, poses[k], near, free, limits=limits)
         if goals.ndim == 3:
             return results
         [alone] = results

@@ -63,7 +63,7 @@ class ArmPart(Protocol):
         ...
 
     def names(self, q: Array, W: Array) -> list[Names]:
-        """Return the names of branches, q of shape (k, n), given where the point is, m, in base_link, shape (k, 3)."""
+        """Return the names of branches, q of shape (k, n), given the point in base_link, m, shape (k, 3)."""
         ...
 
 
@@ -138,7 +138,7 @@ class ElbowArm:
         return "v = z - d1" if self.d1 else "v = z"
 
     def names(self, q: Array, W: Array) -> list[Names]:
-        """Return the names of branches, q of shape (k, n), given where the point is, m, in base_link, shape (k, 3)."""
+        """Return the names of branches, q of shape (k, n), given the point in base_link, m, shape (k, 3)."""
         return [
             (self.shoulder.name(rho), elbow_name(gamma if rho >= self.a1 else -gamma, ("below", "above")))
             for rho, gamma in zip(self.shoulder.rho(q, W), self.bend.angles(q), strict=True)
@@ -267,7 +267,7 @@ class SphericalArm:
         return found
 
     def names(self, q: Array, W: Array) -> list[Names]:
-        """Return the names of branches, q of shape (k, n), given where the point is, m, in base_link, shape (k, 3)."""
+        """Return the names of branches, q of shape (k, n), given the point in base_link, m, shape (k, 3)."""
         return [
             (self.shoulder.name(rho), *slide_name(slide + self.c, self.shoulder.tolerance))
             for rho, slide in zip(self.shoulder.rho(q, W), q[:, 2].tolist(), strict=True)
@@ -352,7 +352,7 @@ class CylindricalArm:
         return found
 
     def names(self, q: Array, W: Array) -> list[Names]:
-        """Return the names of branches, q of shape (k, n), given where the point is, m, in base_link, shape (k, 3)."""
+        """Return the names of branches, q of shape (k, n), given the point in base_link, m, shape (k, 3)."""
         del W
         return [slide_name(slide + self.c, self.shoulder.tolerance) for slide in q[:, 2].tolist()]
 

@@ -70,7 +70,8 @@ def test_a_wrist_alone_has_a_wrist_singularity() -> None:
 
 def test_in_a_batch_of_poses_each_has_the_curves_that_it_has_alone() -> None:
     spec = robot("puma560")
-    q = np.array([[0.3, -0.6, 0.5, 0.9, 0.0, -0.4], [0.3, -0.6, 0.5, 0.9, 0.7, -0.4], [-0.5, 0.2, 0.9, 0.1, 0.0, 0.8]])
+    in_line, bent = [0.3, -0.6, 0.5, 0.9, 0.0, -0.4], [0.3, -0.6, 0.5, 0.9, 0.7, -0.4]
+    q = np.array([in_line, bent, [-0.5, 0.2, 0.9, 0.1, 0.0, 0.8]])
     T = table_tool_pose(spec, q)
     solver = InverseSolver(spec)
     together = solver.solve(T, limits=False)
