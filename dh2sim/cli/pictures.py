@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import build_all, refuse_options
+from dh2sim.cli.common import build_any, refuse_options
 from dh2sim.cli.output import progress_bar
 from dh2sim.errors import PictureError
 from dh2sim.messages import printable
@@ -111,7 +111,7 @@ def render(
         data = open_rollout(Path(source), number)
         motion, summary = motion_of_run(data), data.label
     else:
-        [robot] = build_all([source])
+        [robot] = build_any([source])
         data, motion, summary = None, motion_of_robot(robot, configuration), robot.name
     if video:
         count = len(video_positions(motion, rate))

@@ -16,9 +16,9 @@ def list_robots(
         bool, typer.Option("--json", help="Print JSON alone: a list with an object for each robot.")
     ] = False,
 ) -> None:
-    """List the robots that come with dh2sim, by kind: name, moving joints, and what they are.
+    """List the robots and mechanisms that come with dh2sim, by kind: name, moving joints, and what they are.
 
-    R is a revolute joint, P a prismatic one.
+    R is a revolute joint, P a prismatic one, 21R are twenty-one.
 
     \b
     Examples:
@@ -26,9 +26,9 @@ def list_robots(
       dh2sim list --json
       dh2sim info scara
     """
-    from dh2sim.robot.catalog import summaries
+    from dh2sim.robot.catalog import mechanism_summaries, summaries
 
-    robots = list(summaries())
+    robots = [*summaries(), *mechanism_summaries()]
     if as_json:
         print(json_text([asdict(robot) for robot in robots]))
         return
@@ -39,8 +39,15 @@ def list_robots(
             print()
         print(f"{group.capitalize()}s")
         for robot in members:
-            start = f"  {robot.name:{width}}  {robot.joints:7}  "
+            start = f"  {robot.name:{width}}  {_joints(robot.joints):7}  "
             print(textwrap.fill(robot.description, 80, initial_indent=start, subsequent_indent=" " * len(start)))
+
+
+def _joints(letters: str) -> str:
+    """Return the letters of joints, or how many there are of each where that is shorter."""
+    if len(letters) <= 7:
+        return letters
+    return "".join(f"{letters.count(kind)}{kind}" for kind in "RP" if kind in letters)
 
 
 def schema() -> None:

@@ -16,6 +16,7 @@ from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:
     from dh2sim.draw.rollout_data import RolloutData
+    from dh2sim.model.mechanism import MechanismModel
     from dh2sim.model.robot_model import RobotModel
 
 MOST_POSES = 600
@@ -100,17 +101,22 @@ def motion_of_run(rollout: RolloutData) -> Motion:
     return Motion(model=model, qpos=read_only(qpos), time=read_only(rollout.values("time")))
 
 
-def motion_of_robot(robot: RobotModel, configuration: str | None = None) -> Motion:
-    """Return a robot at rest in one of its configurations; by default at home.
+def motion_of_robot(robot: RobotModel | MechanismModel, configuration: str | None = None) -> Motion:
+    """Return a robot or a mechanism at rest in one of its configurations; by default at home.
 
     Raises:
         PictureError: it has no configuration of that name.
+        AssemblyError: the mechanism's loops cannot be closed at that one.
     """
+    from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
     from dh2sim.formats.mjcf.scene import to_scene
     from dh2sim.formats.mjcf.write import to_mjcf
+    from dh2sim.model.mechanism import MechanismModel
 
-    configurations = robot.spec.named_configurations
-    q = configurations.get("home" if configuration is None else configuration)
+    mechanism = robot if isinstance(robot, MechanismModel) else None
+    configurations = robot.spec.named_configurations if mechanism is None else mechanism.configurations()
+    name = "home" if configuration is None else configuration
+    q = configurations.get(name)
     if q is None:
         hint = did_you_mean(str(configuration), configurations)
         raise PictureError(
@@ -118,10 +124,13 @@ def motion_of_robot(robot: RobotModel, configuration: str | None = None) -> Moti
             f"{listed(configurations)}"
         )
     meshes = {link.mesh.file_name: link.mesh.data for link in robot.all_links if link.mesh is not None}
-    assets = {f"{robot.name}.xml": to_mjcf(robot).encode(), **meshes}
+    mjcf = to_mechanism_mjcf(robot) if isinstance(robot, MechanismModel) else to_mjcf(robot)
+    assets = {f"{robot.name}.xml": mjcf.encode(), **meshes}
     try:
         with mujoco_warnings():
             model = mujoco.MjModel.from_xml_string(to_scene(robot), assets)
     except ValueError as error:
         raise PictureError(f"{robot.name}: MuJoCo refuses the model: {' '.join(str(error).split())}") from error
+    if mechanism is not None:
+        q = np.array(model.key(name).qpos)  # which has the coordinates of bodies that stand for closures, too
     return Motion(model=model, qpos=read_only(np.asarray(q)[None, :]), time=read_only([0.0]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -16,6 +17,7 @@ from dh2sim.kinematics.tree import BASE, KinematicTree, body_poses
 from dh2sim.model.build import build_model
 from dh2sim.model.collision_exclusions import ExcludedPair, Reason
 from dh2sim.model.robot_model import FilledIn, JointModel, LinkModel, RobotModel
+from dh2sim.model.shapes import Shape, ShapeKind, ShapePart, between, neat
 from dh2sim.robot.spec import ActuatorType, BaseSpec, RobotSpec, Row, ToolSpec
 from dh2sim.typing import Array, read_only
 
@@ -182,8 +184,44 @@ def build_mechanism(robot: SpecLike) -> MechanismModel:
         links = tuple(_renamed(link, name) for link in part.links)
         branches.append(BranchModel(name=name, body=body, T_body_dh0=T_body_dh0, links=links, joints=tuple(joints)))
         first += len(branch.rows)
+    main = replace(
+        main,
+        base=_reaching(main.base, tree, BASE),
+        links=tuple(_reaching(link, tree, body) for body, link in enumerate(main.links)),
+    )
+    first = len(main.links)
+    for k, branch in enumerate(branches):
+        links = tuple(_reaching(link, tree, body) for body, link in enumerate(branch.links, start=first))
+        branches[k] = replace(branch, links=links)
+        first += len(links)
     built = MechanismModel(spec=spec, tree=tree, q=q, main=main, branches=tuple(branches), excluded=())
     return replace(built, excluded=_excluded(built))
+
+
+STRUT = 0.012
+"""Radius, in sizes of the mechanism, of the struts that hold what is off a chain."""
+
+
+def _reaching(link: LinkModel, tree: KinematicTree, body: int) -> LinkModel:
+    """Return a link with struts to where branches start from it and closures hold it; they are only shown.
+
+    Each goes from the nearest frame of the link's own chain.
+    """
+    chain = link.name.rpartition("/")[0]
+    own = {name: f for name, f in tree.frames.items() if f.body == body and name.rpartition("/")[0] == chain}
+    reached = [own["tool0"]] if "tool0" in own else own.values()  # the last link is drawn to tool0, not to its frame
+    near = [read_only([0.0, 0.0, 0.0]), *(frame.T_body_frame[:3, 3] for frame in reached)]
+    held = [tree.frame(frame) for closure in tree.closures for frame in (closure.a, closure.b)]
+    starts = [frame for name, frame in tree.frames.items() if name.endswith("/dh_0")]
+    size = mechanism_size(tree)
+    struts: list[Shape] = []
+    for frame in (*held, *starts):
+        end = frame.T_body_frame[:3, 3]
+        start = min(near, key=lambda point: math.dist(point, end))
+        if frame.body == body and math.dist(start, end) > STRUT * size:
+            struts.append(between(ShapeKind.CAPSULE, ShapePart.TRIM, neat(STRUT * size), start, end))
+            near.append(end)
+    return replace(link, shapes=(*link.shapes, *struts))
 
 
 def _chain(spec: RobotSpec, name: str, rows: tuple[Row, ...], q: Array, start: int, *, main: bool) -> RobotModel:

@@ -65,6 +65,8 @@ def builtin_group(name: str, text: str) -> str | None:
     path = builtin_path(name)
     if path is None or path.read_text(encoding="utf-8") != text:
         return None
+    if path.parent.name == _MECHANISMS:
+        return "mechanism"
     return next((group for group, names in builtin_groups().items() if name in names), None)
 
 
@@ -78,20 +80,38 @@ def summaries() -> Iterator[Summary]:
             yield _summary(_folder() / f"{name}.yaml", group)
 
 
+def mechanism_summaries() -> Iterator[Summary]:
+    """Yield the summary of every mechanism that comes with dh2sim, by name; its joints are those of all chains."""
+    for name in builtin_mechanisms():
+        yield _summary(_folder() / _MECHANISMS / f"{name}.yaml", "mechanism")
+
+
 def _summary(path: Path, group: str) -> Summary:
     root = compose(path.read_text(encoding="utf-8"), Report(path.name))
-    rows = root.at("joints")
-    assert rows is not None and isinstance(rows.value, list), path  # noqa: PT018
-    types = [_text(row, "type") for row in rows.value]
+    branches = root.at("branches")
+    chains = [root, *_entries(branches)]
+    rows = [row for chain in chains for row in _rows(chain)]
+    types = [_text(row, "type") for row in rows]
     common = _text(root, "convention")
     return Summary(
         name=_text(root, "name"),
         group=group,
         joints="".join("P" if kind == "prismatic" else "R" for kind in types if kind != "fixed"),
-        conventions=tuple(dict.fromkeys(_text(row, "convention") or common for row in rows.value)),
+        conventions=tuple(dict.fromkeys(_text(row, "convention") or common for row in rows)),
         description=" ".join(_text(root, "description").split()),
         source=" ".join(_text(root, "source").split()),
     )
+
+
+def _entries(mapping: Node | None) -> list[Node]:
+    found = None if mapping is None else mapping.value
+    return [entry.value for entry in found.values()] if isinstance(found, dict) else []
+
+
+def _rows(chain: Node) -> list[Node]:
+    rows = chain.at("joints")
+    assert rows is not None and isinstance(rows.value, list), chain  # noqa: PT018
+    return rows.value
 
 
 def _text(node: Node, key: str) -> str:

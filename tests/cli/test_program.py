@@ -14,7 +14,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from dh2sim.robot.catalog import builtin_groups, builtin_robots
+from dh2sim.robot.catalog import builtin_groups, builtin_mechanisms, builtin_robots
 from tests.program import Outcome, dh2sim, dh2sim_process, environment, shell
 from tests.robot_files import small, write
 
@@ -181,9 +181,9 @@ def test_list_names_every_robot_with_its_joints_below_its_kind() -> None:
     run = dh2sim("list")
     assert (run.status, run.err) == (0, "")
     groups = [block.splitlines() for block in run.out.split("\n\n")]
-    assert [group[0] for group in groups] == [f"{group.capitalize()}s" for group in builtin_groups()]
+    assert [group[0] for group in groups] == [f"{group.capitalize()}s" for group in (*builtin_groups(), "mechanism")]
     names = [[line.split()[0] for line in lines if line[2] != " "] for _, *lines in groups]
-    assert [tuple(group) for group in names] == list(builtin_groups().values())
+    assert [tuple(group) for group in names] == [*builtin_groups().values(), builtin_mechanisms()]
     assert "  ur5e          RRRRRR   Universal Robots UR5e, six turning joints\n" in run.out
     assert max(len(line) for line in run.out.splitlines()) <= 80
 
@@ -192,7 +192,7 @@ def test_list_prints_json_alone() -> None:
     run = dh2sim("list", "--json")
     assert (run.status, run.err) == (0, "")
     robots = json.loads(run.out)
-    assert sorted(robot["name"] for robot in robots) == list(builtin_robots())
+    assert sorted(robot["name"] for robot in robots) == sorted([*builtin_robots(), *builtin_mechanisms()])
     [stanford] = [robot for robot in robots if robot["name"] == "stanford"]
     assert stanford.pop("source").startswith("Table and d1, d2, d6: course slides")
     assert stanford == {

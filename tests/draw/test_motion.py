@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import mujoco
@@ -9,6 +10,7 @@ import pytest
 from dh2sim.draw.motion import MOST_POSES, Motion, motion_of_robot, motion_of_run
 from dh2sim.errors import PictureError
 from dh2sim.model.build import build_model
+from dh2sim.model.mechanism import build_mechanism
 from dh2sim.robot.read import load_robot
 from dh2sim.typing import read_only
 from tests.draw.datasets import STEPS, arm, rollout, stopped, swinging
@@ -117,3 +119,14 @@ def test_poses_of_a_long_motion_are_sampled_from_its_first_to_its_last() -> None
     assert clock(0.0, 0.1, 0.2).sampled() == [0, 1, 2]
     sampled = clock(*np.arange(5000.0)).sampled()
     assert (len(sampled), sampled[0], sampled[-1]) == (MOST_POSES, 0, 4999)
+
+
+def test_a_mechanism_is_shown_with_its_loops_closed() -> None:
+    mechanism = build_mechanism(load_robot("five_bar"))
+    shown = motion_of_robot(mechanism)
+    data = mujoco.MjData(shown.model)
+    shown.place(data, 0)
+    ends = [data.site(name).xpos for name in ("dh_2", "right/dh_2")]
+    assert math.dist(*ends) < 1e-12
+    with pytest.raises(PictureError, match="five_bar has no configuration 'hme'. Did you mean 'home'?"):
+        motion_of_robot(mechanism, "hme")

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from dh2sim.robot.catalog import builtin_group, builtin_groups, builtin_robots, summaries
+from dh2sim.robot.catalog import (
+    builtin_group,
+    builtin_groups,
+    builtin_mechanisms,
+    builtin_robots,
+    mechanism_summaries,
+    summaries,
+)
 from dh2sim.robot.read import load_robot
 
 
 def test_what_the_list_says_of_a_robot_is_what_its_file_says() -> None:
-    found = list(summaries())
+    found = [*summaries(), *mechanism_summaries()]
+    groups = {**builtin_groups(), "mechanism": builtin_mechanisms()}
     assert [(summary.group, summary.name) for summary in found] == [
-        (group, name) for group, names in builtin_groups().items() for name in names
+        (group, name) for group, names in groups.items() for name in names
     ]
     for summary in found:
         spec = load_robot(summary.name)
         assert summary.joints == "".join("R" if row.type.turns else "P" for row in spec.moving_rows)
-        assert summary.conventions == tuple(dict.fromkeys(row.convention.value for row in spec.rows))
+        assert summary.conventions == tuple(dict.fromkeys(row.convention.value for row in spec.all_rows))
         assert summary.description == " ".join(spec.description.split())
         assert summary.source == " ".join(spec.source.split())
 
