@@ -2,7 +2,8 @@
 
 import signal
 
-signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback of Python's own until ``main`` handles signals
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not where whoever started it has it ignored
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback of Python's own until ``main`` handles signals
 
 from dh2sim.cli.main import main  # noqa: E402
 
