@@ -29,6 +29,7 @@ COMMANDS = (
     "trajectory",
     "workspace",
     "symbolic",
+    "mobility",
     "info",
     "view",
     "import",
@@ -245,7 +246,8 @@ def test_shells_complete_commands_options_robots_and_robot_files(tmp_path: Path)
     assert _completions("dh2sim fk --ra", tmp_path) == ["--radians"]
     robots = ["stanford", "stanford_shoulder_origin", "staubli_tx2_60"]
     assert _completions("dh2sim fk sta", tmp_path) == [*robots, "stall.yaml"]
-    assert _completions("dh2sim export rpr st", tmp_path) == [*robots, "stall.yaml", "stock/"]
+    mechanisms = ["stewart", "stretched_four_bar"]
+    assert _completions("dh2sim export rpr st", tmp_path) == [*robots, *mechanisms, "stall.yaml", "stock/"]
     assert _completions("dh2sim info stock/", tmp_path) == ["stock/arm.yml"]
     assert _completions("dh2sim info missing/", tmp_path) == []
     assert _completions("dh2sim new arm --from sca", tmp_path) == ["scara"]

@@ -128,5 +128,5 @@ def test_a_mechanism_is_shown_with_its_loops_closed() -> None:
     shown.place(data, 0)
     ends = [data.site(name).xpos for name in ("dh_2", "right/dh_2")]
     assert math.dist(*ends) < 1e-12
-    with pytest.raises(PictureError, match="five_bar has no configuration 'hme'. Did you mean 'home'?"):
+    with pytest.raises(PictureError, match=r"five_bar has no configuration 'hme'. Did you mean 'home'?"):
         motion_of_robot(mechanism, "hme")
