@@ -175,13 +175,13 @@ def build_mechanism(robot: SpecLike) -> MechanismModel:
     first = len(spec.rows)
     for name, branch in spec.branches.items():
         start = sum(joint.type.moves for joint in tree.joints[:first])
-        part = _chain(spec, name, branch.rows, q, start, main=False)
+        chain = _chain(spec, name, branch.rows, q, start, main=False)
         joints = [
             replace(joint, T_parent_joint=tree.joints[first + k].T_parent_joint)
-            for k, joint in enumerate(part.joints)
+            for k, joint in enumerate(chain.joints)
         ]
         body, T_body_dh0 = tree.frames[f"{name}/dh_0"]
-        links = tuple(_renamed(link, name) for link in part.links)
+        links = tuple(_renamed(link, name) for link in chain.links)
         branches.append(BranchModel(name=name, body=body, T_body_dh0=T_body_dh0, links=links, joints=tuple(joints)))
         first += len(branch.rows)
     main = replace(
@@ -190,9 +190,9 @@ def build_mechanism(robot: SpecLike) -> MechanismModel:
         links=tuple(_reaching(link, tree, body) for body, link in enumerate(main.links)),
     )
     first = len(main.links)
-    for k, branch in enumerate(branches):
-        links = tuple(_reaching(link, tree, body) for body, link in enumerate(branch.links, start=first))
-        branches[k] = replace(branch, links=links)
+    for k, part in enumerate(branches):
+        links = tuple(_reaching(link, tree, body) for body, link in enumerate(part.links, start=first))
+        branches[k] = replace(part, links=links)
         first += len(links)
     built = MechanismModel(spec=spec, tree=tree, q=q, main=main, branches=tuple(branches), excluded=())
     return replace(built, excluded=_excluded(built))

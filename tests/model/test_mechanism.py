@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from dh2sim.kinematics.tree import BASE
@@ -19,7 +20,7 @@ def test_links_are_drawn_to_where_closures_hold_them(name: str) -> None:
     for closure in model.tree.closures:
         for frame in (model.tree.frame(closure.a), model.tree.frame(closure.b)):
             point = frame.T_body_frame[:3, 3]
-            ends = [[0.0, 0.0, 0.0], *(end for shape in links[frame.body].shapes for end in shape.ends)]
+            ends = [np.zeros(3), *(np.array(end) for shape in links[frame.body].shapes for end in shape.ends)]
             nearest = min(math.dist(point, end) for end in ends)
             assert nearest < 0.15 * model.size, (closure.name, nearest)
 
