@@ -53,6 +53,7 @@ def test_there_are_commands_to_check() -> None:
         "fk",
         "ik",
         "symbolic",
+        "trajectory",
         "import",
     ]
 
