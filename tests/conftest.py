@@ -12,7 +12,8 @@ from hypothesis.internal.conjecture import providers
 
 # derandomized: the same robots in every run, so that a failure is one of the code and not of the day
 settings.register_profile("full", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile("quick", settings.get_profile("full"), max_examples=8)
+settings.register_profile("quick", settings.get_profile("full"), max_examples=6)
+settings.register_profile("thorough", settings.get_profile("full"), derandomize=False, max_examples=500)
 
 # property tests try constants of the modules that are loaded, too; without them, which examples a test tries does not
 # depend on which others run with it. There is no setting for it.
@@ -20,8 +21,9 @@ vars(providers)["_get_local_constants"] = lambda: providers._local_constants
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Choose how many examples property tests try."""
-    settings.load_profile("quick" if "not slow" in config.getoption("markexpr") else "full")
+    """Choose how many examples property tests try, unless ``--hypothesis-profile thorough`` says it."""
+    if config.getoption("hypothesis_profile", None) is None:
+        settings.load_profile("quick" if "not slow" in config.getoption("markexpr") else "full")
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -260,6 +260,7 @@ def test_pictures_on_a_mesh_are_not_opened(tmp_path: Path, kind: str, monkeypatc
     build(tmp_path, f"part.{kind}")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux only")
 def test_a_mesh_that_takes_too_much_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "part.obj").write_text("v 0 0 0\n" * 300_000 + "f 1 2 3\n" * 300_000)

@@ -200,10 +200,9 @@ VALUES: Final[tuple[Any, ...]] = (
     "widget",
     [
         "joint_1 [°]",
-        "a₁",
         *(
             pytest.param(label, marks=pytest.mark.slow)
-            for label in ("Robot", "Angles in", "Shapes", "Row", "Mode", "Ghost")
+            for label in ("a₁", "Robot", "Angles in", "Shapes", "Row", "Mode", "Ghost")
         ),
     ],
 )
