@@ -43,7 +43,7 @@ UR5 = (  # theta, a, d, alpha; calibrated at the factory, published by its owner
     (4.13647390228702e-05, 2.23692592990586e-07, 0.0949734691141216, -1.57101000328584),
     (8.1737464953645e-06, 0.0, 0.0825625014554953, 0.0),
 )
-SIZES = (4e-6, 1e-5, 1e-3, 1e-2, 1e-1)
+SIZES = (8e-6, 1e-5, 1e-3, 1e-2, 1e-1)
 """Angles between axes, rad. Smaller ones put frames farther away than a table may."""
 
 

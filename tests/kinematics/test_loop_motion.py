@@ -25,7 +25,11 @@ def _rocker_angle(lengths: tuple[float, float, float, float], crank: float, side
     B = -2 * math.sin(crank)
     C = K1 - (K2 + 1) * math.cos(crank) + K3
     root = B * B - 4 * A * C
-    return None if root < 1e-3 else 2 * math.atan2(-B + side * math.sqrt(root), 2 * A)
+    if root < 1e-3:
+        return None
+    if side * B > 0:  # the other form of the same root, where this one's difference cancels
+        return 2 * math.atan2(2 * C, -B - side * math.sqrt(root))
+    return 2 * math.atan2(-B + side * math.sqrt(root), 2 * A)
 
 
 def _four_bar(lengths: tuple[float, float, float, float], crank: float, side: float) -> RobotSpec | None:

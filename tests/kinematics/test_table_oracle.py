@@ -166,7 +166,7 @@ def test_errors_in_exact_arithmetic_are_those_of_doubles(robot: tuple[RobotSpec,
 
 
 def test_errors_in_exact_arithmetic_do_not_drown_in_far_rows() -> None:
-    rows = (Row(type=REVOLUTE, d=1e6, a=0.4), Row(type=REVOLUTE, d=-1e6, alpha=0.3), Row(type=REVOLUTE, a=0.2))
+    rows = (Row(type=REVOLUTE, d=4e5, a=0.4), Row(type=REVOLUTE, d=-4e5, alpha=0.3), Row(type=REVOLUTE, a=0.2))
     far = RobotSpec(name="far", rows=rows)
     moved = dataclasses.replace(far, rows=(dataclasses.replace(far.rows[0], a=0.4 + 1e-15), *far.rows[1:]))
     assert table_tool_errors(moved, far, [[0.1, 0.2, 0.3]])[0] == pytest.approx(1e-15, rel=0.2)
