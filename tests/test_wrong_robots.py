@@ -293,14 +293,15 @@ def test_a_robot_of_the_largest_and_smallest_numbers_has_a_model_of_finite_numbe
         return of.most if large else of.least or 1e-59
 
     length, angle = (size(of) if large else 1e-59 for of in (LENGTH, ANGLE))
+    part = length / 4  # the lengths of all rows are bounded together
     shape = LinkSpec(density=size(DENSITY), radius=size(LENGTH))
     friction = Dynamics(damping=size(DAMPING), friction=size(FRICTION), armature=size(ARMATURE))
     arm = Robot(
         [
-            Revolute(a=length, alpha=angle, d=length, theta=angle, link=shape),
+            Revolute(a=part, alpha=angle, d=part, theta=angle, link=shape),
             Revolute(dynamics=friction, link=LinkSpec(mass=size(MASS), com=np.array([length, 0.0, length]))),
-            Prismatic(d=length, actuator=ActuatorSpec(kp=size(POSITION_GAIN), kv=size(VELOCITY_GAIN))),
-            Revolute(a=length, limits=Limits(velocity=size(ANGLE), effort=size(EFFORT))),
+            Prismatic(d=part, actuator=ActuatorSpec(kp=size(POSITION_GAIN), kv=size(VELOCITY_GAIN))),
+            Revolute(a=part, limits=Limits(velocity=size(ANGLE), effort=size(EFFORT))),
         ],
         gravity=(0.0, 0.0, -(size(ACCELERATION) or 1e-59)),
     )
