@@ -258,7 +258,8 @@ def test_an_edit_that_makes_a_robot_too_large_to_be_drawn_is_refused() -> None:
     state = after(
         STANFORD, events.EditCell(row=0, column="a", text="8e5"), events.EditCell(row=1, column="a", text="8e5")
     )
-    assert state.table.errors[0].message == "the robot's frames reach 1.6e+06 m; at most 1e+06 m can be shown"
+    message = "joints[1]: the lengths up to here add up to 1.6e+06 m; those of a robot may be 1e6 m together"
+    assert state.table.errors[0].message == message
 
 
 def test_reading_a_row_in_another_convention_makes_another_robot_of_the_same_numbers() -> None:

@@ -227,7 +227,8 @@ def test_a_robot_that_would_keep_this_machine_busy_for_long_is_not_built() -> No
 
 def test_an_uploaded_robot_too_large_to_be_drawn_is_refused() -> None:
     row = "  - {type: revolute, a: 1e6}\n"
-    assert_refused(HEAD + row + row, "the robot's frames reach 2e+06 m; at most 1e+06 m can be shown")
+    message = "joints[1]: the lengths up to here add up to 2e+06 m; those of a robot may be 1e6 m together"
+    assert_refused(HEAD + row + row, f"mine.yaml:5:5: {message}")
 
 
 @settings(max_examples=min(60, settings().max_examples), deadline=None)
