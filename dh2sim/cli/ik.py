@@ -16,6 +16,7 @@ from dh2sim.messages import did_you_mean, listed, shown
 if TYPE_CHECKING:
     from dh2sim.inverse.goals import Free
     from dh2sim.inverse.solutions import Solutions
+    from dh2sim.inverse.textbook import Explanation
     from dh2sim.robot.spec import RobotSpec
     from dh2sim.typing import Array
 
@@ -101,14 +102,14 @@ def ik(
     [spec] = load_all([robot])
     asked = _read(spec, _Options(pose, xyz, rpy, quaternion, at, frame, near, lock, free, no_limits))
     solutions = _solved(asked, limits=not no_limits, numeric=numeric)
-    explanation = _explained(asked) if explain else []
+    explanation = _explained(asked) if explain else None
     if as_json:
         print(json_text(_as_json(asked, solutions, explanation), indent=None))
     else:
         from dh2sim.cli.solutions import print_solutions
 
-        if explanation:
-            print("\n".join([*explanation, ""]))
+        if explanation is not None:
+            print("\n".join([*explanation.lines, ""]))
         print_solutions(asked.spec, asked.robot, solutions, frame=asked.frame, given=asked.given, behind=asked.behind)
     reached = bool(solutions.within_limits.any() or solutions.curves or (no_limits and len(solutions)))
     return DONE if reached else FELL_SHORT
@@ -320,13 +321,13 @@ def _solved(asked: _Asked, *, limits: bool, numeric: bool) -> Solutions:
     return replace(solutions, **both, branch=(*solutions.branch, *branches))
 
 
-def _explained(asked: _Asked) -> list[str]:
+def _explained(asked: _Asked) -> Explanation:
     from dh2sim.inverse.textbook import explain_inverse_kinematics
 
-    return list(explain_inverse_kinematics(asked.spec, asked.T).lines)
+    return explain_inverse_kinematics(asked.spec, asked.T)
 
 
-def _as_json(asked: _Asked, solutions: Solutions, explanation: Sequence[str]) -> dict[str, Any]:
+def _as_json(asked: _Asked, solutions: Solutions, explanation: Explanation | None) -> dict[str, Any]:
     behind = asked.behind.tolist()
     found = [
         {
@@ -358,6 +359,10 @@ def _as_json(asked: _Asked, solutions: Solutions, explanation: Sequence[str]) ->
         nearest = solutions.nearest
         content["reason"] = solutions.reason
         content["nearest"] = None if nearest is None else nearest.tolist() + behind
-    if explanation:
-        content["explanation"] = list(explanation)
+    if explanation is not None:
+        derivation = explanation.as_json()
+        for branch in (*derivation["branches"], *derivation["position_only"]):
+            branch["q"] += behind
+        content["explanation"] = list(explanation.lines)
+        content["derivation"] = derivation
     return content

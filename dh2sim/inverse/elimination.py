@@ -187,7 +187,8 @@ class Method:
         loop = close_loop(self.arm, T[asked], values, self.virtual)
         condition = self.eliminations[0].condition(loop)
         for other in self.eliminations[1:] if last else ():
-            condition = np.minimum(condition, other.condition(loop))
+            if not isinstance(other, Nudged):  # which is regular where the arm itself is singular
+                condition = np.minimum(condition, other.condition(loop))
         return np.setdiff1d(again, asked[condition < _ILL])
 
     def _searched(self, T: Array, locked: Mapping[int, Array]) -> Found:

@@ -206,6 +206,26 @@ def test_the_textbooks_steps_are_printed_with_explain() -> None:
     assert found("planar_2r", "--xyz", "0.6", "0.4", "0", "--explain")["explanation"]
 
 
+def test_the_derivation_in_json_has_a_value_for_every_symbol_of_every_branch() -> None:
+    answer = found("stanford", "--at", *STANFORD, "--explain")
+    derivation = answer["derivation"]
+    assert len(derivation["branches"]) == 8
+    assert {key for step in derivation["steps"] for key in step} == {"title", "formulas", "remark", "lines"}
+    lines = [line for step in derivation["steps"] for line in step["lines"]]
+    for branch in derivation["branches"]:
+        T = table_tool_pose(robot("stanford"), np.array(branch["q"]))
+        assert np.abs(T - answer["target"]).max() <= 1e-12
+        signs = branch["signs"].items()
+        values = {line["symbol"]: line["value"] for line in lines if line["signs"].items() <= signs}
+        assert [values[f"q{i}"] for i in range(1, 7)] == pytest.approx(branch["q"], abs=1e-12)
+
+
+def test_why_there_is_no_derivation_is_in_the_json_too() -> None:
+    derivation = found("franka_panda", "--at", "home", "--explain")["derivation"]
+    assert (derivation["form"], derivation["steps"]) == ("", [])
+    assert derivation["reason"] == "Textbooks solve arms of 2 to 6 joints in closed form; this one has 7."
+
+
 def test_no_limits_are_kept_with_no_limits() -> None:
     answer = found("stanford", "--xyz", "3", "0", "0", "--no-limits")
     assert any(not solution["within_limits"] for solution in answer["solutions"])
