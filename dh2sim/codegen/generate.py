@@ -18,7 +18,7 @@ from dh2sim.codegen.mechanism import Mechanism, build_mechanism, origin_moved
 from dh2sim.codegen.newton_euler import inverse_dynamics
 from dh2sim.codegen.program import Function, Listing, Program, What
 from dh2sim.errors import Dh2simError
-from dh2sim.kinematics.chain import spec_of
+from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.kinematics.trace import Number, Operations, Trace, count_operations
 from dh2sim.messages import member
 from dh2sim.model.build import ModelLike, model_of
@@ -54,7 +54,8 @@ def generate_code(
 
     Raises:
         MismatchError: The code differs from the table by more than rounding.
-        MeshError, ModelError: There is no model to take masses from, for 'inverse-dynamics'.
+        MeshError: There is no model to take masses from, for 'inverse-dynamics'.
+        ModelError: The same; or the robot has branches or closures.
         Dh2simError: An argument has a value that is not allowed.
     """
     language = member(Language, language, "language")
@@ -69,7 +70,7 @@ def _asked_for(
     if not wanted:
         raise Dh2simError(f"choose at least one of {', '.join(What)}")
     model = model_of(robot) if What.INVERSE_DYNAMICS in wanted else None
-    spec = spec_of(robot) if model is None else model.spec
+    spec = serial_spec_of(robot) if model is None else model.spec
     return _program(spec, model, [each for each in What if each in wanted], name or spec.name), spec, model
 
 

@@ -111,6 +111,20 @@ def spec_of(robot: SpecLike) -> RobotSpec:
     return spec
 
 
+def serial_spec_of(robot: SpecLike) -> RobotSpec:
+    """Return the specification of a serial robot, whatever form it is given in.
+
+    Raises:
+        ModelError: The robot has branches or closures.
+        TypeError: It is not a robot.
+    """
+    spec = spec_of(robot)
+    if spec.is_mechanism:
+        more = "closed loops" if spec.closures else "branches"
+        raise ModelError(f"{spec.name}: has {more}: this works on serial robots")
+    return spec
+
+
 def chain_of(robot: ChainLike) -> KinematicChain:
     """Return the chain of a robot, whatever form it is given in.
 
@@ -147,20 +161,13 @@ def build_chain(spec: SpecLike) -> KinematicChain:
     Raises:
         ModelError: The robot has branches or closures; ``build_tree`` takes those too.
     """
-    spec = spec_of(spec)
-    if spec.is_mechanism:
-        raise ModelError(f"{spec.name}: has {_more_than_a_chain(spec)}: this works on serial robots")
+    spec = serial_spec_of(spec)
     T_base_link_dh0 = pose_from_rpy(spec.base.pose.xyz, spec.base.pose.rpy)
     return KinematicChain(
         joints=placed_joints(spec.rows, T_base_link_dh0),
         T_base_link_dh0=T_base_link_dh0,
         T_dhn_tool0=pose_from_rpy(spec.tool.xyz, spec.tool.rpy),
     )
-
-
-def _more_than_a_chain(spec: RobotSpec) -> str:
-    """Return what a mechanism has besides its main chain."""
-    return "closed loops" if spec.closures else "branches"
 
 
 def placed_joints(rows: Iterable[Row], T_parent_dh: Array) -> tuple[Joint, ...]:

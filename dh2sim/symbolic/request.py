@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any, TypedDict
 
 from dh2sim.errors import Dh2simError
-from dh2sim.kinematics.chain import SpecLike, spec_of
+from dh2sim.kinematics.chain import SpecLike, serial_spec_of
 from dh2sim.messages import member
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.form import Equation, Form
@@ -126,6 +126,7 @@ def symbolic_form(
 
     Raises:
         UnknownFrameError: There is no such frame.
+        ModelError: The robot has branches or closures.
         MismatchError: The form differs from the table by more than 1e-13 of the reach.
         Dh2simError: An argument has a value that is not allowed.
     """
@@ -134,7 +135,7 @@ def symbolic_form(
         numbers = not letters
         if numbers and bodies is None:
             raise Dh2simError("dynamics in numbers needs bodies; pass letters=True for letters")
-    table = symbolic_table(spec_of(robot), letters=letters, numbers=numbers)
+    table = symbolic_table(serial_spec_of(robot), letters=letters, numbers=numbers)
     style_ = member(Style, style, "style")
     lengths_ = None if lengths is None else member(Lengths, lengths, "lengths")
     fold_ = member(Fold, fold, "fold")
