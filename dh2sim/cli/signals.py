@@ -12,7 +12,6 @@ import _thread
 import signal
 import sys
 import threading
-import time
 import warnings
 from collections.abc import Callable
 from types import FrameType
@@ -32,6 +31,11 @@ class Signals:
         self._repeated = False
         """Whether the signal under way is a repetition."""
         self._sending = _thread.allocate_lock()
+        self._over = _thread.allocate_lock()
+        """Held until the program ends."""
+        self._over.acquire()
+        self._repeating = _thread.allocate_lock()
+        """Held by the thread that repeats a signal."""
         self._handler = self._handle
 
     def listen(self) -> None:
@@ -41,11 +45,16 @@ class Signals:
         sys.unraisablehook = self._report_dropped
 
     def end(self) -> None:
-        """Let signals end the program at once from now on: Python itself takes a while to end."""
+        """Let signals end the program at once from now on: Python itself takes a while to end.
+
+        Python before 3.11.3 crashes where a thread begins to run while it ends, so the one here is waited for.
+        """
         self._ended = True
+        self._over.release()
         with self._sending:  # no repetition is on its way any more
             _install(signal.SIGINT, signal.SIG_DFL)
             _install(signal.SIGTERM, signal.SIG_DFL)
+        self._repeating.acquire(timeout=1.0)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         repeated, self._repeated = self._repeated, False
@@ -56,6 +65,7 @@ class Signals:
             # libraries warn of coroutines that are cut off
             warnings.filterwarnings("ignore", message="coroutine .* was never awaited", category=RuntimeWarning)
             # a threading.Thread takes locks, which the interrupted code may hold
+            self._repeating.acquire()
             _thread.start_new_thread(self._repeat, ())
         if self._is_reporting(frame) or (repeated and _is_ending()):
             return
@@ -66,15 +76,15 @@ class Signals:
     def _repeat(self) -> None:
         """Repeat the first signal until the program ends."""
         assert self.first is not None
-        while True:
-            time.sleep(PAUSE)
+        while not self._over.acquire(timeout=PAUSE):
             with self._sending:
                 if self._ended:
-                    return
+                    break
                 # whoever has installed another handler meanwhile waits for signals from outside
                 if signal.getsignal(self.first) == self._handler:
                     self._repeated = True
                     _interrupt_main_thread(self.first)
+        self._repeating.release()
 
     def _report_dropped(self, error: sys.UnraisableHookArgs) -> None:
         """Report an exception that Python drops, unless it is that of a signal, which is repeated."""
