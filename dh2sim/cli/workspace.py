@@ -45,7 +45,7 @@ def workspace(
     ] = None,
     size: Annotated[
         float | None,
-        typer.Option(metavar="M", help="Edge of the voxels, m. [default: 0.04, more for large arms]"),
+        typer.Option(metavar="M", help="Edge of the voxels, m. [default: by the reach; 0.04 for 0.9 m]"),
     ] = None,
     samples: Annotated[int, typer.Option(metavar="N", help="Random configurations.")] = 200_000,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random number generator.")] = 0,

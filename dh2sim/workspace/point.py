@@ -184,13 +184,17 @@ class InBasis:
 
     def __init__(self, point: PointMap, axes: Array, origin: Array) -> None:
         """Prepare axes, unit vectors in base_link, shape (k, 3), and the origin, m, shape (3,)."""
-        self._point, self._axes, self._origin = point, axes, origin
+        self._point, self._axes, self.origin = point, axes, origin
         self.lower, self.upper, self.steps = point.lower, point.upper, point.steps
+
+    def places(self, q: Array) -> Array:
+        """Return coordinates alone, m, shape (N, k)."""
+        return along(self._point.positions(q) - self.origin, self._axes)
 
     def values(self, q: Array) -> tuple[Array, Array]:
         """Return coordinates, m, shape (N, k), and their derivatives, shape (N, k, m)."""
         p, J = self._point.values(q)
-        return along(p - self._origin, self._axes), np.stack([along_columns(J, axis) for axis in self._axes], axis=1)
+        return along(p - self.origin, self._axes), np.stack([along_columns(J, axis) for axis in self._axes], axis=1)
 
     def second(self, q: Array) -> tuple[Array, Array]:
         """Return derivatives, shape (N, k, m), and second derivatives, shape (N, k, m, m)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -61,9 +61,6 @@ class Section:
     """m³, inside the first joint's limits; None of a planar arm."""
 
 
-Singular = tuple[Array, Array]
-
-
 def around_first_axis(point: PointMap) -> AroundAxis:
     """Return r and z about the axis of the first joint; z is zero beside the origin of base_link."""
     origin, direction = point.first_axis()
@@ -85,29 +82,13 @@ def turned_section(
         advance: Called with numbers of nodes as they are reached.
     """
     around = around_first_axis(point)
-    inner = around.point
     direction = around.points(np.array([1.0]), np.array([0.0]))[0] - around.origin
-    q = random_configurations(inner.sample_low, inner.sample_high, SAMPLES, [seed, 1])
-    region, line, singular = _found(around, inner, q, size, point.size, half_plane=True, advance=advance)
+    axes = np.stack([direction, around.direction])
+    section, region, q = _section(around, around.point, ("r", "z"), axes, size, seed, advance)
+    first = point.joints[0]
     full = sum(_turned_volume(curve) for curve in region.curves)
-    low, high = point.low[point.joints[0]], point.high[point.joints[0]]
-    share = _turn_share(around, region, q, float(high - low))
-    return Section(
-        labels=("r", "z"),
-        turns_about=names[point.joints[0]],
-        axis_point=read_only(around.origin),
-        directions=read_only(np.stack([direction, around.direction])),
-        curves=region.curves,
-        held_by=tuple(_held_by(around, inner, curve) for curve in region.curves),
-        line=line,
-        nodes=region.nodes,
-        size=size,
-        singular=singular[0],
-        singular_q=read_only(inner.full(singular[1])),
-        area=region.area,
-        full_turn_volume=full,
-        volume=full * share,
-    )
+    share = _turn_share(around, region, q, float(point.high[first] - point.low[first]))
+    return replace(section, turns_about=names[first], full_turn_volume=full, volume=full * share)
 
 
 def planar_section(
@@ -115,24 +96,7 @@ def planar_section(
 ) -> Section:
     """Return what a planar arm reaches in its plane: axes, shape (2, 3), and a point of it, shape (3,)."""
     plane = InBasis(point, axes, origin)
-    q = random_configurations(point.sample_low, point.sample_high, SAMPLES, [seed, 1])
-    region, line, singular = _found(plane, point, q, size, point.size, half_plane=False, advance=advance)
-    return Section(
-        labels=axis_labels(axes),
-        turns_about=None,
-        axis_point=read_only(origin),
-        directions=read_only(axes),
-        curves=region.curves,
-        held_by=tuple(_held_by(plane, point, curve) for curve in region.curves),
-        line=line,
-        nodes=region.nodes,
-        size=size,
-        singular=singular[0],
-        singular_q=read_only(point.full(singular[1])),
-        area=region.area,
-        full_turn_volume=None,
-        volume=None,
-    )
+    return _section(plane, point, axis_labels(axes), axes, size, seed, advance)[0]
 
 
 def axis_labels(axes: Array) -> tuple[str, str]:
@@ -141,30 +105,50 @@ def axis_labels(axes: Array) -> tuple[str, str]:
     return (names[0], names[1]) if all(names) else ("u", "v")
 
 
-def _found(
+def _section(
     coordinates: AroundAxis | InBasis,
     point: PointMap,
-    q: Array,
+    labels: tuple[str, str],
+    directions: Array,
     size: float,
-    scale: float,
-    *,
-    half_plane: bool,
+    seed: int,
     advance: Callable[[int], None],
-) -> tuple[Region, Array, Singular]:
+) -> tuple[Section, Region, Array]:
+    """Return the section in two coordinates of a point, its region, and the configurations searched from."""
+    q = random_configurations(point.sample_low, point.sample_high, SAMPLES, [seed, 1])
     x, J = coordinates.values(q)
-    no_points = np.empty((0, 2))
-    none = no_points, np.empty((0, len(point.joints)))
-    if motion_rank(J[:64]) < 2:
-        empty = Region(curves=(), nodes=no_points, q=none[1], size=size)
-        if len(point.joints) > 1:
-            return empty, x, none
-        if not point.joints:
-            return empty, x[:1], none
-        sweep = np.linspace(point.sample_low, point.sample_high, LINE)
-        return empty, coordinates.values(sweep)[0], none
-    low, high = x.min(axis=0) - 0.25 * scale, x.max(axis=0) + 0.25 * scale
-    region = find_region(coordinates, q, low, high, size, scale=scale, half_plane=half_plane, advance=advance)
-    return region, no_points, _singular_points(coordinates, point, q[:_SINGULAR_STARTS])
+    region = Region(curves=(), nodes=np.empty((0, 2)), q=q[:0], size=size)
+    line, singular = np.empty((0, 2)), q[:0]
+    if motion_rank(J[:64]) == 2:
+        low, high = x.min(axis=0) - 0.25 * point.size, x.max(axis=0) + 0.25 * point.size
+        half_plane = isinstance(coordinates, AroundAxis)
+        region = find_region(
+            coordinates, q, low, high, size, scale=point.size, half_plane=half_plane, advance=advance
+        )
+        singular = _singular_configurations(coordinates, point, q[:_SINGULAR_STARTS])
+    elif len(point.joints) > 1:
+        line = x
+    elif point.joints:
+        line = coordinates.values(np.linspace(point.sample_low, point.sample_high, LINE))[0]
+    else:
+        line = x[:1]
+    section = Section(
+        labels=labels,
+        turns_about=None,
+        axis_point=read_only(coordinates.origin),
+        directions=read_only(directions),
+        curves=region.curves,
+        held_by=tuple(_held_by(coordinates, point, curve) for curve in region.curves),
+        line=read_only(line),
+        nodes=region.nodes,
+        size=size,
+        singular=read_only(coordinates.values(singular)[0]),
+        singular_q=read_only(point.full(singular)),
+        area=region.area,
+        full_turn_volume=None,
+        volume=None,
+    )
+    return section, region, q
 
 
 def _turned_volume(curve: Curve) -> float:
@@ -211,8 +195,8 @@ def _held_by(coordinates: AroundAxis | InBasis, point: PointMap, curve: Curve) -
     return np.where(strength.max(axis=1) > 1e-3 * point.size, joint, SINGULAR).astype(np.int64)
 
 
-def _singular_points(coordinates: AroundAxis | InBasis, point: PointMap, q: Array) -> Singular:
-    """Return points of the set where the two coordinates cannot move at once, inside the limits of all joints.
+def _singular_configurations(coordinates: AroundAxis | InBasis, point: PointMap, q: Array) -> Array:
+    """Return configurations inside all limits at which the two coordinates cannot move at once, shape (N, m).
 
     A direction n(θ) that no joint moves along, Jᵀ n = 0, is one equation a joint; with θ there is an unknown more, so
     the set is made of curves, and Newton's steps of least norm lead onto them.
@@ -236,5 +220,4 @@ def _singular_points(coordinates: AroundAxis | InBasis, point: PointMap, q: Arra
         q += step[:, :m] * point.steps
         theta += step[:, m]
     inside = ((q >= point.lower - 1e-9) & (q <= point.upper + 1e-9)).all(axis=1)
-    found = q[inside & (residual < 1e-9 * point.size)]
-    return read_only(coordinates.values(found)[0]), found
+    return np.asarray(q[inside & (residual < 1e-9 * point.size)])

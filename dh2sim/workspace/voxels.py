@@ -15,7 +15,7 @@ from dh2sim.errors import SettingsError
 from dh2sim.kinematics.forward import geometric_jacobian
 from dh2sim.kinematics.sampling import random_configurations, scattered_configurations
 from dh2sim.typing import Array, read_only
-from dh2sim.workspace.point import Coordinates, Flags, PointMap, along_columns, motion_rank
+from dh2sim.workspace.point import Coordinates, Flags, InBasis, PointMap, motion_rank
 from dh2sim.workspace.reaching import reach
 
 MOST_VOXELS: Final = 8_000_000
@@ -99,20 +99,26 @@ class Voxels:
 class Measure:
     """Yoshikawa's manipulability: of the whole frame where joints move it in all six ways, else of its origin."""
 
-    def __init__(self, point: PointMap, axes: Array) -> None:
-        """Choose for a point that moves along these axes, unit vectors, shape (k, 3)."""
-        self._point, self._axes = point, axes
+    def __init__(self, point: PointMap, coordinates: InBasis) -> None:
+        """Choose for a point with coordinates along the axes that it moves in."""
+        self._point, self._coordinates = point, coordinates
         rank = motion_rank(self._jacobians(_trials(point)))
         self.whole = rank == 6
         """Whether turning counts, too: m³ for an arm of six turning joints, as ``dh2sim jacobian`` prints."""
         self._rank = 6 if self.whole else motion_rank(point.J_trials)
 
-    def of(self, q: Array, J: Array) -> Array:
-        """Return it at configurations of the joints that move the point, (N, m), with the point's Jacobians."""
+    def of(self, q: Array) -> Array:
+        """Return it at configurations of the joints that move the point, (N, m)."""
+        return self._of(self._jacobians(q) if self.whole else self._coordinates.values(q)[1])
+
+    def places_and_values(self, q: Array) -> tuple[Array, Array]:
+        """Return where the point is, m, shape (N, k), and the measure there."""
         if self.whole:
-            A = self._jacobians(q)
-        else:
-            A = np.stack([along_columns(J, axis) for axis in self._axes], axis=1)
+            return self._coordinates.places(q), self.of(q)
+        x, J = self._coordinates.values(q)
+        return x, self._of(J)
+
+    def _of(self, A: Array) -> Array:
         rows, columns = A.shape[1:]
         if rows == columns and rows == self._rank:
             return np.asarray(np.abs(np.linalg.det(A)))
@@ -148,7 +154,6 @@ def batches(count: int) -> list[slice]:
 def draw_voxels(
     point: PointMap,
     measure: Measure,
-    coordinates: Coordinates,
     grid: Grid,
     samples: int,
     seed: int,
@@ -165,9 +170,8 @@ def draw_voxels(
         q = random_configurations(
             point.sample_low, point.sample_high, part.stop - part.start, [seed, part.start // BATCH]
         )
-        x, _ = coordinates.values(q)
-        _, J = point.values(q)
-        return _best(grid.numbers(x), np.ones(len(q), dtype=np.int64), measure.of(q, J), q)
+        x, w = measure.places_and_values(q)
+        return _best(grid.numbers(x), np.ones(len(q), dtype=np.int64), w, q)
 
     total: tuple[NDArray[np.int64], NDArray[np.int64], Array, Array] | None = None
     waiting: list[tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]] = []
@@ -196,7 +200,6 @@ def _best(
 
 def grow_voxels(
     voxels: Voxels,
-    point: PointMap,
     measure: Measure,
     coordinates: Coordinates,
     threads: int,
@@ -242,7 +245,7 @@ def grow_voxels(
                 )
                 w = np.zeros(len(q))
                 if ok.any():
-                    w[ok] = measure.of(q[ok], point.values(q[ok])[1])
+                    w[ok] = measure.of(q[ok])
                 return q, ok, w
 
             results = list(in_order(search, batches(len(targets)), threads))
@@ -282,7 +285,7 @@ def spanned(p: Array, scale: float) -> tuple[Array, Array]:
         scale: Length beside which a distance from the plane is rounding, m.
     """
     center = 0.5 * (p.min(axis=0) + p.max(axis=0))
-    _, values, vectors = np.linalg.svd(p - center, full_matrices=True)
+    _, values, vectors = np.linalg.svd(p - center, full_matrices=False)
     k = int((values > 1e-9 * scale * math.sqrt(len(p))).sum())
     if k == 3:
         return np.eye(3), np.zeros(3)

@@ -23,10 +23,11 @@ from dh2sim.workspace.point import InBasis, PointMap, motion_rank
 from dh2sim.workspace.section import Section, around_first_axis, planar_section, turned_section
 from dh2sim.workspace.voxels import Advance, Measure, draw_voxels, grid_around, grow_voxels, spanned
 
-SIZE: Final = 0.04
-"""Edge of voxels, m, unless another is asked for, or the arm is so large that these would be too many."""
-_USUAL: Final = 400_000
-"""Voxels of the box around the workspace, up to which that edge is taken."""
+USUAL: Final = 100_000
+"""Voxels of the box around the workspace, at most, where no size is given: configurations fill most of them."""
+ACROSS: Final = 100
+"""Of them along its longest side, at most: those of a plane are fewer, and their section is finer anyway."""
+_ROUND: Final = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 SAMPLES: Final = 200_000
 ORIENTATIONS: Final = 24
 MOST_SAMPLES: Final = 100_000_000
@@ -134,7 +135,8 @@ def compute_workspace(
     Args:
         robot: The robot, in any form.
         frame: tool0, dh_0 … dh_n or link_1 … link_n.
-        size: Edge of the voxels, m; by default 0.04, or a round number more for a large arm.
+        size: Edge of the voxels, m; by default the least round number with which the box around the workspace has at
+            most 100 000 voxels, and 100 along each side: 0.04 for an arm that reaches 0.9 m.
         samples: Number of random configurations.
         seed: Of them.
         threads: Number of threads, 0 for one a processor.
@@ -151,9 +153,7 @@ def compute_workspace(
     """
     model = _model_of(robot)
     spec, chain = model.spec, model.chain
-    _check(
-        size=SIZE if size is None else size, samples=samples, seed=seed, threads=threads, orientations=orientations
-    )
+    _check(size=1.0 if size is None else size, samples=samples, seed=seed, threads=threads, orientations=orientations)
     if dexterity and frame != "tool0":
         raise SettingsError([("dexterity", f"is that of tool0, not of {frame}")])
     workers = threads or os.cpu_count() or 1
@@ -177,11 +177,11 @@ def compute_workspace(
     grid = grid_around(low, high, size, shape)
     if section:
         _require_nodes(low, high, size)
-    measure = Measure(point, axes)
+    measure = Measure(point, along_axes)
     with show("sampling", "configurations", samples) as advance:
-        voxels = draw_voxels(point, measure, along_axes, grid, samples, seed, workers, advance)
+        voxels = draw_voxels(point, measure, grid, samples, seed, workers, advance)
     with show("completing", shape, math.prod(grid.shape) - len(voxels)) as advance:
-        voxels = grow_voxels(voxels, point, measure, along_axes, workers, advance)
+        voxels = grow_voxels(voxels, measure, along_axes, workers, advance)
     places = grid.centers(voxels.numbers)
     centers = np.repeat(origin[None], len(voxels), axis=0)
     for axis, coordinate in zip(axes, places.T, strict=True):
@@ -219,13 +219,15 @@ def compute_workspace(
 
 
 def _usual_size(extent: Array) -> float:
-    """Return the edge of voxels, m, that keeps their number small; 1, 2 or 4 times a power of ten."""
-    size = SIZE
-    for factor in (2.5, 2.0, 2.0) * 8:
-        if np.prod(extent / size + 4.0) <= _USUAL:
-            break
-        size = float(f"{size * factor:.3g}")
-    return size
+    """Return the least round edge of voxels, m, with which a box, shape (k,), keeps ``USUAL`` and ``ACROSS``."""
+    finest = float(extent.max()) / ACROSS
+    decade = 10.0 ** math.floor(math.log10(finest)) if finest > 0.0 else 0.01
+    sizes = (decade * 10.0**power * step for power in range(4) for step in _ROUND)
+    return next(
+        float(f"{size:.3g}")
+        for size in sizes
+        if size >= finest * (1.0 - 1e-9) and np.prod(extent / size + 1.0) <= USUAL
+    )
 
 
 def _model_of(robot: SpecLike | RobotModel) -> RobotModel:

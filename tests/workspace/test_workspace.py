@@ -135,3 +135,19 @@ def test_wrong_arguments_are_reported_together() -> None:
         Robot.load("puma560").workspace(size=0.001)
     with pytest.raises(UnknownFrameError):
         Robot.load("puma560").workspace(frame="dh_9")
+
+
+def test_voxels_are_as_fine_as_the_arm_is_large_unless_a_size_is_given() -> None:
+    def scaled(factor: float) -> Robot:
+        links = [
+            Revolute(d=0.3 * factor, alpha=1.5),
+            Revolute(a=0.4 * factor, limits=(-2, 1)),
+            Revolute(a=0.3 * factor),
+        ]
+        return Robot(links)
+
+    sizes = {factor: scaled(factor).workspace(samples=500, threads=1) for factor in (1.0, 10.0, 1000.0)}
+    assert sizes[10.0].size == pytest.approx(10.0 * sizes[1.0].size)
+    assert sizes[1000.0].size == pytest.approx(1000.0 * sizes[1.0].size)
+    assert 10_000 < len(sizes[1.0].centers) < 100_000
+    assert scaled(1.0).workspace(samples=500, size=0.1, threads=1).size == 0.1
