@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 _HOMES = {
     "ActuatorSpec": "robot.spec",
+    "Comparison": "compare.comparison",
     "Continuous": "robot.table_rows",
     "Dh2simError": "errors",
     "Dynamics": "robot.spec",
@@ -43,6 +44,7 @@ _HOMES = {
     "build_model": "model.build",
     "compute_workspace": "workspace.workspace",
     "convert_robot": "importing.convert",
+    "diff": "compare.comparison",
     "draw_robot": "draw.diagram.drawing",
     "explain_inverse_kinematics": "inverse.textbook",
     "find_mobility": "mobility.robot_mechanism",
@@ -70,6 +72,8 @@ __all__ = [*_HOMES]
 
 if TYPE_CHECKING:
     from dh2sim.codegen.generate import generate_code as generate_code
+    from dh2sim.compare.comparison import Comparison as Comparison
+    from dh2sim.compare.comparison import diff as diff
     from dh2sim.draw.diagram.drawing import draw_robot as draw_robot
     from dh2sim.errors import Dh2simError as Dh2simError
     from dh2sim.errors import RobotError as RobotError

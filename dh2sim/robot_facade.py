@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from dh2sim.codegen.languages import Language
+    from dh2sim.compare.comparison import Comparison
     from dh2sim.draw.diagram.drawing import DrawingStyle, RobotDrawing
     from dh2sim.export import ExportReport, Format
     from dh2sim.importing.sources import ImportOptions
@@ -418,6 +419,20 @@ class Robot:
         from dh2sim.mobility.robot_mechanism import find_mobility
 
         return find_mobility(self.spec)
+
+    def diff(self, other: SpecLike | FilePath, *, tolerance: float = 1e-6) -> Comparison:
+        """Compare the robot with another: the same mechanism, or which misreading of the table explains it.
+
+        Args:
+            other: A robot, a file of any kind that dh2sim reads, or the name of a robot that comes with dh2sim.
+            tolerance: Greatest difference of tool0, rad, and m for a reach of up to 1 m, then of the reach.
+
+        Raises:
+            Dh2simError: The file is wrong, or one of the robots has closed loops or branches.
+        """
+        from dh2sim.compare.comparison import diff
+
+        return diff(self, other, tolerance=tolerance)
 
     def symbolic(self, what: What | str = "pose", **options: Unpack[SymbolicKeywords]) -> SymbolicForm:
         """Return the robot's kinematics or dynamics in symbols, compared with numbers; ``print`` shows it.

@@ -52,6 +52,7 @@ COMMANDS: Final = {
     "view": Command("view", "view", "Show a robot in the browser, and edit its table."),
     "import": Command("importing", "import_robot", "Make a robot file from a URDF, an MJCF or a table."),
     "convert": Command("importing", "convert", "Write a table in the other convention."),
+    "diff": Command("diff", "diff", "Say whether two robots are the same mechanism."),
     "frames": Command("importing", "frames", "Assign DH frames to joint axes, step by step."),
     "rollout": Command("rollout", "rollout", "Simulate many rollouts into a dataset."),
     "render": Command("pictures", "render", "Render a rollout as a video, or a robot as an image."),
@@ -90,6 +91,7 @@ Examples:
   dh2sim import arm.urdf -o arm.yaml
   dh2sim convert stanford --to modified
   dh2sim frames axes.yaml            from joint axes to a table
+  dh2sim diff puma560 puma560_standard
   dh2sim rollout stanford --out run.zarr
   dh2sim runs run.zarr               what a run contains
   dh2sim plot run.zarr               how its joints move

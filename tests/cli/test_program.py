@@ -34,6 +34,7 @@ COMMANDS = (
     "view",
     "import",
     "convert",
+    "diff",
     "frames",
     "rollout",
     "render",
@@ -78,7 +79,7 @@ def test_every_example_of_the_programs_help_works(tmp_path: Path, monkeypatch: p
         run = dh2sim(*command, *quicker.get(command[0], []))
         assert run.status == 0, line
         assert run.err == "" or command[0] in talkative, line
-    assert len(lines) == 21
+    assert len(lines) == 22
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "arm.urdf",
         "arm.yaml",

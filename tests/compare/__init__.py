@@ -1,0 +1,1 @@
+"""Comparing robots, grading tables, making exercises."""
