@@ -68,7 +68,7 @@ def _section(workspace: Workspace, section: Section) -> Any:
     about = f" from the axis of {section.turns_about}" if section.turns_about is not None else ""
     ax.set_xlabel(f"{section.labels[0]}{about}, m")
     ax.set_ylabel(f"{section.labels[1]}, m")
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2, markerscale=3.0)
     return figure
 
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from dh2sim.draw.projection import Pinhole
+from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
 from dh2sim.view.state import Ghost, LinkDrag, Matrix, Mode, Part
+
+if TYPE_CHECKING:
+    from dh2sim.workspace.workspace import Workspace
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -252,6 +256,29 @@ class SetCamera:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SearchWorkspace:
+    """Report how far the search of a robot's workspace is."""
+
+    model: RobotModel = field(repr=False)
+    """The robot; a report of another one than the page's changes nothing."""
+    doing: str
+    share: float
+    """Of what it is doing, from 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundWorkspace:
+    """Report what tool0 of a robot reaches."""
+
+    model: RobotModel = field(repr=False)
+    """The robot."""
+    workspace: Workspace | None = field(repr=False)
+    """None where it cannot be computed."""
+    note: str = ""
+    """Why it cannot, or why it has no section."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Notify:
     """Show the user a notice; an empty one removes the last."""
 
@@ -290,5 +317,7 @@ Event: TypeAlias = (
     | Compare
     | CompareMisread
     | SetCamera
+    | SearchWorkspace
+    | FoundWorkspace
     | Notify
 )

@@ -15,6 +15,7 @@ from dh2sim.view.motion.dragging import LinkGrabs, ToolHandle
 from dh2sim.view.motion.motion_source import MotionControl
 from dh2sim.view.motion.row_animation import RowAnimation
 from dh2sim.view.panel.panel import Panel
+from dh2sim.view.reach_search import ReachSearch
 from dh2sim.view.reduce import reduce
 from dh2sim.view.robot_files import RobotFiles
 from dh2sim.view.scene.camera import CameraWatch
@@ -75,6 +76,7 @@ class Page:
         self._handle = ToolHandle(client.scene, self.send, lambda: self.state, self.apply)
         self._camera = CameraWatch(client.camera, lambda: self.state.model, self.send)
         self._grabs = LinkGrabs(self._painter, self.send, lambda: self.state)
+        self._search = ReachSearch(self.send)
         self._thread = threading.Thread(target=self._run, name=f"page-{client.client_id}", daemon=True)
 
     def start(self) -> None:
@@ -84,6 +86,7 @@ class Page:
     def close(self) -> None:
         """End after the present task; what is queued is dropped."""
         self._closed.set()
+        self._search.close()
         self._queue.put(None)
 
     @property
@@ -95,6 +98,7 @@ class Page:
         """Wait until its thread has ended, at most ``timeout`` seconds."""
         if self._thread.is_alive():
             self._thread.join(timeout)
+        self._search.join(timeout)
 
     def send(self, task: Task, *, on_start: Callable[[], None] | None = None) -> None:
         """Queue an event or a function, from any thread; ``on_start`` is called when its turn comes."""
@@ -170,6 +174,7 @@ class Page:
             self._grabs.show(self.state)
             self._panel.show(self.state)
         self.client.flush()
+        self._search.show(self.state)
         if self._queue.empty() and not self._closed.is_set():
             self._panel.show_slow(self.state)
 

@@ -104,6 +104,8 @@ def reduce(state: ViewState, event: events.Event) -> ViewState:
         event: Its numbers may be anything; its rows and joints need not exist.
     """
     after = with_undo(state, event, _reduced(state, event))
+    if after.model is not state.model:
+        after = replace(after, workspace=None, workspace_note="", searching=None)
     jumps = isinstance(event, events.Follow) and event.jumps
     return with_trace(after, replace(after, trace=())) if jumps else with_trace(state, after)
 
@@ -147,6 +149,11 @@ def _reduced(state: ViewState, event: events.Event) -> ViewState:
             return replace(state, pinhole=pinhole) if pinhole.is_usable else state
         case events.Notify(notice=notice):
             return replace(state, notice=notice)
+        case events.SearchWorkspace(model=model, doing=doing, share=share):
+            return replace(state, searching=(doing, share)) if model is state.model else state
+        case events.FoundWorkspace(model=model, workspace=found, note=note):
+            known = model is state.model
+            return replace(state, workspace=found, workspace_note=note, searching=None) if known else state
         case events.SetMode(mode=mode):
             # a simulation may have left the limits slightly
             q = within(state.model, state.q)

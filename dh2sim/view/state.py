@@ -7,12 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from dh2sim.draw.projection import Pinhole
 from dh2sim.model.robot_model import JointModel, RobotModel
 from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Units
 from dh2sim.view.scene.items import Vector
+
+if TYPE_CHECKING:
+    from dh2sim.workspace.workspace import Workspace
 
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 """A pose of shape (4, 4), as tuples, so that states compare by value."""
@@ -49,11 +52,20 @@ class Part(StrEnum):
     """That tool0 is dragged by."""
     ELLIPSOID = "ellipsoid"
     """Of the velocities that tool0's origin can have."""
+    FORCE = "force ellipsoid"
+    """Of the forces at tool0's origin that the joints can hold."""
+    WORKSPACE = "workspace"
+    """Points that tool0 reaches."""
+    CUT = "cut"
+    """Without those in front of base_link's x-z plane, so that the inside is seen."""
+    SECTION = "section"
+    """Of the workspace, with what bounds it."""
     BRANCHES = "branches"
     """All other ways to hold tool0 where it is."""
 
 
-INITIALLY: Final = frozenset(Part) - {Part.TRACE, Part.ELLIPSOID, Part.BRANCHES}
+_ON_REQUEST: Final = {Part.TRACE, Part.ELLIPSOID, Part.FORCE, Part.BRANCHES, Part.WORKSPACE, Part.SECTION}
+INITIALLY: Final = frozenset(Part) - _ON_REQUEST
 """Parts that a page shows at first."""
 
 
@@ -170,6 +182,12 @@ class ViewState:
     """Path of tool0 in the world since ``Part.TRACE`` is shown, m."""
     planned: tuple[Vector, ...] = ()
     """Path of tool0 in the trajectory that pages play, m; empty once the robot is another."""
+    workspace: Workspace | None = field(default=None, repr=False)
+    """What tool0 reaches; None until it is computed for this robot."""
+    workspace_note: str = ""
+    """Why it cannot be computed, or why it has no section."""
+    searching: tuple[str, float] | None = None
+    """What the search of the workspace is doing, and its share of that from 0 to 1; None while there is none."""
     goal: Goal | None = None
     mode: Mode = Mode.MANUAL
     paused: bool = False

@@ -317,8 +317,8 @@ def _notes(model: RobotModel, point: PointMap) -> tuple[str, ...]:
     still = [joint.name for k, joint in enumerate(model.moving_joints) if k not in point.joints]
     if still and point.joints:
         words = " and ".join([", ".join(still[:-1]), still[-1]] if len(still) > 1 else still)
-        verb = "does" if len(still) == 1 else "do"
-        notes.append(f"{words} {verb} not move the point.")
+        verb, held = ("does", "it is") if len(still) == 1 else ("do", "they are")
+        notes.append(f"{words} {verb} not move the point: {held} held at home.")
     return tuple(notes)
 
 

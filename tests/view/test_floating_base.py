@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 from dh2sim.typing import Array
-from dh2sim.view.events import CompareMisread, Event, Follow, SetMode, Show
+from dh2sim.view.events import CompareMisread, Event, Follow, FoundWorkspace, SetMode, Show
 from dh2sim.view.motion.motion_source import Recording, Simulation
 from dh2sim.view.motion.replay import open_replay
 from dh2sim.view.panel.pose import frame_title
@@ -20,7 +20,7 @@ from dh2sim.view.scene.items import Polyline as Line
 from dh2sim.view.scene.scene import BRANCHES, IN_BASE_LINK, scene_of
 from dh2sim.view.state import IDENTITY, Matrix, Mode, Part, ViewState
 from tests.program import dh2sim
-from tests.view.states import STANFORD, after
+from tests.view.states import STANFORD, WORKSPACE, after
 from tests.view.test_solids import pose_in_scene
 
 ELSEWHERE: Matrix = ((0.0, -1.0, 0.0, 0.5), (1.0, 0.0, 0.0, -2.0), (0.0, 0.0, 1.0, 3.0), (0.0, 0.0, 0.0, 1.0))
@@ -28,6 +28,7 @@ ELSEWHERE: Matrix = ((0.0, -1.0, 0.0, 0.5), (1.0, 0.0, 0.0, -2.0), (0.0, 0.0, 1.
 FOLLOW = Follow(q=STANFORD.q, T_world_base_link=ELSEWHERE)
 EVERYTHING: tuple[Event, ...] = (
     CompareMisread(),
+    FoundWorkspace(model=STANFORD.model, workspace=WORKSPACE),
     *(Show(part=part, on=True) for part in Part if part is not Part.BRANCHES),
 )
 """Branches are drawn while joints are set by hand, and then no base floats."""

@@ -17,7 +17,7 @@ from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.scene.link_poses import triad_length
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import Goal, Part
-from tests.view.on_page import OpenPage, open_tab, pixel, shown, wait_for_position, wait_until
+from tests.view.on_page import OpenPage, field, open_tab, pixel, shown, wait_for_position, wait_until
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -114,3 +114,21 @@ def test_branches_are_listed_and_clicked_through(open_page: OpenPage, viewer: Vi
     page.get_by_role("button", name=str(other), exact=True).click()
     wait_until(lambda: served.state.q == listed[other - 1].q, "the robot is in the other branch")
     wait_until(lambda: listed[other - 1].name in shown(page, "branch"), "the page names it")
+
+
+def test_the_workspace_is_searched_while_the_page_goes_on(open_page: OpenPage, viewer: Viewer) -> None:
+    page = open_page()
+    open_tab(page, "Pose")
+    (served,) = viewer.pages
+    page.get_by_label("Reachable points").first.click()
+    wait_until(lambda: "…" in shown(page, "workspace"), "the page says that it searches")
+    wait_until(lambda: "/workspace/points" in served._painter._drawn, "the points")
+    assert "best manipulability" in shown(page, "workspace")
+    page.get_by_label("Section in scene").first.click()
+    wait_until(lambda: "/section/plane/limits" in served._painter._drawn, "the section")
+    assert "section" in shown(page, "workspace")
+    open_tab(page, "Table")
+    field(page, "d₂").fill("0.25")
+    wait_until(lambda: served.state.spec.rows[1].d == 0.25, "another robot")
+    wait_until(lambda: served.state.workspace is None, "whose workspace is another")
+    wait_until(lambda: served.state.workspace is not None, "and is searched by itself")

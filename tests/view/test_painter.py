@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from dh2sim.view.scene.items import Arrow, Item, Label, Lines, Placed, Polyline, Solid, Triad
+from dh2sim.view.scene.items import Arrow, Item, Label, Lines, Placed, Points, Polyline, Solid, Triad
 from dh2sim.view.scene.painter import Painter
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ def test_every_kind_of_item_is_drawn(scene: viser.SceneApi) -> None:
         "/a/path": Polyline(points=CORNERS, color=(0.0, 1.0, 0.0)),
         "/a/arrow": Arrow(start=CORNERS[0], end=CORNERS[1], color=(0.0, 0.0, 1.0), thickness=0.1),
         "/a/label": Label(text="x"),
+        "/a/points": Points(points=CORNERS, colors=((1.0, 0.0, 0.0),) * 3, size=0.1),
     }
     assert Painter(scene).draw(items) == len(items)
     drawn = {name: type(scene.get_handle_by_name(name)).__name__ for name in items}
@@ -58,6 +59,7 @@ def test_every_kind_of_item_is_drawn(scene: viser.SceneApi) -> None:
         "/a/lines": "LineSegmentsHandle",
         "/a/path": "LineSegmentsHandle",
         "/a/arrow": "ArrowsHandle",
+        "/a/points": "PointCloudHandle",
         "/a/label": "LabelHandle",
     }
     placed = scene.get_handle_by_name("/a")

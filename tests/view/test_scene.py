@@ -17,13 +17,23 @@ from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
-from dh2sim.view.events import CompareMisread, MoveJoint, SelectRow, SetJoints, SetOpacity, Show
+from dh2sim.view.events import (
+    CompareMisread,
+    EditCell,
+    FoundWorkspace,
+    MoveJoint,
+    SelectRow,
+    SetJoints,
+    SetOpacity,
+    Show,
+)
 from dh2sim.view.initial_state import open_state
-from dh2sim.view.scene.items import Label, Lines, Polyline, Scene, Solid, Triad
+from dh2sim.view.scene.ellipsoids import force_scale
+from dh2sim.view.scene.items import Label, Lines, Points, Polyline, Scene, Solid, Triad
 from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import Part, ViewState, within
 from tests.strategies import robots_with_joint_vectors
-from tests.view.states import STANFORD, after
+from tests.view.states import STANFORD, WORKSPACE, after
 from tests.view.test_frame_readout import jacobian_by_differences
 from tests.view.test_solids import matrix, pose_in_scene
 
@@ -216,3 +226,53 @@ def test_the_grid_has_round_cells_whatever_the_robots_size() -> None:
 
 def test_the_row_that_is_edited_is_the_one_that_is_explained_from_the_beginning() -> None:
     assert scene_of(STANFORD) == scene_of(after(STANFORD, SelectRow(row=0)))
+
+
+def test_the_force_ellipsoid_has_the_forces_that_joint_torques_of_norm_1_hold() -> None:
+    state = after(STANFORD, Show(part=Part.FORCE, on=True), MoveJoint(joint=1, value=0.8))
+    scene = scene_of(state)
+    surface = scene["/force/surface"]
+    assert isinstance(surface, Solid)
+    T = pose_in_scene(scene, "/force/surface")
+    J = jacobian_by_differences(state.spec, state.q)[:3]
+    per_newton = force_scale(state.model)
+    for axis, half in zip(T[:3, :3].T, surface.scale, strict=True):
+        assert np.linalg.norm(J.T @ (half / per_newton * axis)) == pytest.approx(1.0, abs=1e-6)
+    assert not below(scene_of(STANFORD), "/force")
+    planar = scene_of(after(open_state(load_robot("planar_2r")), Show(part=Part.FORCE, on=True)))["/force/surface"]
+    assert isinstance(planar, Solid)
+    assert max(planar.scale) == planar.scale[2] < 2.0, "across the plane no joint has to hold a force: cut off"
+
+
+def test_reached_points_are_drawn_by_their_manipulability_and_cut_open() -> None:
+    state = after(STANFORD, Show(part=Part.WORKSPACE, on=True))
+    assert not below(scene_of(state), "/workspace")
+    found = WORKSPACE
+    other = open_state(load_robot("planar_2r")).model
+    assert after(state, FoundWorkspace(model=other, workspace=found)).workspace is None, "of another robot"
+    state = after(state, FoundWorkspace(model=state.model, workspace=found))
+    points = scene_of(state)["/workspace/points"]
+    assert isinstance(points, Points)
+    behind = found.centers[:, 1] > 0.0
+    assert np.array_equal(points.points, found.centers[behind])
+    brightest = int(np.argmax([sum(color) for color in points.colors]))
+    assert found.manipulability[behind][brightest] > 0.98 * found.manipulability.max()
+    whole = scene_of(after(state, Show(part=Part.CUT, on=False)))["/workspace/points"]
+    assert isinstance(whole, Points)
+    assert np.array_equal(whole.points, found.centers)
+    assert after(state, EditCell(row=1, column="d", text="0.2")).workspace is None, "of the robot before"
+
+
+def test_the_section_turns_with_the_arm_so_that_the_tool_is_in_its_plane() -> None:
+    state = after(STANFORD, Show(part=Part.SECTION, on=True))
+    state = after(state, FoundWorkspace(model=state.model, workspace=WORKSPACE), MoveJoint(joint=0, value=0.7))
+    scene = scene_of(state)
+    tool = table_tool_pose(state.spec, state.q)[:3, 3]
+    in_plane = np.linalg.inv(pose_in_scene(scene, "/section/plane"))[:3] @ [*tool, 1.0]
+    assert np.allclose(in_plane, [np.hypot(*tool[:2]), tool[2], 0.0], rtol=0, atol=1e-12)
+    limits, singular = scene["/section/plane/limits"], scene["/section/plane/singular"]
+    assert isinstance(limits, Lines)
+    assert isinstance(singular, Lines)
+    assert len(limits.segments) == 3
+    assert singular.segments == (((0.9, 0.8, 0.0), (0.1, 0.8, 0.0)),)
+    assert "/section/plane/inside" in scene

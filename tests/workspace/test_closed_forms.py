@@ -48,7 +48,7 @@ def test_a_planar_2r_arm_that_turns_all_around_reaches_an_annulus() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=min(8, settings().max_examples), deadline=None)
 @given(
     l1=st.floats(0.3, 1.0),
     l2=st.floats(0.2, 1.0),
@@ -70,7 +70,7 @@ def test_a_2r_arm_with_its_elbow_on_one_side_reaches_a_segment_of_a_ring(
 
 
 @pytest.mark.slow
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=min(8, settings().max_examples), deadline=None)
 @given(low=st.floats(0.1, 0.5), stroke=st.floats(0.2, 0.8), turn=st.floats(0.5, 5.5))
 def test_an_rp_arm_reaches_a_segment_of_a_ring(low: float, stroke: float, turn: float) -> None:
     robot = Robot([Revolute(alpha=math.pi / 2, limits=(-0.5, turn - 0.5)), Prismatic(limits=(low, low + stroke))])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from dh2sim.kinematics.forward import frame_names
 from dh2sim.kinematics.transforms import pose_errors
@@ -15,10 +15,16 @@ from dh2sim.view.frame_readout import FrameReadout, MujocoPose, readout_of, rela
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Send, bind
 from dh2sim.view.panel.branches import BranchList
+from dh2sim.view.panel.reach import ReachFolder
+from dh2sim.view.scene.ellipsoids import force_half_axes
 from dh2sim.view.state import Part, ViewState
 
 if TYPE_CHECKING:
     import viser
+
+_FORCE_HINT: Final = (
+    "The forces at tool0 that joint torques and forces of norm 1 hold: long where the velocity's is short"
+)
 
 
 class PoseTab:
@@ -48,6 +54,12 @@ class PoseTab:
                 send,
                 lambda on: Show(part=Part.ELLIPSOID, on=on),
             )
+            self._force = bind(
+                client.gui.add_checkbox("Forces in scene", Part.FORCE in state.shown, hint=_FORCE_HINT),
+                send,
+                lambda on: Show(part=Part.FORCE, on=on),
+            )
+        self._reach = ReachFolder(client, send, state)
         self._shown: object = None
         self._shown_slow: object = None
 
@@ -59,6 +71,8 @@ class PoseTab:
                 chooser.handle.options = names
             chooser.show(name)
         self._ellipsoid.show(Part.ELLIPSOID in state.shown)
+        self._force.show(Part.FORCE in state.shown)
+        self._reach.show(state)
         self._branches.show(state)
         shown = (state.model, state.q, state.frame, state.reference, state.angle, state.floats)
         if shown != self._shown:
@@ -125,10 +139,12 @@ def jacobian_markup(readout: FrameReadout) -> str:
         for name, row in zip(names, readout.jacobian.tolist(), strict=True)
     ]
     half_axes = " ".join(f"{half:.4g}" for half in readout.ellipsoid.semi_axes.tolist())
+    forces = " ".join(f"{half:.4g}" for half in force_half_axes(readout.ellipsoid).tolist())
     measures = [
         ("manipulability", f"{readout.manipulability:.6g}"),
         ("distance to singularity", f"{readout.smallest_singular_value:.6g}"),
         ("ellipsoid, half axes [m/s]", half_axes),
+        ("of force [N]", forces),
     ]
     note = markup.note("In base_link; m/s and rad/s for 1 rad/s or 1 m/s of each joint")
     return note + markup.table(rows, name="jacobian") + markup.lines(measures, name="measures")

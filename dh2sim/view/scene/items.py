@@ -81,6 +81,17 @@ class Lines(Placed):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Points(Placed):
+    """A cloud of points, each with its colour."""
+
+    points: tuple[Vector, ...] = field(repr=False)
+    """m."""
+    colors: tuple[Color, ...] = field(repr=False)
+    size: float
+    """Of a point, m."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Arrow(Placed):
     """An arrow from one point to another."""
 
@@ -100,6 +111,6 @@ class Label(Placed):
     color: Color = (0.1, 0.1, 0.1)
 
 
-Item: TypeAlias = Placed | Solid | Triad | Polyline | Lines | Arrow | Label
+Item: TypeAlias = Placed | Solid | Triad | Polyline | Lines | Points | Arrow | Label
 Scene: TypeAlias = Mapping[str, Item]
 """Items by name."""

@@ -15,6 +15,7 @@ from dh2sim.view.scene.items import (
     Label,
     Lines,
     Placed,
+    Points,
     Polyline,
     Scene,
     Solid,
@@ -106,6 +107,16 @@ class Painter:
                     **_properties(item),
                     **pose,
                 )
+            case Points():
+                return self._scene.add_point_cloud(
+                    name,
+                    points=np.array(item.points, dtype=np.float32),
+                    colors=np.round(255.0 * np.array(item.colors)).astype(np.uint8),
+                    point_size=item.size,
+                    point_shape="circle",
+                    precision="float32",
+                    **pose,
+                )
             case Arrow():
                 return self._scene.add_arrows(
                     name,
@@ -128,6 +139,8 @@ def _made_of(item: Item) -> tuple[object, ...]:
             return Solid, item.vertices, item.faces
         case Polyline() | Lines():
             return type(item), item.color, item.width
+        case Points():
+            return Points, item.points, item.colors, item.size
         case Arrow():
             return Arrow, item.color, item.thickness
         case Triad():

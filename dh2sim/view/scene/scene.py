@@ -11,13 +11,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian
-from dh2sim.kinematics.singularity import velocity_ellipsoid
+from dh2sim.kinematics.forward import forward_kinematics
 from dh2sim.kinematics.transforms import compose, pose_errors
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.view.branches import branches_of
 from dh2sim.view.scene.annotations import row_annotations
+from dh2sim.view.scene.ellipsoids import ELLIPSOID, FORCE, ellipsoids
 from dh2sim.view.scene.ghost import PALE, ToolOffset, ghost_configuration, ghost_scene
 from dh2sim.view.scene.ground import ground_of
 from dh2sim.view.scene.items import (
@@ -36,7 +36,8 @@ from dh2sim.view.scene.items import (
 )
 from dh2sim.view.scene.labels import spread_labels
 from dh2sim.view.scene.link_poses import poses_at, robot_size, round_length, triad_length
-from dh2sim.view.scene.solids import ball_triangles, orientation_of, position_of, robot_solids
+from dh2sim.view.scene.reach import SECTION, WORKSPACE, reach_items
+from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids
 from dh2sim.view.state import Goal, LinkDrag, Mode, Part, ViewState
 
 ROBOT: Final = "/robot"
@@ -45,11 +46,10 @@ ROW: Final = "/row"
 GHOST: Final = "/ghost"
 DRAG: Final = "/drag"
 GOAL: Final = "/goal"
-ELLIPSOID: Final = "/ellipsoid"
 BRANCHES: Final = "/branches"
 GRID: Final = "/grid"
 PEDESTAL: Final = "/pedestal"
-IN_BASE_LINK: Final = (ROBOT, NAMES, ROW, GHOST, ELLIPSOID, BRANCHES)
+IN_BASE_LINK: Final = (ROBOT, NAMES, ROW, GHOST, ELLIPSOID, FORCE, BRANCHES, WORKSPACE, SECTION)
 """Items below these are given in base_link, all others, such as the trace and the grid, in the world."""
 _BRANCH_OPACITY: Final = 0.16
 PLANNED_COLOR: Final[Color] = (0.85, 0.45, 0.05)
@@ -64,11 +64,6 @@ _TOGETHER: Final = 0.25
 """Frames nearer to each other than this share of their axes' length share a label."""
 _ABOVE: Final = 0.45
 """Height of a label above its frame, as a share of the axes' length."""
-_ELLIPSOID_COLOR: Final[Color] = (0.05, 0.50, 0.62)
-_ELLIPSOID_SCALE: Final = 0.15
-"""m of an ellipsoid for each m/s of a velocity."""
-_FLAT: Final = 0.01
-"""Thickness of an ellipsoid that is flat, as a share of its length."""
 _THICKNESS: Final = 0.12
 """Of the arrow of a drag, as a share of the axes' length."""
 
@@ -105,8 +100,8 @@ def _items(state: ViewState) -> Iterator[tuple[str, Item]]:
         yield from _without(GHOST, ghost_scene(state.ghost.model, configuration.q))
     if Part.BRANCHES in state.shown and state.mode is Mode.MANUAL:
         yield from _branches(state)
-    if Part.ELLIPSOID in state.shown:
-        yield from _ellipsoid(state)
+    yield from ellipsoids(state)
+    yield from reach_items(state)
     if state.drag is not None:
         yield DRAG, _drag_arrow(state, state.drag)
     if (marker := _goal_marker(state)) is not None:
@@ -129,33 +124,6 @@ def _branches(state: ViewState) -> Iterator[tuple[str, Item]]:
         if not branch.here:
             root = f"{BRANCHES}/branch_{number}"
             yield from robot_solids(state.model, branch.q, root, color=PALE, opacity=_BRANCH_OPACITY).items()
-
-
-def _ellipsoid(state: ViewState) -> Iterator[tuple[str, Item]]:
-    """Yield the velocity ellipsoid around the origin of tool0, and its principal axes."""
-    ellipsoid = velocity_ellipsoid(geometric_jacobian(state.model.chain, state.q))
-    halves = _ELLIPSOID_SCALE * ellipsoid.semi_axes
-    if not halves[0] > 0.0:
-        return
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = ellipsoid.axes, poses_at(state.model, state.q).tool0[:3, 3]
-    position, orientation = position_of(T), orientation_of(T)
-    vertices, faces = ball_triangles()
-    yield (
-        f"{ELLIPSOID}/surface",
-        Solid(
-            position=position,
-            orientation=orientation,
-            vertices=vertices,
-            faces=faces,
-            color=_ELLIPSOID_COLOR,
-            opacity=0.35,
-            scale=vector(np.maximum(halves, _FLAT * halves[0])),
-        ),
-    )
-    segments = tuple((vector(-half), vector(half)) for half in np.diag(halves))
-    axes = Lines(position=position, orientation=orientation, segments=segments, color=_ELLIPSOID_COLOR, width=2.0)
-    yield f"{ELLIPSOID}/axes", axes
 
 
 def _spread_labels(state: ViewState, items: Scene) -> Scene:
