@@ -53,6 +53,10 @@ class ImportedFileError(RobotFileError):
     """A file that a robot is to be made from is wrong: a URDF, an MJCF, a table, axes."""
 
 
+class DesignFileError(RobotFileError):
+    """A file of designs is wrong, or a robot that it describes."""
+
+
 class UnknownRobotError(Dh2simError):
     """Neither a file nor a robot that comes with dh2sim has this name."""
 

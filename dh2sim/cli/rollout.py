@@ -31,7 +31,10 @@ if TYPE_CHECKING:
 def rollout(
     robot: RobotArgument,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="RUN.zarr", help="Folder to write the run to.")],
-    rollouts: Annotated[int, typer.Option(metavar="N", help="Number of rollouts.")] = 256,
+    rollouts: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Number of rollouts. [default: 256, or one for each of --designs]"),
+    ] = None,
     duration: Annotated[
         float | None,
         typer.Option(metavar="S", help="Duration of each rollout, s. [default: 2, unless --steps is given]"),
@@ -81,6 +84,22 @@ def rollout(
             "each link or joint of each rollout.",
         ),
     ] = "",
+    vary: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME=HOW,…",
+            help="Draw numbers of the robot file for each rollout: X (a factor from 1 - X to 1 + X), normal:SD, "
+            "uniform:LOW:HIGH or loguniform:LOW:HIGH, in the file's units. A parameter of the file, a cell such as "
+            "a2 or theta1, or a path such as joint_2.link.mass.",
+        ),
+    ] = "",
+    designs: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.csv", help="Simulate the designs of a file: a column for each number."),
+    ] = None,
+    per_design: Annotated[
+        int | None, typer.Option(metavar="N", help="Successive rollouts that have one design. [default: 1]")
+    ] = None,
     floating_base: Annotated[bool, typer.Option("--floating-base", help="Let base_link move freely.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted run, or start it.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing run.")] = False,
@@ -103,6 +122,7 @@ def rollout(
       dh2sim rollout ur5e --out run.zarr --start random --json -q
       dh2sim rollout my_arm.yaml --out run.zarr --rollouts 100000 --resume
       dh2sim rollout puma560 --out run.zarr --randomize mass=0.2
+      dh2sim rollout puma560 --out run.zarr --vary a2=0.05,d3=normal:0.01
     Then:
       dh2sim runs run.zarr               what it contains
       dh2sim plot run.zarr --what joints
@@ -115,7 +135,7 @@ def rollout(
     from dh2sim.simulate.run import fill, open_run
 
     options = RolloutOptions(
-        rollouts=rollouts,
+        rollouts=rollouts,  # type: ignore[arg-type]  # None is as if it were not given
         steps=steps,
         duration=duration,
         timestep=timestep,
@@ -126,13 +146,16 @@ def rollout(
         record=record,
         every=every,
         randomize=_shares(randomize),
+        vary=_named(vary, "--vary", "name=how, as in a2=0.05"),
+        designs=None if designs is None else str(designs),
+        per_design=per_design,
         floating_base=floating_base,
     )
     job = prepare(model, options, command=shlex.join(["dh2sim", *sys.argv[1:]]))
     with (
         open_run(job, out, resume=resume, overwrite=overwrite) as writer,
         _patient(quiet) as patience,
-        progress_bar("simulating", "rollouts", rollouts, quiet=quiet) as advance,
+        progress_bar("simulating", "rollouts", options.rollouts, quiet=quiet) as advance,
     ):
         progress = fill(writer, job, threads=threads, advance=advance, stopping=lambda: patience.arrived is not None)
     summary = describe(out)
@@ -144,29 +167,36 @@ def rollout(
     if progress.finished:
         return 0
     print(
-        f"dh2sim: interrupted; {summary.rollouts - summary.not_run:,} of {rollouts:,} rollouts are saved in "
+        f"dh2sim: interrupted; {summary.rollouts - summary.not_run:,} of {options.rollouts:,} rollouts are saved in "
         f"{printable(str(out))}. Continue with the same command and --resume",
         file=sys.stderr,
     )
     return INTERRUPTED if patience.arrived == signal.SIGINT else 128 + int(patience.arrived or 0)
 
 
+def _named(text: str, option: str, form: str) -> dict[str, str]:
+    """Read ``name=value,…``; ``form`` says in words what each is like."""
+    values: dict[str, str] = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        name, equals, value = (part.strip() for part in item.partition("="))
+        if not equals or not name or not value:
+            raise typer.BadParameter(f"'{item}' is not of the form {form}", param_hint=option)
+        if name in values:
+            raise typer.BadParameter(f"'{name}' is given twice", param_hint=option)
+        values[name] = value
+    return values
+
+
 def _shares(text: str) -> dict[str, float]:
     """Read ``name=share,…``."""
     shares: dict[str, float] = {}
-    for item in filter(None, (part.strip() for part in text.split(","))):
-        name, equals, value = (part.strip() for part in item.partition("="))
+    form = "name=share, as in mass=0.1"
+    for name, value in _named(text, "--randomize", form).items():
         try:
-            number = float(value)
+            shares[name] = float(value)
         except ValueError:
-            number = None
-        if not equals or number is None:
-            raise typer.BadParameter(
-                f"'{item}' is not of the form name=share, as in mass=0.1", param_hint="--randomize"
-            )
-        if name in shares:
-            raise typer.BadParameter(f"'{name}' is given twice", param_hint="--randomize")
-        shares[name] = number
+            item = f"'{name}={value}'"
+            raise typer.BadParameter(f"{item} is not of the form {form}", param_hint="--randomize") from None
     return shares
 
 

@@ -9,6 +9,7 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
+from types import MappingProxyType
 
 from dh2sim.errors import Dh2simError, RobotError, UnknownRobotError
 from dh2sim.messages import Loc, did_you_mean, listed, loc_of, path_of, shown
@@ -102,12 +103,12 @@ def read_tree(
     usual = default_units or Units()
     scope = Scope(
         report=places,
-        parameters=_evaluate_parameters(root, report),
+        parameters=evaluate_parameters(root, report),
         directory=directory,
         angle=_unit(root.at("units", "angle"), AngleUnit, usual.angle),
         length=_unit(root.at("units", "length"), LengthUnit, usual.length),
     )
-    tree = kind.check(_plain(root), (), scope)
+    tree = kind.check(plain_node(root), (), scope)
     if tree is not WRONG:
         check(tree, scope)
     if report.problems:
@@ -158,13 +159,13 @@ def units_of(tree: Tree) -> Units:
     return Units(**tree.get("units", {}))
 
 
-def _plain(node: Node) -> object:
+def plain_node(node: Node) -> object:
     """Return a node's value without places."""
     match node.value:
         case dict() as entries:
-            return {key: _plain(entry.value) for key, entry in entries.items()}
+            return {key: plain_node(entry.value) for key, entry in entries.items()}
         case list() as items:
-            return [_plain(item) for item in items]
+            return [plain_node(item) for item in items]
         case scalar:
             return scalar
 
@@ -180,10 +181,17 @@ def _locate(tree: Tree, places: Places) -> None:
         tree["assembly"]["location"] = places.place(("assembly", "q"))
 
 
-def _evaluate_parameters(root: Node, report: Report) -> Mapping[str, float]:
+def evaluate_parameters(
+    root: Node, report: Report, exchanged: Mapping[str, float] = MappingProxyType({})
+) -> Mapping[str, float]:
     """Return every parameter's value; NaN for one that is wrong, which is then in ``report``.
 
     Where keys of ``parameters`` could not be read, every other name has the value NaN as well.
+
+    Args:
+        root: The tree of the file.
+        report: Where problems are noted.
+        exchanged: Values that take the place of the file's own.
     """
     node = root.at("parameters")
     if node is None:
@@ -205,7 +213,7 @@ def _evaluate_parameters(root: Node, report: Report) -> Mapping[str, float]:
         if node.wrong:
             continue
         try:
-            values[name] = to_number(node.value, values)
+            values[name] = exchanged[name] if name in exchanged else to_number(node.value, values)
         except NumberError as error:
             report.add(node.line, node.column, ("parameters", name), str(error))
     for cycle in cycles:

@@ -5,6 +5,7 @@ Each field is annotated with its kind (``fields``): what it means, its unit in f
 a robot.
 """
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -599,6 +600,19 @@ class RobotSpec:
 
 ROBOT: Final = Part("", RobotSpec, more={"actuators": Part("What drives every joint.", ActuatorSpec)})
 """The robot file as a whole."""
+
+
+def robot_of_checked(given: Mapping[str, Any]) -> RobotSpec:
+    """Return the robot of fields that ``robot_fields`` made of a tree without problems, without another check."""
+    robot = object.__new__(RobotSpec)
+    for each in dataclasses.fields(RobotSpec):
+        if each.name in given or each.default is not dataclasses.MISSING:
+            value = given.get(each.name, each.default)
+        else:
+            assert each.default_factory is not dataclasses.MISSING
+            value = each.default_factory()
+        object.__setattr__(robot, each.name, value)
+    return robot
 
 
 class _Problems:

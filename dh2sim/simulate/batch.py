@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dh2sim.simulate.contacts import FirstContacts
 from dh2sim.simulate.dataset_layout import FINISHED, STATUS
-from dh2sim.simulate.mujoco_runtime import VELOCITY_STAGE, forward
+from dh2sim.simulate.mujoco_runtime import VELOCITY_STAGE, forward, set_models
 from dh2sim.simulate.plant import Plant
 from dh2sim.simulate.randomization import apply_scales
 from dh2sim.simulate.records import Recorder
@@ -150,6 +150,7 @@ class GravityForces:
         """Return the joint forces, N·m or N, that balance gravity at the given positions, shape (batch, n)."""
         if self._batch is None:
             self._batch = Batch(self._plant.model, self._simulations, self._threads)
+            set_models(self._batch, self._plant, as_fields=bool(self._factors))
             apply_scales(self._batch, self._plant, self._factors)
         mass, force = self._batch.bind("M"), self._batch.bind("qfrc_bias")
         self._batch.bind("qpos")[:] = qpos
@@ -201,6 +202,8 @@ class MonitoredBatch:
             wanted: Controls, shape (batch, …, actuators).
         """
         lower, upper = self.plant.control_lower, self.plant.control_upper
+        if wanted.ndim > lower.ndim > 1:
+            lower, upper = lower[:, None], upper[:, None]
         outside = (wanted < lower) | (wanted > upper)
         if not outside.any():
             return wanted, None

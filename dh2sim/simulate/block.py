@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,15 +11,17 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from dh2sim.errors import ControllerError
+from dh2sim.robot.variation import CELLS
 from dh2sim.simulate.batch import BatchObservation, GravityForces, MonitoredBatch
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, OpenLoop, RolloutBatch
 from dh2sim.simulate.controllers.registry import ControllerChoice
-from dh2sim.simulate.dataset_layout import Layout
+from dh2sim.simulate.dataset_layout import Layout, design_variables
+from dh2sim.simulate.design_plants import DesignPlant, DesignPlants, groups
 from dh2sim.simulate.initial_states import InitialStates
 from dh2sim.simulate.loops import Scheduled, checked, simulate_closed_loop, simulate_open_loop
-from dh2sim.simulate.mujoco_runtime import quiet_engine
+from dh2sim.simulate.mujoco_runtime import quiet_engine, set_models
 from dh2sim.simulate.options import RolloutOptions
-from dh2sim.simulate.plant import Plant
+from dh2sim.simulate.plant import Plant, batch_plant
 from dh2sim.simulate.randomization import Generators, Purpose, apply_scales, scales
 from dh2sim.simulate.records import Recorder
 from dh2sim.typing import Array, read_only
@@ -45,6 +47,8 @@ class Job:
     controller: ControllerChoice
     initial: InitialStates
     layout: Layout = field(repr=False)
+    designs: DesignPlants | None = None
+    """Where rollouts have designs of their own; ``plant`` is that of the robot file then."""
 
 
 def simulate_block(
@@ -65,11 +69,13 @@ def simulate_block(
         ControllerError: The controller failed, or returned an array of the wrong shape.
     """
     arrays = _empty(job, rollouts)
+    made: dict[int, DesignPlant] = {}
     with quiet_engine():
         for first in range(rollouts.start, rollouts.stop, BATCH_SIZE):
             part = range(first, min(first + BATCH_SIZE, rollouts.stop))
             rows = slice(part.start - rollouts.start, part.stop - rollouts.start)
-            _simulate(job, part, threads, {name: array[rows] for name, array in arrays.items()}, job.options.steps)
+            own = {name: array[rows] for name, array in arrays.items()}
+            _simulate(job, part, threads, own, job.options.steps, made)
             if advance is not None:
                 advance(len(part))
     return arrays
@@ -83,7 +89,7 @@ def rehearse(job: Job) -> None:
     """
     short, first = replace(job, options=job.options.replace(steps=1, every=1)), range(min(2, job.options.rollouts))
     with quiet_engine():
-        _simulate(short, first, 1, _empty(short, first), job.options.steps)
+        _simulate(short, first, 1, _empty(short, first), job.options.steps, {})
 
 
 def _empty(job: Job, rollouts: range) -> dict[str, NDArray[Any]]:
@@ -95,11 +101,56 @@ def _empty(job: Job, rollouts: range) -> dict[str, NDArray[Any]]:
     }
 
 
-def _simulate(job: Job, rollouts: range, threads: int, arrays: Block, run_steps: int) -> None:
-    """Simulate one batch into its part of the block's arrays; the controller is made for ``run_steps`` time steps."""
-    plant, options, name = job.plant, job.options, job.controller.name
+def _simulate(
+    job: Job, rollouts: range, threads: int, arrays: Block, run_steps: int, made: dict[int, DesignPlant]
+) -> None:
+    """Simulate some rollouts into their part of the block's arrays, in one batch, or one for each layout of models.
+
+    The controller is made for ``run_steps`` time steps; ``made`` has designs that were made before.
+    """
+    if job.designs is None:
+        _simulate_batch(job, job.plant, None, rollouts, threads, arrays, run_steps)
+        return
+    designs = job.designs.of(rollouts, made)
+    _note_designs(job.designs, designs, rollouts, arrays)
+    for group in groups(designs):
+        own = [designs[position] for position in group]
+        whole = len(group) == len(rollouts)
+        parts = arrays if whole else {name: array[group] for name, array in arrays.items()}
+        which: Sequence[int] = rollouts if whole else [rollouts[position] for position in group]
+        start = read_only([design.start for design in own])
+        plant = batch_plant([design.plant for design in own])
+        _simulate_batch(job, plant, start, which, threads, parts, run_steps)
+        if not whole:
+            for name, array in arrays.items():
+                array[group] = parts[name]
+
+
+def _note_designs(plants: DesignPlants, designs: Sequence[DesignPlant], rollouts: range, arrays: Block) -> None:
+    """Record what the designs of rollouts are."""
+    numbers = [rollout // plants.per_design for rollout in rollouts]
+    arrays["design"][:] = numbers
+    values = {number: plants.designs.values(number) for number in set(numbers)}
+    for i, name in enumerate(design_variables(plants.designs.names)):
+        arrays[name][:] = [values[number][i] for number in numbers]
+    for i, cell in enumerate(CELLS):
+        if f"dh_{cell}" in arrays:
+            arrays[f"dh_{cell}"][:] = [design.rows[:, i] for design in designs]
+
+
+def _simulate_batch(
+    job: Job,
+    plant: Plant,
+    start: Array | None,
+    rollouts: Sequence[int],
+    threads: int,
+    arrays: Block,
+    run_steps: int,
+) -> None:
+    """Simulate rollouts in one batch; ``start`` has the named configuration of each where they have designs."""
+    options, name = job.options, job.controller.name
     factors = scales(plant, options, rollouts)
-    q0, v0 = job.initial.states(plant, options, rollouts)
+    q0, v0 = job.initial.states(plant, options, rollouts, start)
     qpos0 = np.concatenate([np.tile(_base_pose(plant), (len(q0), 1)), q0], axis=1)
     gravity = GravityForces(plant, len(rollouts), threads, factors)
     controller = job.controller.make(
@@ -117,10 +168,12 @@ def _simulate(job: Job, rollouts: range, threads: int, arrays: Block, run_steps:
     stepwise = isinstance(controller, ClosedLoop) or recorder.looks_between_steps
     # between the steps of a closed loop an MjData keeps what it has computed already
     batch = Batch(plant.model, len(rollouts), threads, persistent=stepwise)
+    set_models(batch, plant, as_fields=bool(factors))
     apply_scales(batch, plant, factors)
     batch.bind("qpos")[:] = qpos0
     batch.bind("qvel")[:, plant.model.nv - plant.n :] = v0
     monitored = MonitoredBatch(plant, batch, recorder, options.steps)
+    monitored.contacts.number_as(job.plant.model)
     for state in recorder.state_fields:
         recorder.put_field(state, 0, batch.bind(state)[:, None])
     if isinstance(controller, ClosedLoop):

@@ -31,12 +31,17 @@ class FirstContacts:
             simulations: Number of simulations.
             substeps: Whether what MuJoCo counts in a time step is that of a substep near its end, as with RK4.
         """
-        self._model = plant.model
+        self._models = plant.models
         self._data = mujoco.MjData(plant.model)
         self._substeps = substeps
+        self.number_as(plant.model)
         self.step = np.full(simulations, NO_CONTACT, dtype=np.int64)
         self.links = np.full((simulations, 2), NO_CONTACT, dtype=np.int32)
         """Numbers of the bodies, in ascending order."""
+
+    def number_as(self, model: mujoco.MjModel) -> None:
+        """Count bodies as a model does whose bodies of these names may have other numbers."""
+        self._numbers = {name: number for number, name in links_with_shapes(model).items()}
 
     def see(self, simulations: NDArray[np.intp], step: int, contacts: NDArray[Any], qpos: Array) -> None:
         """Look at simulations at the beginning of a time step.
@@ -80,12 +85,16 @@ class FirstContacts:
 
     def _note(self, simulation: int, step: int, qpos: Array) -> bool:
         """Note the links that overlap most at given positions; return whether there are any."""
+        model = self._models[simulation % len(self._models)]
         self._data.qpos[:] = qpos
-        mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_collision(self._model, self._data)
+        mujoco.mj_kinematics(model, self._data)
+        mujoco.mj_collision(model, self._data)
         if not self._data.ncon:
             return False
         contact = self._data.contact
-        bodies = self._model.geom_bodyid[contact.geom[int(np.argmin(contact.dist))]]
-        self.step[simulation], self.links[simulation] = step, np.sort(bodies)
+        bodies = model.geom_bodyid[contact.geom[int(np.argmin(contact.dist))]]
+        self.step[simulation], self.links[simulation] = (
+            step,
+            sorted(self._numbers[model.body(int(body)).name] for body in bodies),
+        )
         return True

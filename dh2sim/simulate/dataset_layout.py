@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dh2sim.robot.spec import Convention, Row
+from dh2sim.robot.variation import CELLS, Variation
 from dh2sim.simulate.contacts import NO_CONTACT, links_with_shapes
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.plant import Plant
@@ -93,7 +96,14 @@ DOUBLE, LONG, INT, BYTE = np.dtype(np.float64), np.dtype(np.int64), np.dtype(np.
 
 
 def run_layout(
-    plant: Plant, options: RolloutOptions, attributes: Mapping[str, Any], *, follows: bool, block: int
+    plant: Plant,
+    options: RolloutOptions,
+    attributes: Mapping[str, Any],
+    *,
+    follows: bool,
+    block: int,
+    variation: Variation | None = None,
+    rows: Sequence[Row] = (),
 ) -> Layout:
     """Return the layout of a run's dataset.
 
@@ -103,26 +113,35 @@ def run_layout(
         attributes: Those of the dataset, JSON values.
         follows: Whether the controller has a reference to record.
         block: Rollouts in a block.
+        variation: What differs between designs, if there are such.
+        rows: Those of the table.
     """
-    variables = tuple(_variables(plant, options, follows=follows))
-    sizes = _sizes(plant, options, variables)
+    variables = tuple(_variables(plant, options, follows=follows, variation=variation, rows=rows))
+    sizes = _sizes(plant, options, variables, len(rows))
     return Layout(
         sizes=sizes,
-        coordinates=tuple(_coordinates(plant, options, sizes)),
+        coordinates=tuple(_coordinates(plant, options, sizes, rows)),
         variables=variables,
         attributes=attributes,
         block=block,
     )
 
 
-def rollout_bytes(plant: Plant, options: RolloutOptions, *, follows: bool) -> int:
-    """Return how many bytes a rollout records."""
-    variables = tuple(_variables(plant, options, follows=follows))
-    sizes = _sizes(plant, options, variables)
+def rollout_bytes(
+    plant: Plant,
+    options: RolloutOptions,
+    *,
+    follows: bool,
+    variation: Variation | None = None,
+    rows: Sequence[Row] = (),
+) -> int:
+    """Return how many bytes a rollout records; the arguments are those of ``run_layout``."""
+    variables = tuple(_variables(plant, options, follows=follows, variation=variation, rows=rows))
+    sizes = _sizes(plant, options, variables, len(rows))
     return sum(math.prod(sizes[name] for name in each.dimensions[1:]) * each.dtype.itemsize for each in variables)
 
 
-def _sizes(plant: Plant, options: RolloutOptions, variables: Iterable[Variable]) -> dict[str, int]:
+def _sizes(plant: Plant, options: RolloutOptions, variables: Iterable[Variable], rows: int) -> dict[str, int]:
     """Return the size of every dimension that the variables have."""
     sizes = {
         "rollout": options.rollouts,
@@ -134,12 +153,15 @@ def _sizes(plant: Plant, options: RolloutOptions, variables: Iterable[Variable])
         "energy_kind": len(ENERGY),
         "twist": len(TWIST),
         "link": len(links(plant)),
+        "row": rows,
     }
     used = {"step", "interval", "joint", *(name for variable in variables for name in variable.dimensions)}
     return {name: size for name, size in sizes.items() if name in used}
 
 
-def _variables(plant: Plant, options: RolloutOptions, *, follows: bool) -> Iterator[Variable]:
+def _variables(
+    plant: Plant, options: RolloutOptions, *, follows: bool, variation: Variation | None, rows: Sequence[Row]
+) -> Iterator[Variable]:
     for name in options.record:
         if name != "reference" or follows:
             yield from _recorded(name, plant)
@@ -160,6 +182,34 @@ def _variables(plant: Plant, options: RolloutOptions, *, follows: bool) -> Itera
         yield _per_rollout(
             f"{name}_scale", dimensions.get(name, ("joint",)), DOUBLE, np.nan, "1", f"factor of the {name}"
         )
+    if variation is not None:
+        yield from _of_design(variation, rows)
+
+
+TAKEN: Final = frozenset(
+    """qpos qvel ctrl tool_pose qpos_ref qvel_ref qacc torque energy contacts base_pose base_twist status stop_step
+    saturation contact_step contact_link_a contact_link_b design blocks rollout step interval joint actuator pose
+    energy_kind twist link row time interval_time joint_unit joint_lower joint_upper joint_velocity_limit
+    actuator_unit""".split()  # noqa: SIM905
+)
+"""Names of variables, coordinates and dimensions of runs, which no number of a design can have."""
+
+
+def design_variables(names: Iterable[str]) -> dict[str, str]:
+    """Return names of numbers of a robot file by the names of their variables, which have letters, digits and _."""
+    return {re.sub("[^A-Za-z0-9]+", "_", name).strip("_"): name for name in names}
+
+
+def _of_design(variation: Variation, rows: Sequence[Row]) -> Iterator[Variable]:
+    yield _per_rollout("design", (), LONG, -1, "1", "number of the design")
+    units = dict(zip(variation.names, variation.units, strict=True))
+    for variable, name in design_variables(variation.names).items():
+        words = f"{name} of the robot file, in its units"
+        yield _per_rollout(variable, (), DOUBLE, np.nan, units[name] or "as in the robot file", words, parameter=name)
+    has_beta = any(row.convention is Convention.HAYATI for row in rows)
+    for cell in CELLS if has_beta else CELLS[:-1]:
+        unit = "m" if cell in ("a", "d") else "rad"
+        yield _per_rollout(f"dh_{cell}", ("row",), DOUBLE, np.nan, unit, f"{cell} of every row of the table")
 
 
 def _per_rollout(
@@ -211,7 +261,9 @@ def _recorded(name: str, plant: Plant) -> Iterator[Variable]:
             yield _per_rollout("contacts", ("interval",), INT, -1, "1", words)
 
 
-def _coordinates(plant: Plant, options: RolloutOptions, sizes: Mapping[str, int]) -> Iterator[Coordinate]:
+def _coordinates(
+    plant: Plant, options: RolloutOptions, sizes: Mapping[str, int], rows: Sequence[Row]
+) -> Iterator[Coordinate]:
     time = plant.timestep * options.every * np.arange(options.records + 1)
     units = ["rad" if turns else "m" for turns in plant.turns]
     yield Coordinate(name="rollout", dimension="rollout", values=np.arange(options.rollouts, dtype=np.int64))
@@ -239,6 +291,7 @@ def _coordinates(plant: Plant, options: RolloutOptions, sizes: Mapping[str, int]
         "energy_kind": ENERGY,
         "twist": TWIST,
         "link": tuple(plant.model.body(i).name for i in links(plant)),
+        "row": tuple(row.name for row in rows),
     }
     for name, texts in labels.items():
         if name in sizes:

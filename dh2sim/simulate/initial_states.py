@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from mujoco.batch import Batch
 
 from dh2sim.errors import SettingsError
 from dh2sim.messages import did_you_mean, listed
-from dh2sim.simulate.mujoco_runtime import forward
+from dh2sim.simulate.mujoco_runtime import forward, set_models
 from dh2sim.simulate.options import REFERENCE, STARTS, RolloutOptions
 from dh2sim.simulate.plant import Plant
 from dh2sim.simulate.randomization import Generators, Purpose
@@ -36,15 +36,22 @@ class InitialStates:
     """Joint positions and velocities, rad, m and their rates, shape (1 or rollouts, 2, n)."""
     digest: str = ""
     """SHA-256 of ``given``; empty for home and zero, which are the robot's."""
+    named: bool = False
+    """Whether it is a named configuration."""
 
-    def states(self, plant: Plant, options: RolloutOptions, rollouts: range) -> tuple[Array, Array]:
+    def states(
+        self, plant: Plant, options: RolloutOptions, rollouts: Sequence[int], own: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return joint positions and velocities at the start of some rollouts, each of shape (batch, n).
 
-        Random configurations lie inside the limits, uniformly, and no links touch in them if such are found.
+        Random configurations lie inside the limits, uniformly, and no links touch in them if such are found. Rollouts
+        with designs of their own that start in a named configuration do so in their design's, ``own``.
         """
+        if own is not None and self.named:
+            return own.copy(), np.zeros(own.shape)
         if self.given is not None:
             one = len(self.given) == 1
-            chosen = self.given if one else self.given[rollouts.start : rollouts.stop]
+            chosen = self.given if one else self.given[np.asarray(rollouts)]
             states = np.broadcast_to(chosen, (len(rollouts), 2, plant.n))
             return states[:, 0].copy(), states[:, 1].copy()
         return _random(plant, options.seed, rollouts), np.zeros((len(rollouts), plant.n))
@@ -103,7 +110,7 @@ def read_initial_states(
         )
     frozen = read_only(states)
     digest = "" if start in STARTS else hashlib.sha256(frozen.tobytes()).hexdigest()
-    return InitialStates(name=start, given=frozen, digest=digest)
+    return InitialStates(name=start, given=frozen, digest=digest, named=start in configurations)
 
 
 def reference_start(first: Mapping[str, float] | None, joints: tuple[str, ...]) -> InitialStates:
@@ -192,19 +199,20 @@ def _csv(path: Path, joints: tuple[str, ...]) -> Array:
     return states
 
 
-def _random(plant: Plant, seed: int, rollouts: range) -> Array:
-    half = plant.free_half_ranges
-    lower = np.where(np.isfinite(plant.lower), plant.lower, -half)
-    upper = np.where(np.isfinite(plant.upper), plant.upper, half)
+def _random(plant: Plant, seed: int, rollouts: Sequence[int]) -> Array:
+    half, shape = plant.free_half_ranges, (len(rollouts), plant.n)
+    lower = np.broadcast_to(np.where(np.isfinite(plant.lower), plant.lower, -half), shape)
+    upper = np.broadcast_to(np.where(np.isfinite(plant.upper), plant.upper, half), shape)
     sources = Generators(seed, rollouts, Purpose.START)
     batch = Batch(plant.model, len(rollouts), nthread=1)
+    set_models(batch, plant)
     first = 7 if plant.floating else 0
     qpos, contacts = batch.bind("qpos"), batch.bind("ncon")
     q = np.zeros((len(rollouts), plant.n))
     left = np.arange(len(rollouts))
     for _ in range(TRIES):
         for i in left.tolist():
-            q[i] = sources[i].uniform(lower, upper)
+            q[i] = sources[i].uniform(lower[i], upper[i])
         qpos[left, first:] = q[left]
         forward(batch, left)
         left = left[contacts[left] > 0]

@@ -8,13 +8,17 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch, SimulationError
+from mujoco.batch import MODEL_FIELDS, Batch, SimulationError
 from numpy.typing import NDArray
 
 from dh2sim.mujoco_warnings import mujoco_warnings
+
+if TYPE_CHECKING:
+    from dh2sim.simulate.plant import Plant
 
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 """MuJoCo has computed all that follows from positions and velocities."""
@@ -54,6 +58,36 @@ def forward(batch: Batch, ids: NDArray[np.intp] | None = None) -> None:
     """Compute what MuJoCo derives from positions and velocities; simulations that fail keep their old values."""
     with suppress(SimulationError):
         batch.forward(ids, stage=VELOCITY_STAGE)
+
+
+def set_models(batch: Batch, plant: Plant, *, as_fields: bool = False) -> None:
+    """Give the simulations of a batch the models of their designs, if they have such.
+
+    Args:
+        batch: The batch, made of ``plant.model``.
+        plant: What its simulations are of.
+        as_fields: Whether every field in which the models differ becomes one of the batch's own, so that it can be
+            changed afterwards; slower, with the same bits.
+    """
+    if not plant.each:
+        return
+    if not as_fields:
+        batch.set_models(list(plant.models))
+        return
+    first = plant.model
+    distinct = {id(model): model for model in plant.models}
+    for name in sorted(MODEL_FIELDS):
+        own = _field(first, name)
+        if own is None or all(np.array_equal(own, _field(model, name)) for model in distinct.values()):
+            continue
+        values = batch.expand(name)
+        for i, model in enumerate(plant.models):  # of bvh_aabb a batch holds the beginning
+            values[i] = np.ravel(_field(model, name))[: values[i].size].reshape(values[i].shape)
+
+
+def _field(model: mujoco.MjModel, name: str) -> Any:
+    owner, _, rest = name.partition(".")
+    return getattr(model.opt, rest, None) if rest else getattr(model, owner, None)
 
 
 def _timer() -> ctypes.c_void_p | None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
 from functools import partial
+from os import PathLike
 from types import MappingProxyType
 from typing import Any, Final, SupportsIndex, TypedDict, Unpack
 
 from dh2sim.errors import SettingsError
 from dh2sim.messages import did_you_mean, listed
+from dh2sim.simulate.designs import DesignTable, Draw, read_design_table, read_draws
 
 RECORDABLE: Final = ("qpos", "qvel", "ctrl", "tool_pose", "reference", "qacc", "torque", "energy", "contacts")
 """What ``record`` may contain."""
@@ -46,6 +48,9 @@ class RolloutKeywords(TypedDict, total=False):
     every: SupportsIndex
     randomize: Mapping[str, float]
     floating_base: bool
+    vary: Mapping[str, str | float | Draw]
+    designs: str | PathLike[str] | Mapping[str, Any] | DesignTable | None
+    per_design: SupportsIndex | None
 
 
 class _OptionError(Exception):
@@ -194,6 +199,13 @@ class RolloutOptions:
     """Greatest relative change of ``RANDOMIZABLE`` quantities; each link or joint of a rollout has its own factor."""
     floating_base: bool = _option(False, _yes_or_no)
     """Whether base_link floats."""
+    vary: Mapping[str, Draw] = field(default_factory=lambda: MappingProxyType({}), metadata={"read": read_draws})
+    """Numbers of the robot file that are drawn for each design, and how: ``0.05`` (a factor from 0.95 to 1.05),
+    ``normal:SD``, ``uniform:LOW:HIGH`` or ``loguniform:LOW:HIGH``, in the units of the robot file."""
+    designs: DesignTable | None = field(default=None, metadata={"read": read_design_table})
+    """A CSV file of designs, or a mapping of names to values: a column for each number that differs."""
+    per_design: int = _option(1, partial(_whole, least=1, most=MOST_ROLLOUTS))
+    """Successive rollouts that have one design; with ``designs`` by default as many as ``rollouts`` allows."""
 
     def __init__(self, **given: Unpack[RolloutKeywords]) -> None:
         """Check the options.
@@ -208,12 +220,14 @@ class RolloutOptions:
         duration = values.pop("duration", None)
         wrong: dict[str, Sequence[object]] = {}
         for option in fields(self):
-            value = MappingProxyType({}) if option.name == "randomize" else option.default
+            value = MappingProxyType({}) if option.default is MISSING else option.default
             if option.name in values:
                 try:
                     value = option.metadata["read"](values[option.name])
                 except _OptionError as error:
                     wrong[option.name] = error.args
+                except SettingsError as error:
+                    wrong[option.name] = [problem for _, problem in error.problems]
             object.__setattr__(self, option.name, value)
         known = RolloutKeywords.__annotations__
         wrong |= {name: [f"is not an option.{did_you_mean(name, known)}"] for name in values if name not in known}
@@ -226,10 +240,34 @@ class RolloutOptions:
                 wrong["duration"] = error.args
         if not {"steps", "duration", "timestep", "every"} & {*wrong} and self.steps % self.every:
             wrong["every"] = [f"must divide the {self.steps} steps of a rollout, got {self.every}"]
+        wrong |= self._count_designs({*values} - {*wrong})
         if self.integrator == "RK4" and "qacc" in self.record:
             wrong["record"] = ["must not contain 'qacc' with RK4, which overwrites the acceleration; use Euler"]
         if wrong:
             raise SettingsError((name, str(problem)) for name, problems in wrong.items() for problem in problems)
+
+    def _count_designs(self, given: Collection[str]) -> dict[str, Sequence[object]]:
+        """Set how many rollouts there are, or how many each design has, and return what is wrong with them."""
+        if self.designs is None:
+            if self.per_design != 1 and not self.vary:
+                return {"per_design": ["must be given together with vary or designs"]}
+            return {}
+        twice = [name for name in self.vary if name in self.designs.columns]
+        if twice:
+            return {"vary": [f"must not contain {listed(twice)}, which designs has too"]}
+        count = len(self.designs)
+        if "rollouts" in given:
+            if "per_design" not in given:
+                object.__setattr__(self, "per_design", max(1, self.rollouts // count))
+            if self.rollouts != count * self.per_design:
+                problem = f"must be a multiple of the {count} designs, got {self.rollouts}"
+                if "per_design" in given:
+                    problem = f"must be {count * self.per_design} for {count} designs, got {self.rollouts}"
+                return {"rollouts": [problem]}
+        elif count * self.per_design > MOST_ROLLOUTS:
+            return {"designs": [f"must give at most {MOST_ROLLOUTS:,} rollouts, got {count * self.per_design:,}"]}
+        object.__setattr__(self, "rollouts", count * self.per_design)
+        return {}
 
     @property
     def records(self) -> int:
@@ -244,10 +282,18 @@ class RolloutOptions:
     def to_json(self) -> dict[str, Any]:
         """Return JSON values, which ``from_json`` reads."""
         values = {option.name: getattr(self, option.name) for option in fields(self)}
-        return {**values, "record": list(self.record), "randomize": dict(self.randomize)}
+        vary, designs, per_design = (values.pop(name) for name in ("vary", "designs", "per_design"))
+        values |= {"record": list(self.record), "randomize": dict(self.randomize)}
+        if vary:
+            values["vary"] = {name: str(draw) for name, draw in vary.items()}
+        if designs is not None:
+            values["designs"] = designs.name
+        return {**values, "per_design": per_design} if vary or designs is not None else values
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> RolloutOptions:
         """Make options from JSON values, such as the attribute ``settings`` of a dataset; other keys are ignored."""
         known: Any = {option.name: values[option.name] for option in fields(cls) if option.name in values}
+        if not known.get("designs"):  # those of a run that was made in code are in its variables alone
+            known.pop("designs", None)
         return cls(**known)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Final
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -23,7 +24,10 @@ FREE_SLIDE: Final = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plant:
-    """A compiled model with its limits, joints and actuators in the order of the table."""
+    """A compiled model with its limits, joints and actuators in the order of the table.
+
+    Where the rollouts of a batch have designs of their own, all arrays have shape (batch, n) or (batch, actuators).
+    """
 
     model: mujoco.MjModel = field(repr=False)
     timestep: float
@@ -53,6 +57,14 @@ class Plant:
     """Least controls, shape (actuators,); -inf where unlimited."""
     control_upper: Array
     """Greatest controls; inf where unlimited."""
+    each: tuple[Plant, ...] = field(default=(), repr=False)
+    """The plant of each rollout of a batch whose rollouts have designs of their own; ``model`` is that of the first,
+    and they all have its bodies, joints and actuators."""
+
+    @property
+    def models(self) -> tuple[mujoco.MjModel, ...]:
+        """The model of each rollout where they have designs of their own, or the one of all of them."""
+        return tuple(plant.model for plant in self.each) or (self.model,)
 
     @property
     def n(self) -> int:
@@ -63,6 +75,16 @@ class Plant:
     def free_half_ranges(self) -> Array:
         """Half of the range that each joint is given where it has no limits, rad or m, shape (n,)."""
         return np.where(np.array(self.turns, dtype=bool), FREE_TURN, FREE_SLIDE)
+
+
+_OWN: Final = ("lower", "upper", "velocity", "kp", "kv", "home", "control_lower", "control_upper")
+"""What each design has."""
+
+
+def batch_plant(plants: Sequence[Plant]) -> Plant:
+    """Return the plant of a batch whose rollouts have these plants."""
+    own: dict[str, Any] = {name: read_only(np.stack([getattr(plant, name) for plant in plants])) for name in _OWN}
+    return replace(plants[0], **own, each=tuple(plants))
 
 
 def compile_plant(mjcf: str, robot: RobotModel) -> Plant:

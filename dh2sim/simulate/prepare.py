@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any, TypeVar
@@ -12,12 +13,14 @@ import numpy as np
 
 from dh2sim.errors import ControllerError, SettingsError
 from dh2sim.formats.mjcf.scene import to_scene
-from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
+from dh2sim.formats.mjcf.write import MjcfOptions
+from dh2sim.messages import listed
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
 from dh2sim.simulate.block import Job, rehearse
 from dh2sim.simulate.controllers.registry import ControllerChoice, choose
-from dh2sim.simulate.dataset_layout import FORMAT, rollout_bytes, run_layout
+from dh2sim.simulate.dataset_layout import FORMAT, TAKEN, design_variables, rollout_bytes, run_layout
+from dh2sim.simulate.design_plants import DesignPlants, PlantRecipe
+from dh2sim.simulate.designs import Designs
 from dh2sim.simulate.initial_states import InitialStates, read_initial_states, reference_start
 from dh2sim.simulate.options import AUTO, REFERENCE, RolloutOptions
 from dh2sim.simulate.plant import Plant, compile_plant
@@ -50,11 +53,9 @@ def prepare(model: RobotModel, options: RolloutOptions, *, command: str = "") ->
     """
     controller, initial = _resolved(model, options)
     options = options.replace(controller=controller.text, start=initial.name)
-    shown = without_meshes(with_base_mass(model) if options.floating_base else model)
-    driven = shown if controller.actuation is None else with_actuators(shown, controller.actuation)
-    mjcf = to_mjcf(
-        driven,
-        MjcfOptions(
+    recipe = PlantRecipe(
+        actuation=controller.actuation,
+        mjcf=MjcfOptions(
             timestep=options.timestep,
             integrator=options.integrator,
             energy="energy" in options.record,
@@ -62,18 +63,67 @@ def prepare(model: RobotModel, options: RolloutOptions, *, command: str = "") ->
             floating_base=options.floating_base,
         ),
     )
+    mjcf = recipe.text(model)
     plant = compile_plant(mjcf, model)
     initial.check(plant)
     idle = [("randomize", problem) for problem in _idle(plant, options.randomize)]
     if idle:
         raise SettingsError(idle)
     digests = {"controller_digest": controller.digest, "start_digest": initial.digest}
-    attributes = _attributes(model, options, plant, digests, mjcf=mjcf, scene=to_scene(shown), command=command)
-    block = _block_size(rollout_bytes(plant, options, follows=controller.follows), options)
-    layout = run_layout(plant, options, attributes, follows=controller.follows, block=block)
-    job = Job(options=options, mjcf=mjcf, plant=plant, controller=controller, initial=initial, layout=layout)
+    if options.designs is not None:
+        digests["designs_digest"] = options.designs.digest
+    designs = None
+    if options.vary or options.designs is not None:
+        designs = DesignPlants(
+            designs=_designs(model, options),
+            recipe=replace(recipe, mjcf=replace(recipe.mjcf, keyframes=False)),
+            per_design=options.per_design,
+            start=initial.name,
+        )
+    scene = to_scene(recipe.shown(model))
+    attributes = _attributes(model, options, plant, digests, mjcf=mjcf, scene=scene, command=command)
+    variation = None if designs is None else designs.designs.variation
+    rows = model.spec.rows
+    recorded = rollout_bytes(plant, options, follows=controller.follows, variation=variation, rows=rows)
+    block = _block_size(recorded, options)
+    layout = run_layout(
+        plant, options, attributes, follows=controller.follows, block=block, variation=variation, rows=rows
+    )
+    job = Job(
+        options=options,
+        mjcf=mjcf,
+        plant=plant,
+        controller=controller,
+        initial=initial,
+        layout=layout,
+        designs=designs,
+    )
     rehearse(job)
     return job
+
+
+def _designs(model: RobotModel, options: RolloutOptions) -> Designs:
+    """Return the designs of a run, each of which there is a robot of.
+
+    Raises:
+        DesignFileError: There is none of some.
+        SettingsError: Likewise, or a name is not one of a number of the robot.
+    """
+    designs = Designs(
+        model.spec,
+        draws=options.vary,
+        table=options.designs,
+        count=-(-options.rollouts // options.per_design),
+        seed=options.seed,
+    )
+    variables = design_variables(designs.names)
+    problems = [f"{name}: is the name of a variable of every run" for name in designs.names if name in TAKEN]
+    if len(variables) < len(designs.names):
+        problems.append(f"must have names that differ in letters and digits, got {listed(designs.names)}")
+    if problems:
+        raise SettingsError(("vary" if options.designs is None else "designs", problem) for problem in problems)
+    designs.check()
+    return designs
 
 
 def _resolved(model: RobotModel, options: RolloutOptions) -> tuple[ControllerChoice, InitialStates]:

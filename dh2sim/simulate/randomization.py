@@ -24,6 +24,7 @@ class Purpose(IntEnum):
     START = 0
     RANDOMIZE = 1
     CONTROLLER = 2
+    # 16: the numbers of designs (``designs.STREAM``), which have streams by name
 
 
 def generator(seed: int, rollout: int, purpose: Purpose) -> np.random.Generator:
@@ -38,7 +39,7 @@ def generator(seed: int, rollout: int, purpose: Purpose) -> np.random.Generator:
 class Generators(Sequence[np.random.Generator]):
     """The generators of some rollouts, each made when it is first used, since that takes longer than a time step."""
 
-    def __init__(self, seed: int, rollouts: range, purpose: Purpose) -> None:
+    def __init__(self, seed: int, rollouts: Sequence[int], purpose: Purpose) -> None:
         """Make none yet."""
         self._seed, self._rollouts, self._purpose = seed, rollouts, purpose
         self._made: dict[int, np.random.Generator] = {}
@@ -71,7 +72,7 @@ FIELDS = {
 """Which fields of an MjModel each quantity multiplies."""
 
 
-def scales(plant: Plant, options: RolloutOptions, rollouts: range) -> dict[str, Array]:
+def scales(plant: Plant, options: RolloutOptions, rollouts: Sequence[int]) -> dict[str, Array]:
     """Draw the factors of every randomized quantity, uniformly from 1 - x to 1 + x.
 
     Returns:

@@ -62,7 +62,7 @@ class _Bad:
         self, batch: RolloutBatch, *, rollout: int = 3, step: int = 10, value: str = "nan", before: str = "0.2"
     ) -> None:
         self._batch, self._step, self._value, self._before = batch, step, float(value), float(before)
-        self._row = rollout - batch.rollouts.start if rollout in batch.rollouts else None
+        self._row = list(batch.rollouts).index(rollout) if rollout in batch.rollouts else None
 
     def _at(self, step: int) -> Array:
         controls = np.full((len(self._batch.rollouts), len(self._batch.plant.actuators)), 0.2)

@@ -83,6 +83,8 @@ class MjcfOptions:
     """Whether it evaluates the sensors, which takes time at every step of a small arm."""
     floating_base: bool = False
     """Whether base_link floats; it needs mass then, see ``with_base_mass``."""
+    keyframes: bool = True
+    """Whether named configurations become keyframes, whose controls take time to compute."""
 
 
 EXPORTED = MjcfOptions()
@@ -118,7 +120,8 @@ def to_mjcf(model: ModelLike, options: MjcfOptions = EXPORTED) -> str:
     add_contact(mujoco, model)
     add_actuators(mujoco, model)
     add_sensors(mujoco, model)
-    add_keyframes(mujoco, model, floating_base=options.floating_base)
+    if options.keyframes:
+        add_keyframes(mujoco, model, floating_base=options.floating_base)
     return document(mujoco, provenance(model))
 
 

@@ -68,8 +68,8 @@ def holding_controls(batch: RolloutBatch, *, against_gravity: bool) -> Array:
     start, load = batch.q0[:, joints], batch.gravity0[:, joints]
     controls = np.where(position, start, 0.0)
     if against_gravity:
-        kp = plant.model.actuator_gainprm[:, 0]
-        pulls = position & (kp > 0.0)
+        kp = np.stack([model.actuator_gainprm[:, 0] for model in plant.models])
+        pulls = np.logical_and(position, kp > 0.0)
         controls = controls + np.where(pulls, load / np.where(pulls, kp, 1.0), np.where(motor, load, 0.0))
     return np.clip(controls, plant.control_lower, plant.control_upper)
 
@@ -125,14 +125,15 @@ class RandomSpline:
         self._lower, self._upper = plant.control_lower, plant.control_upper
         joints = driven_joints(plant)
         position, velocity = of_type(plant, ActuatorType.POSITION), of_type(plant, ActuatorType.VELOCITY)
-        free = np.where(position, plant.free_half_ranges[joints], np.where(velocity, plant.velocity[joints], 1.0))
+        fastest = plant.velocity[..., joints]
+        free = np.where(position, plant.free_half_ranges[joints], np.where(velocity, fastest, 1.0))
         reach = INSIDE * amplitude * half_ranges(self._lower, self._upper, free)
         start = holding_controls(batch, against_gravity=False)
         center = centers(start, reach, self._lower, self._upper)
         self._pieces = math.floor(batch.steps * plant.timestep * rate) + 1
         targets = center + reach * uniform(batch.generators, self._pieces, len(joints))
         # a spline is nowhere faster than its points are apart
-        most = np.where(position, INSIDE * plant.velocity[joints] / rate, np.inf)
+        most = np.where(position, INSIDE * fastest / rate, np.inf)
         self._points = follow(start, [start, start, *targets], most)
 
     def controls(self, first: int, count: int) -> Array:
@@ -142,7 +143,7 @@ class RandomSpline:
         controls = np.empty((self._points.shape[1], count, self._points.shape[2]))
         for i, part in runs_of(piece):
             weighted_sum(weights[:, part], list(self._points[i : i + 4]), controls[:, part])
-        return np.clip(controls, self._lower, self._upper, out=controls)
+        return np.clip(controls, self._lower[..., None, :], self._upper[..., None, :], out=controls)
 
 
 class Sine:

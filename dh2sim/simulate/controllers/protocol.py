@@ -70,10 +70,12 @@ class RolloutBatch:
     """Rollouts that are driven together, at their start."""
 
     plant: Plant
+    """The robot. Where rollouts have designs of their own its arrays have shape (batch, n), so that they may be used
+    as those of shape (n,) are: beside positions of shape (batch, n)."""
     steps: int
     """Time steps of the run."""
-    rollouts: range
-    """Their indices in the run."""
+    rollouts: Sequence[int]
+    """Their indices in the run: a range, unless designs differ so much that they cannot be simulated together."""
     q0: Array
     """Joint positions at the start, rad or m, shape (batch, n)."""
     v0: Array

@@ -109,13 +109,14 @@ def _rows(batch: RolloutBatch, recording: Recording, names: tuple[str, ...], wha
     columns = recording.columns(names, what, joints=batch.plant.joints)
     if recording.rollouts is None:
         return recording.read(range(1))[:, :, columns]
-    if batch.rollouts.stop > recording.rollouts:
+    first, last = min(batch.rollouts), max(batch.rollouts)
+    if last >= recording.rollouts:
         raise ControllerError(
             f"{recording.file} has {recording.rollouts} rollouts, 0 to {recording.rollouts - 1}; "
-            f"rollout {batch.rollouts.stop - 1} of this run has none to replay. "
+            f"rollout {last} of this run has none to replay. "
             "Simulate fewer rollouts, or let all replay one with rollout=NUMBER"
         )
-    data = recording.read(batch.rollouts)[:, :, columns]
+    data = recording.read(range(first, last + 1))[[i - first for i in batch.rollouts]][:, :, columns]
     stopped = [i for i, rows in zip(batch.rollouts, data, strict=True) if not np.isfinite(rows).all()]
     if stopped:
         raise ControllerError(

@@ -28,8 +28,17 @@ ROUNDS: Final = 300
 """Of reducing the damping in the configuration that is worst."""
 
 
-@functools.lru_cache(maxsize=8)  # every block of a run asks
 def steady_gains(plant: Plant) -> tuple[Array, Array]:
+    """Return what ``_steady_gains`` does; of shape (batch, n) where the plant is that of designs."""
+    if not plant.each:
+        return _steady_gains(plant)
+    own = {id(each): _steady_gains(each) for each in plant.each}
+    kp, kv = zip(*(own[id(each)] for each in plant.each), strict=True)
+    return np.stack(kp), np.stack(kv)
+
+
+@functools.lru_cache(maxsize=64)  # every block of a run asks
+def _steady_gains(plant: Plant) -> tuple[Array, Array]:
     """Return the robot's stiffness and damping, reduced as far as a torque that is held for a time step requires.
 
     A position actuator's own damping is integrated implicitly, and may be arbitrarily strong; that of a controller is

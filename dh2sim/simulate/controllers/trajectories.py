@@ -121,7 +121,7 @@ INSIDE: Final = 1.0 - 1e-9
 
 
 def half_ranges(lower: Array, upper: Array, free: Array) -> Array:
-    """Return half of each range, or ``free`` where a range is not limited; all of shape (m,)."""
+    """Return half of each range, or ``free`` where a range is not limited; of shape (m,) or (batch, m)."""
     limited = np.isfinite(lower) & np.isfinite(upper)
     return np.where(limited, 0.5 * np.where(limited, upper, 0.0) - 0.5 * np.where(limited, lower, 0.0), free)
 
@@ -132,8 +132,8 @@ def centers(start: Array, reach: Array, lower: Array, upper: Array) -> Array:
     Args:
         start: Shape (batch, m).
         reach: At most half of the ranges, shape (m,) or (batch, m).
-        lower: Shape (m,); -inf where unlimited.
-        upper: Shape (m,); inf where unlimited.
+        lower: Shape (m,) or (batch, m); -inf where unlimited.
+        upper: Likewise; inf where unlimited.
 
     Returns:
         Array of shape (batch, m).
@@ -147,7 +147,7 @@ def follow(start: Array, targets: Iterable[Array], most: Array) -> Array:
     Args:
         start: Shape (batch, m).
         targets: Each of shape (batch, m).
-        most: Greatest distance between neighbouring points, shape (m,).
+        most: Greatest distance between neighbouring points, shape (m,) or (batch, m).
 
     Returns:
         The start and the points, shape (1 + targets, batch, m).
@@ -202,17 +202,19 @@ def _clear_of_links(batch: RolloutBatch, targets: Array, center: Array, reach: A
         batch: The rollouts.
         targets: As they were drawn, shape (motions, batch, n).
         center: Centre of the window that they are drawn from, shape (batch, n).
-        reach: Half of its width, shape (n,).
-        most: Greatest distance between neighbouring waypoints, shape (n,).
+        reach: Half of its width, shape (n,) or (batch, n).
+        most: Greatest distance between neighbouring waypoints, shape (n,) or (batch, n).
     """
     waypoints = follow(batch.q0, targets, most)
-    model = batch.plant.model
+    models = batch.plant.models
+    model = models[0]
     if not (model.geom_contype.any() and model.geom_conaffinity.any()):
         return waypoints
     data = mujoco.MjData(model)
     first = model.nq - batch.plant.n
+    reach, most = (np.broadcast_to(array, batch.q0.shape) for array in (reach, most))
 
-    def touches(start: Array, end: Array) -> bool:
+    def touches(model: mujoco.MjModel, start: Array, end: Array) -> bool:
         looks = max(1, math.ceil(float(np.abs(end - start).max()) / _LOOK))
         for k in range(1, looks + 1):
             q = start + (k / looks) * (end - start)
@@ -224,16 +226,19 @@ def _clear_of_links(batch: RolloutBatch, targets: Array, center: Array, reach: A
         return False
 
     for i, generator in enumerate(batch.generators):
+        model = models[i % len(models)]
         again: np.random.Generator | None = None
         for k in range(1, len(waypoints)):
             before, target = waypoints[k - 1, i], targets[k - 1, i]
             for _ in range(_TRIES):
-                waypoints[k, i] = before + np.clip(target - before, -most, most)
-                if not touches(before, waypoints[k, i]) or touches(before, before):  # or it could never leave
+                waypoints[k, i] = before + np.clip(target - before, -most[i], most[i])
+                if not touches(model, before, waypoints[k, i]) or touches(
+                    model, before, before
+                ):  # or it could never leave
                     break
                 # a stream of its own: a longer run, which draws more targets first, must begin alike
                 again = again or generator.spawn(1)[0]
-                target = center[i] + reach * again.uniform(-1.0, 1.0, size=len(target))
+                target = center[i] + reach[i] * again.uniform(-1.0, 1.0, size=len(target))
             else:
                 waypoints[k, i] = before
     return waypoints

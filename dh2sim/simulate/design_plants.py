@@ -1,0 +1,172 @@
+"""The plants of designs: each compiled from its own table, compared with that table, and grouped for simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from dh2sim.errors import Dh2simError, MismatchError, Problem, RobotError
+from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
+from dh2sim.kinematics.table_oracle import table_mechanism_frames
+from dh2sim.model.build import build_model
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
+from dh2sim.robot.spec import ActuatorType
+from dh2sim.simulate.designs import Designs
+from dh2sim.simulate.plant import Plant, compile_plant
+from dh2sim.typing import Array, read_only
+
+TOLERANCE: Final = 1e-12
+"""Of a model's rotations in rad, and of its positions as a share of the larger of 1 m and the robot's extent."""
+_SIZES: Final = tuple(
+    sorted(
+        name
+        for name in dir(mujoco.MjModel)
+        if name[0] == "n" and "_" not in name and name not in ("names", "nbuffer", "narena")
+    )
+)
+"""Numbers of what a model has."""
+_TREES: Final = ("bvh_child", "bvh_depth", "bvh_nodeid")
+"""What MuJoCo has of a model and a batch cannot have of each simulation."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlantRecipe:
+    """How the robots of a run become models."""
+
+    actuation: ActuatorType | None
+    """What drives every joint; None: what the robot file says."""
+    mjcf: MjcfOptions
+
+    def shown(self, model: RobotModel) -> RobotModel:
+        """Return a robot as it is simulated, with its own actuators."""
+        return without_meshes(with_base_mass(model) if self.mjcf.floating_base else model)
+
+    def text(self, model: RobotModel) -> str:
+        """Return the MJCF that is simulated.
+
+        Raises:
+            ModelError: An MJCF cannot hold the robot.
+        """
+        shown = self.shown(model)
+        return to_mjcf(shown if self.actuation is None else with_actuators(shown, self.actuation), self.mjcf)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DesignPlant:
+    """One design, ready to be simulated."""
+
+    plant: Plant
+    start: Array
+    """Where it starts if that is a named configuration, rad and m, shape (n,)."""
+    rows: Array
+    """a, alpha, d, theta, beta of every row, m and rad, shape (rows, 5)."""
+    layout: object = field(repr=False)
+    """Equal for designs that MuJoCo can simulate in one batch."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DesignPlants:
+    """Makes the plants of the designs of a run."""
+
+    designs: Designs
+    recipe: PlantRecipe
+    per_design: int
+    """Successive rollouts that have one design."""
+    start: str
+    """Name of a configuration that rollouts start in, or anything else."""
+
+    def of(self, rollouts: Sequence[int], made: dict[int, DesignPlant]) -> list[DesignPlant]:
+        """Return the design of each of some rollouts.
+
+        Args:
+            rollouts: Their indices.
+            made: Those that were made before; left with those of these rollouts.
+
+        Raises:
+            Dh2simError: A design cannot be simulated: the error names all that cannot.
+            MismatchError: A model is not as its table says.
+        """
+        wanted = [rollout // self.per_design for rollout in rollouts]
+        for design in set(made) - set(wanted):
+            del made[design]
+        problems: list[Problem] = []
+        for design in dict.fromkeys(wanted):
+            if design in made:
+                continue
+            try:
+                made[design] = self.make(design)
+            except MismatchError as error:
+                raise MismatchError(f"{self.designs.name(design)}: {error}") from None
+            except RobotError as error:
+                problems += [self.designs.problem(design, each) for each in error.problems]
+            except Dh2simError as error:
+                problems.append(self.designs.problem(design, Problem(path="", message=str(error))))
+        if problems:
+            raise self.designs.error(problems)
+        return [made[design] for design in wanted]
+
+    def make(self, design: int) -> DesignPlant:
+        """Make the plant of a design, and compare it with its table.
+
+        Raises:
+            Dh2simError: It cannot be simulated.
+            MismatchError: The model is not as the table says.
+        """
+        spec = self.designs.spec(design)
+        model = build_model(spec)
+        plant = compile_plant(self.recipe.text(model), model)
+        compare_with_table(plant, model)
+        configurations = spec.named_configurations
+        return DesignPlant(
+            plant=plant,
+            start=configurations.get(self.start, plant.home),
+            rows=read_only([[row.a, row.alpha, row.d, row.theta, row.beta] for row in spec.rows]),
+            layout=_layout(plant.model),
+        )
+
+
+def compare_with_table(plant: Plant, robot: RobotModel) -> None:
+    """Compare the poses of all DH frames and tool0 with the table's, at one configuration that is special in nothing.
+
+    Raises:
+        MismatchError: They differ by more than rounding.
+    """
+    spec, model = robot.spec, plant.model
+    lower, upper = robot.travel
+    share = np.modf(0.37 + 0.618034 * np.arange(plant.n))[0]
+    q = lower + share * (upper - lower)
+    data = mujoco.MjData(model)
+    data.qpos[model.nq - plant.n :] = q
+    mujoco.mj_kinematics(model, data)
+    frames = [*(f"dh_{i}" for i in range(len(spec.rows) + 1)), "tool0"]
+    sites = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name) for name in frames]
+    poses = table_mechanism_frames(spec, q)
+    table = np.stack([poses[name] for name in frames])
+    distance = float(np.abs(data.site_xpos[sites] - table[:, :3, 3]).max())
+    turned = float(np.abs(data.site_xmat[sites].reshape(-1, 3, 3) - table[:, :3, :3]).max())
+    angle = max(TOLERANCE, robot.angle_rounding)
+    allowed = angle * max(1.0, robot.extent)
+    if not (distance <= allowed and turned <= angle):
+        raise MismatchError(
+            f"the model differs from its table by {distance:.3g} m and {turned:.3g} rad (allowed: {allowed:.3g} m "
+            f"and {angle:.3g} rad). This is a defect of dh2sim: please report it with the robot file"
+        )
+
+
+def _layout(model: mujoco.MjModel) -> object:
+    sizes = tuple(getattr(model, name) for name in _SIZES)
+    heavy = (model.body_mass > 0.0).tobytes()
+    return sizes, heavy, model.exclude_signature.tobytes(), *(getattr(model, name).tobytes() for name in _TREES)
+
+
+def groups(designs: Iterable[DesignPlant]) -> Iterator[list[int]]:
+    """Yield the positions of designs that can be simulated together."""
+    found: dict[object, list[int]] = {}
+    for position, design in enumerate(designs):
+        found.setdefault(design.layout, []).append(position)
+    yield from found.values()
