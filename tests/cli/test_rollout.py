@@ -295,7 +295,7 @@ def test_every_example_of_the_help_works(folder: Path) -> None:
     write(folder, small("my_arm"))
     lines = dh2sim("rollout", "--help").out.split("Examples:\n")[1].split("  Then:")[0].splitlines()
     commands = [line.split()[1:] for line in lines if line.strip()]
-    assert len(commands) == 5
+    assert len(commands) == 6
     for number, command in enumerate(commands):
         at = command.index("--out") + 1
         run = dh2sim(*command[:at], f"{number}.zarr", *command[at + 1 :], *QUICK)

@@ -170,7 +170,8 @@ def test_defaults_on_the_command_line_are_those_of_the_options() -> None:
     from dh2sim.cli.rollout import rollout as command
 
     options, given = RolloutOptions(), inspect.signature(command).parameters
-    for name in ("rollouts", "timestep", "integrator", "controller", "start", "seed", "every", "floating_base"):
+    for name in ("timestep", "integrator", "controller", "start", "seed", "every", "floating_base"):
         assert given[name].default == getattr(options, name), name
+    assert f"[default: {options.rollouts}, or" in given["rollouts"].annotation  # as text
     assert given["record"].default.split(",") == list(options.record)
     assert set(RANDOMIZABLE) == set(QUANTITIES.split(", "))
