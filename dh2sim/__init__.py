@@ -42,6 +42,7 @@ _HOMES = {
     "Workspace": "workspace.workspace",
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
+    "check_files": "checking.run",
     "compute_workspace": "workspace.workspace",
     "convert_robot": "importing.convert",
     "diff": "compare.comparison",
@@ -71,6 +72,7 @@ _HOMES = {
 __all__ = [*_HOMES]
 
 if TYPE_CHECKING:
+    from dh2sim.checking.run import check_files as check_files
     from dh2sim.codegen.generate import generate_code as generate_code
     from dh2sim.compare.comparison import Comparison as Comparison
     from dh2sim.compare.comparison import diff as diff

@@ -34,6 +34,7 @@ COMMANDS: Final = {
     "new": Command("new", "new", "Write a robot file to start from."),
     "export": Command("export", "export", "Write URDF and MJCF, verified against the table."),
     "validate": Command("validate", "validate", "Check every engine against the table."),
+    "check": Command("check", "check", "Check a repository: robot files, exports, poses."),
     "fk": Command("fk", "fk", "Print the pose of a frame.", NEGATIVE_NUMBERS),
     "jacobian": Command("fk", "jacobian", "Print the Jacobian, and how close it is to singular.", NEGATIVE_NUMBERS),
     "ik": Command("ik", "ik", "Find all joint vectors that reach a pose.", many=("--at", "--near", "--lock")),
@@ -79,6 +80,7 @@ Examples:
   dh2sim info stanford               its table, frames, mass and reach
   dh2sim export stanford             write URDF and MJCF to generated/stanford/
   dh2sim validate stanford           check every engine against the table
+  dh2sim check robots                all robot files of a repository, and their exports
   dh2sim fk stanford 17 -40 0.5 63 34 -23
   dh2sim jacobian stanford home
   dh2sim ik puma560 --at home        all ways to get there

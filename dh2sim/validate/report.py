@@ -226,11 +226,11 @@ def to_junit(report: ValidationReport) -> str:
                 time=f"{check.seconds:.3f}",
             )
             if check.ok is None:
-                ET.SubElement(case, "skipped", message=_writable(check.reason or ""))
+                ET.SubElement(case, "skipped", message=writable(check.reason or ""))
             elif not check.ok:
-                ET.SubElement(case, "failure", message=_writable(failure_text(check)))
+                ET.SubElement(case, "failure", message=writable(failure_text(check)))
             if check.left_out is not None:
-                ET.SubElement(case, "system-out").text = _writable(str(check.left_out))
+                ET.SubElement(case, "system-out").text = writable(str(check.left_out))
     ET.indent(root)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 
@@ -259,6 +259,6 @@ def _counts(checks: list[Check] | tuple[Check, ...]) -> dict[str, str]:
     }
 
 
-def _writable(text: str) -> str:
+def writable(text: str) -> str:
     """Replace what XML cannot hold: control characters, and bytes of file names that are not text."""
     return _UNWRITABLE.sub("?", text)

@@ -23,6 +23,7 @@ COMMANDS = (
     "new",
     "export",
     "validate",
+    "check",
     "fk",
     "jacobian",
     "ik",
