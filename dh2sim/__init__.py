@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 _HOMES = {
     "ActuatorSpec": "robot.spec",
+    "Calibration": "calibrate.result",
     "Comparison": "compare.comparison",
     "Continuous": "robot.table_rows",
     "Dh2simError": "errors",
@@ -20,6 +21,7 @@ _HOMES = {
     "KinematicChain": "kinematics.chain",
     "Limits": "robot.spec",
     "LinkSpec": "robot.spec",
+    "Measurements": "calibrate.measurements",
     "Mobility": "mobility.result",
     "PayloadSpec": "robot.spec",
     "Pose": "robot.spec",
@@ -57,8 +59,10 @@ _HOMES = {
     "import_robot": "importing.sources",
     "inverse_kinematics": "inverse.solver",
     "load_robot": "robot.read",
+    "measurements": "calibrate.measurements",
     "parse_robot": "robot.read",
     "plan_trajectory": "trajectory.plan",
+    "read_measurements": "calibrate.data_file",
     "read_trajectory": "trajectory.files",
     "recover_table": "kinematics.frame_assignment.recover",
     "robot_file_text": "robot.write",
@@ -72,6 +76,10 @@ _HOMES = {
 __all__ = [*_HOMES]
 
 if TYPE_CHECKING:
+    from dh2sim.calibrate.data_file import read_measurements as read_measurements
+    from dh2sim.calibrate.measurements import Measurements as Measurements
+    from dh2sim.calibrate.measurements import measurements as measurements
+    from dh2sim.calibrate.result import Calibration as Calibration
     from dh2sim.checking.run import check_files as check_files
     from dh2sim.codegen.generate import generate_code as generate_code
     from dh2sim.compare.comparison import Comparison as Comparison

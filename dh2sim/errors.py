@@ -157,6 +157,14 @@ class TrajectoryError(Dh2simError, ValueError):
     """A trajectory cannot be: a path leaves limits, jumps or cannot be followed; or a file of one is wrong."""
 
 
+class CalibrationError(Dh2simError, ValueError):
+    """Measurements do not fit together, or cannot tell what is asked of them."""
+
+
+class MeasurementFileError(RobotFileError):
+    """A file of measurements is wrong."""
+
+
 class SettingsError(Dh2simError, ValueError):
     """Options of a run are wrong; ``problems`` has the name of each argument with what is wrong with it.
 

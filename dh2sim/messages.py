@@ -70,6 +70,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in text)
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a number with a noun whose plural ends in s, as in '1 row' and '12 rows'."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def listed(names: Iterable[str], between: str = ", ") -> str:
     """Return names with commas between them, or ``none``; a long list is cut short."""
     first = list(itertools.islice(names, _MOST_LISTED + 1))

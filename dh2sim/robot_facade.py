@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     import mujoco
     import xarray as xr
 
+    from dh2sim.calibrate.calibration import CalibrationKeywords
+    from dh2sim.calibrate.measurements import Measurements
+    from dh2sim.calibrate.result import Calibration
     from dh2sim.codegen.languages import Language
     from dh2sim.compare.comparison import Comparison
     from dh2sim.draw.diagram.drawing import DrawingStyle, RobotDrawing
@@ -726,6 +729,39 @@ class Robot:
         if rollouts is not None:
             options["rollouts"] = rollouts
         return rollout(self.model, out=out, threads=threads, resume=resume, overwrite=overwrite, **options)
+
+    def calibrate(
+        self,
+        data: Measurements | FilePath,
+        *,
+        kind: str | None = None,
+        groups: str | None = None,
+        **options: Unpack[CalibrationKeywords],
+    ) -> Calibration:
+        """Fit table, base and tool to measurements of the real robot.
+
+        Args:
+            data: A CSV file, as ``docs/calibration.md`` describes it; or what ``measurements`` makes of arrays, or
+                ``run_measurements`` of a run.
+            kind: Of a file: 'pose', 'position', 'distance' or 'socket'; by default what its columns are for.
+            groups: Of a file: the column whose rows of one value are held out together.
+            **options: As for :func:`dh2sim.calibrate.calibration.calibrate`: ``unknown``, ``prior``, ``robust``,
+                ``noise``, ``held_out``, ``seed``.
+
+        Returns:
+            The calibration: ``robot`` is a specification, from which ``Robot.from_spec`` makes a robot.
+
+        Raises:
+            MeasurementFileError: The file is wrong; the text says what and where.
+            CalibrationError: The measurements cannot tell what is asked of them.
+        """
+        from dh2sim.calibrate.calibration import calibrate
+        from dh2sim.calibrate.data_file import read_measurements
+
+        measured = (
+            read_measurements(data, self, kind=kind, groups=groups) if isinstance(data, str | os.PathLike) else data
+        )
+        return calibrate(self, measured, **options)
 
     def convert(self, convention: Convention | str) -> Self:
         """Return the same arm with its table in another convention, 'standard' or 'modified', or 'compact'.

@@ -37,6 +37,7 @@ COMMANDS = (
     "convert",
     "diff",
     "frames",
+    "calibrate",
     "rollout",
     "render",
     "draw",

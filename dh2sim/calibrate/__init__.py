@@ -1,0 +1,1 @@
+"""Tables fitted to measurements of a real robot: which numbers they tell, how well, and what they leave open."""

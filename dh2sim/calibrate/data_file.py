@@ -1,0 +1,464 @@
+"""Files of measurements: CSV with joint columns by name, and units in the header."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from dh2sim.calibrate.measurements import OTHER_KINDS, Kind, Measurements, grouped, problems_of
+from dh2sim.calibrate.parameters import rotation_of
+from dh2sim.errors import Dh2simError, MeasurementFileError, Problem
+from dh2sim.kinematics.chain import SpecLike, serial_spec_of
+from dh2sim.kinematics.transforms import pose_from_rpy
+from dh2sim.messages import counted, did_you_mean, listed, member, shown
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.typing import Array, read_only
+
+MAX_BYTES: Final = 100_000_000
+_MOST_PROBLEMS: Final = 50
+_LENGTH_UNITS: Final = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
+_ANGLE_UNITS: Final = {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "mrad": 1e-3}
+_HEADING: Final = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(]\s*(?P<unit>[^\])]*?)\s*[\])])?\s*")
+_JOINT_ALIAS: Final = re.compile(r"(?:q|j|joint)_?([0-9]{1,3})", re.IGNORECASE)
+_POSITION: Final = ("x", "y", "z")
+_QUATERNION: Final = ("qw", "qx", "qy", "qz")
+_RPY: Final = ("roll", "pitch", "yaw")
+_VECTOR: Final = ("rx", "ry", "rz")
+_MATRIX: Final = tuple(f"r{i}{k}" for i in (1, 2, 3) for k in (1, 2, 3))
+_TRANSFORM: Final = tuple(f"t{i}{k}" for i in (1, 2, 3) for k in (1, 2, 3, 4))
+_LAST_ROW: Final = tuple(f"t4{k}" for k in (1, 2, 3, 4))
+_LENGTHS: Final = (*_POSITION, "distance", "t14", "t24", "t34")
+_ANGLES: Final = (*_RPY, *_VECTOR)
+_PLAIN: Final = (*_QUATERNION, *_MATRIX, *(name for name in _TRANSFORM if not name.endswith("4")), *_LAST_ROW)
+_TEXTS: Final = ("station", "placement", "socket", "to", "pair", "group")
+_IGNORED: Final = ("name", "note", "notes", "comment", "time", "id", "index", "number")
+_ORIENTATIONS: Final = {
+    "a quaternion": _QUATERNION,
+    "roll, pitch, yaw": _RPY,
+    "a rotation vector": _VECTOR,
+    "a rotation matrix": _MATRIX,
+    "a 4x4 transform": _TRANSFORM,
+}
+_COLUMNS: Final = (
+    "x, y, z; qw, qx, qy, qz or roll, pitch, yaw or rx, ry, rz or r11 … r33 or t11 … t34; distance; "
+    f"{listed(_TEXTS)}; ignored: {listed(_IGNORED)}"
+)
+_DEGREES: Final = 4.0 * math.pi
+"""rad, beyond which no joint turns that is not meant in degrees."""
+_MILLIMETRES: Final = 20.0
+"""m, farther than which nothing is from a robot's base that is not meant in mm."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Cell:
+    text: str
+    column: int
+    """In the line, from 1."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Column:
+    name: str
+    """In lower case, or the name of a joint."""
+    heading: str
+    index: int
+    factor: float
+    """By which a number becomes one in SI units; 0 for texts."""
+    joint: int = -1
+    unit: str = ""
+
+
+class _Report:
+    """Collects what is wrong in a file."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.problems: list[Problem] = []
+
+    def __call__(self, line: int, column: int, path: str, message: str) -> None:
+        self.problems.append(Problem(file=self.file, line=line, column=column, path=path, message=message))
+
+    def raise_any(self) -> None:
+        if self.problems:
+            problems = sorted(self.problems)
+            if len(problems) > _MOST_PROBLEMS:
+                more = len(problems) - _MOST_PROBLEMS
+                last = problems[_MOST_PROBLEMS]
+                problems = [*problems[:_MOST_PROBLEMS], replace(last, path="", message=f"and {more} more problems")]
+            raise MeasurementFileError(problems)
+
+
+def read_measurements(
+    path: str | os.PathLike[str], robot: SpecLike, *, kind: Kind | str | None = None, groups: str | None = None
+) -> Measurements:
+    """Read a file of measurements.
+
+    Args:
+        path: A CSV file: commas, semicolons or tabs between columns, the first line names them.
+        robot: That was measured.
+        kind: 'pose', 'position', 'distance' or 'socket'; by default what the columns are for.
+        groups: The column whose rows of one value are held out together; by default ``placement``, else ``group``,
+            ``station`` or ``socket``.
+
+    Raises:
+        MeasurementFileError: The file is wrong; the error holds everything that is, with its place.
+        Dh2simError: It cannot be read, or the kind is unknown.
+    """
+    spec = serial_spec_of(robot)
+    name = os.fspath(path)
+    wanted = None if kind is None else member(Kind, OTHER_KINDS.get(str(kind), str(kind)), "kind")
+    try:
+        with Path(path).open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise Dh2simError(f"{name}: cannot be read: {error.strerror or error}") from None
+    report = _Report(name)
+    if len(data) > MAX_BYTES:
+        report(1, 1, "", f"the file has more than {MAX_BYTES} bytes")
+        report.raise_any()
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        report(line, 1, "", "the file is not UTF-8 text")
+        report.raise_any()
+    return _read(text, spec, report, wanted, groups)
+
+
+def _read(text: str, spec: RobotSpec, report: _Report, kind: Kind | None, groups: str | None) -> Measurements:
+    lines = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        report(1, 1, "", "the file is empty; the first line must name the columns")
+        report.raise_any()
+    number, header = lines[0]
+    separator = max(",;\t", key=header.count)
+    cells = _split(header, separator)
+    columns = _columns(cells, number, spec, report, groups)
+    kind = _kind(columns, kind, number, report)
+    _require_columns(columns, kind, spec, number, report)
+    rows = [(line, _split(content, separator)) for line, content in lines[1:]]
+    if not rows:
+        report(number, 1, "", "there are no measurements below the header")
+    values, texts = _cells(columns, rows, len(cells), separator, report)
+    places = [line for line, _ in rows]
+    _look_at_units(columns, values, rows, report)
+    report.raise_any()
+    joints = sorted((column for column in columns.values() if column.joint >= 0), key=lambda column: column.joint)
+    position = _stack(values, _POSITION) if "x" in values else None
+    rotation = _rotations(values, rows, columns, report) if kind is Kind.POSE else None
+    if position is None and "t14" in values:
+        position = _stack(values, ("t14", "t24", "t34"))
+    report.raise_any()
+    used = groups or ("group" if "group" in texts and "placement" not in texts else None)
+    found = Measurements(
+        kind=kind,
+        q=read_only(np.stack([values[column.name] for column in joints], axis=1)),
+        position=None if position is None or kind is Kind.SOCKET else read_only(position),
+        rotation=None if rotation is None else read_only(rotation),
+        distance=read_only(values["distance"])
+        if "distance" in values and kind in (Kind.DISTANCE, Kind.SOCKET)
+        else None,
+        station=texts.get("station") if kind is not Kind.SOCKET else None,
+        pair=texts.get("pair") if kind is Kind.DISTANCE else None,
+        socket=texts.get("socket") if kind is Kind.SOCKET else None,
+        placement=texts.get("placement", texts.get("station")) if kind is Kind.SOCKET else texts.get("placement"),
+        to=texts.get("to"),
+        groups=texts.get(_folded(used)) if used else None,
+        group_name=_folded(used) if used else "",
+        lines=tuple(places),
+        file=report.file,
+    )
+    for row, column_name, message in problems_of(found):
+        line = places[row] if row >= 0 else number
+        column = columns.get(column_name)
+        at = rows[row][1][column.index].column if column is not None and row >= 0 else 1
+        report(line, at, column.heading if column is not None else "", message.removeprefix(f"line {line}: "))
+    report.raise_any()
+    return grouped(found)
+
+
+def _split(line: str, separator: str) -> list[_Cell]:
+    """Split a line into cells, some of which may be in double quotes."""
+    cells, at = [], 0
+    while True:
+        start = at
+        while at < len(line) and line[at] in " " and line[at] != separator:
+            at += 1
+        if at < len(line) and line[at] == '"':
+            end = at + 1
+            while end < len(line) and (line[end] != '"' or line[end + 1 : end + 2] == '"'):
+                end += 2 if line[end] == '"' else 1
+            text = line[at + 1 : end].replace('""', '"')
+            column = at + 2
+            following = line.find(separator, end)
+        else:
+            following = line.find(separator, start)
+            raw = line[start:] if following < 0 else line[start:following]
+            text, column = raw.strip(), start + 1 + len(raw) - len(raw.lstrip())
+        cells.append(_Cell(text=text, column=column))
+        if following < 0:
+            return cells
+        at = following + 1
+
+
+def _folded(name: str) -> str:
+    return name.strip().casefold()
+
+
+def _columns(
+    cells: Sequence[_Cell], line: int, spec: RobotSpec, report: _Report, groups: str | None
+) -> dict[str, _Column]:
+    """Return the columns by name; report those that are unknown, twice there, or without a unit."""
+    rows = spec.moving_rows
+    joints = {_folded(row.name): k for k, row in enumerate(rows)}
+    known = [*(row.name for row in rows), *_LENGTHS, *_ANGLES, *_PLAIN, *_TEXTS, *_IGNORED]
+    found: dict[str, _Column] = {}
+    for index, cell in enumerate(cells):
+        match = _HEADING.fullmatch(cell.text)
+        name, unit = (match["name"], match["unit"] or "") if match else (cell.text, "")
+        key = _folded(name)
+        joint = joints.get(key, -1)
+        alias = _JOINT_ALIAS.fullmatch(key)
+        if joint < 0 and alias and 1 <= int(alias[1]) <= len(rows):
+            joint = int(alias[1]) - 1
+        if groups is not None and key == _folded(groups) and joint < 0 and key not in _LENGTHS:
+            column = _Column(name=key, heading=cell.text, index=index, factor=0.0)
+        elif joint >= 0:
+            row = rows[joint]
+            units = _ANGLE_UNITS if row.type.turns else _LENGTH_UNITS
+            factor = _unit(unit, units, row.name, line, cell, report)
+            column = _Column(name=row.name, heading=cell.text, index=index, factor=factor, joint=joint, unit=unit)
+        elif key in _LENGTHS or key in _ANGLES:
+            units = _LENGTH_UNITS if key in _LENGTHS else _ANGLE_UNITS
+            factor = _unit(unit, units, key, line, cell, report)
+            column = _Column(name=key, heading=cell.text, index=index, factor=factor, unit=unit)
+        elif key in _PLAIN:
+            column = _Column(name=key, heading=cell.text, index=index, factor=1.0)
+        elif key in _TEXTS:
+            column = _Column(name=key, heading=cell.text, index=index, factor=0.0)
+        elif key in _IGNORED:
+            continue
+        else:
+            if _is_number(cell.text):
+                message = (
+                    f"expected the name of a column, found {shown(cell.text)}: the first line must name the columns"
+                )
+                report(line, cell.column, "", message)
+                report.raise_any()
+            message = "the column has no name"
+            if cell.text:
+                message = f"unknown column {shown(name)}.{did_you_mean(name, known)} Columns: "
+                message += f"{listed(row.name for row in rows)}; {_COLUMNS}"
+            report(line, cell.column, "", message)
+            continue
+        if column.name in found:
+            report(line, cell.column, cell.text, f"column {shown(column.name)} is there twice")
+            continue
+        found[column.name] = column
+    if groups is not None and _folded(groups) not in found:
+        names = [cell.text for cell in cells]
+        report(line, 1, "", f"there is no column {shown(groups)} to group by.{did_you_mean(groups, names)}")
+    return found
+
+
+def _unit(unit: str, units: Mapping[str, float], name: str, line: int, cell: _Cell, report: _Report) -> float:
+    factor = units.get(unit) or units.get(unit.casefold()) or units.get(unit.casefold().removesuffix("s"))
+    if factor is None and unit.casefold() in ("degree", "degrees"):
+        factor = units.get("deg")
+    if factor is None and unit.casefold() in ("radian", "radians"):
+        factor = units.get("rad")
+    if factor is None:
+        *most, last = [f"{name} [{each}]" for each in ("rad", "deg", "mrad") if each in units] or [
+            f"{name} [{each}]" for each in ("m", "mm", "cm")
+        ]
+        allowed = f"{', '.join(most)} or {last}"
+        message = f"has no unit: write {allowed}" if not unit else f"unknown unit {shown(unit)}: write {allowed}"
+        report(line, cell.column, cell.text, message)
+        return 1.0
+    return factor
+
+
+def _kind(columns: Mapping[str, _Column], kind: Kind | None, line: int, report: _Report) -> Kind:
+    oriented = [names for names in _ORIENTATIONS.values() if any(name in columns for name in names)]
+    if kind is not None:
+        return kind
+    if "socket" in columns:
+        return Kind.SOCKET
+    if "distance" in columns:
+        return Kind.DISTANCE
+    if oriented:
+        return Kind.POSE
+    if not any(name in columns for name in _POSITION):
+        report(
+            line,
+            1,
+            "",
+            "nothing was measured: expected columns x, y, z (and an orientation), distance, or socket",
+        )
+    return Kind.POSITION
+
+
+def _require_columns(columns: Mapping[str, _Column], kind: Kind, spec: RobotSpec, line: int, report: _Report) -> None:
+
+    def require(names: Iterable[str], what: str) -> None:
+        lacking = [name for name in names if name not in columns]
+        if lacking:
+            report(line, 1, "", f"missing {'column' if len(lacking) == 1 else 'columns'} {listed(lacking)}{what}")
+
+    require((row.name for row in spec.moving_rows), ": each joint needs one")
+    some = [name for name, parts in _ORIENTATIONS.items() if any(part in columns for part in parts)]
+    match kind:
+        case Kind.DISTANCE:
+            require(("distance",), " of --kind distance")
+            if any(name in columns for name in _POSITION):
+                require(_POSITION, " of the stations' fixed points")
+        case Kind.SOCKET:
+            require(("socket",), " of --kind socket")
+        case Kind.POSE | Kind.POSITION:
+            if kind is Kind.POSITION or "a 4x4 transform" not in some:
+                require(_POSITION, f" of --kind {kind}")
+    if kind is not Kind.POSE:
+        return
+    if len(some) > 1:
+        report(line, 1, "", f"{listed(some, ' and ')} exclude each other")
+    if not some:
+        report(line, 1, "", f"a pose needs an orientation: {_COLUMNS.split('; ')[1]}; or else --kind position")
+    for name in some:
+        require(_ORIENTATIONS[name], f" of {name}")
+
+
+def _cells(
+    columns: Mapping[str, _Column],
+    rows: Sequence[tuple[int, list[_Cell]]],
+    width: int,
+    separator: str,
+    report: _Report,
+) -> tuple[dict[str, Array], dict[str, tuple[str, ...]]]:
+    """Return numbers in SI units and texts, by column."""
+    values = {column.name: np.full(len(rows), np.nan) for column in columns.values() if column.factor}
+    texts: dict[str, list[str]] = {column.name: [""] * len(rows) for column in columns.values() if not column.factor}
+    may_be_empty = {"to"} | ({"distance"} if "socket" in columns else set())
+    for k, (line, cells) in enumerate(rows):
+        if len(cells) != width:
+            report(line, 1, "", f"expected {counted(width, 'cell')} as in the header, found {len(cells)}")
+            continue
+        for column in columns.values():
+            cell = cells[column.index]
+            if not cell.text:
+                if column.name not in may_be_empty:
+                    report(line, cell.column, column.heading, "the cell is empty")
+                continue
+            if not column.factor:
+                texts[column.name][k] = cell.text
+                continue
+            text = cell.text.replace(",", ".") if separator == ";" else cell.text
+            try:
+                number = float(text) if "_" not in text else float("x")
+            except ValueError:
+                report(line, cell.column, column.heading, f"expected a number, found {shown(cell.text)}")
+                continue
+            if not math.isfinite(number):
+                report(line, cell.column, column.heading, f"must be finite, found {cell.text}")
+                continue
+            values[column.name][k] = number * column.factor
+    return values, {name: tuple(found) for name, found in texts.items()}
+
+
+def _look_at_units(
+    columns: Mapping[str, _Column],
+    values: Mapping[str, Array],
+    rows: Sequence[tuple[int, list[_Cell]]],
+    report: _Report,
+) -> None:
+    """Report numbers that cannot be in the unit of their column."""
+    for column in columns.values():
+        found = values.get(column.name)
+        if found is None or np.isnan(found).all():
+            continue
+        row = int(np.nanargmax(np.abs(found)))
+        largest, line = float(abs(found[row])), rows[row][0]
+        cell = rows[row][1][column.index]
+        turning = column.name in _ANGLES or (column.joint >= 0 and column.unit in ("rad",))
+        if turning and column.unit == "rad" and largest > _DEGREES:
+            report(line, cell.column, column.heading, f"found {cell.text} rad, which looks like degrees: write [deg]")
+        sliding = column.name in _LENGTHS or (column.joint >= 0 and column.unit in _LENGTH_UNITS)
+        if sliding and column.unit == "m" and largest > _MILLIMETRES:
+            report(line, cell.column, column.heading, f"found {cell.text} m, which looks like mm: write [mm]")
+    joints = [column for column in columns.values() if column.joint >= 0 and column.unit in ("deg", "°")]
+    if joints and len(rows) >= 5:
+        largest = max(float(np.abs(values[column.name]).max()) for column in joints)
+        spread = max(float(np.ptp(values[column.name])) for column in joints)
+        if math.degrees(largest) <= 2.0 * math.pi and math.degrees(spread) > 0.5:
+            column = joints[0]
+            line, cells = rows[0]
+            report(
+                line,
+                cells[column.index].column,
+                column.heading,
+                f"all joint angles are within {math.degrees(largest):.3g} deg, which looks like radians: write [rad]",
+            )
+
+
+def _stack(values: Mapping[str, Array], names: Sequence[str]) -> Array:
+    return np.stack([values[name] for name in names], axis=1)
+
+
+def _rotations(
+    values: Mapping[str, Array],
+    rows: Sequence[tuple[int, list[_Cell]]],
+    columns: Mapping[str, _Column],
+    report: _Report,
+) -> Array:
+    """Return orientations, whichever way they are given; report those that are none."""
+
+    def wrong(off: Array, name: str, message: Callable[[float], str]) -> None:
+        for k in np.flatnonzero(~(off < 1e-2)):
+            line, cells = rows[int(k)]
+            report(line, cells[columns[name].index].column, columns[name].heading, message(float(off[k])))
+
+    if "qw" in values:
+        q = _stack(values, _QUATERNION)
+        norm = np.linalg.norm(q, axis=1)
+        wrong(
+            np.abs(norm - 1.0), "qw", lambda off: f"a quaternion must have length 1, which this is off by {off:.3g}"
+        )
+        w, v = q[:, 0] / np.maximum(norm, 1e-12), q[:, 1:] / np.maximum(norm, 1e-12)[:, None]
+        K = np.zeros((len(q), 3, 3))
+        x, y, z = v.T
+        K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -z, y, -x
+        K[:, 1, 0], K[:, 2, 0], K[:, 2, 1] = z, -y, x
+        return np.asarray(np.eye(3) + 2.0 * (w[:, None, None] * K + K @ K))
+    if "roll" in values:
+        return np.array([pose_from_rpy(np.zeros(3), rpy)[:3, :3] for rpy in _stack(values, _RPY)])
+    if "rx" in values:
+        return np.array([rotation_of(vector) for vector in _stack(values, _VECTOR)])
+    names = _MATRIX if "r11" in values else tuple(name for name in _TRANSFORM if not name.endswith("4"))
+    R = _stack(values, names).reshape(-1, 3, 3)
+    off = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+    off = np.where(np.linalg.det(R) > 0.0, off, 2.0)
+    wrong(
+        off,
+        names[0],
+        lambda off: "this is not a rotation matrix" + (f": R Rᵀ differs from 1 by {off:.3g}" if off < 2.0 else ""),
+    )
+    U, _, Vt = np.linalg.svd(R)
+    return np.asarray(U @ Vt)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

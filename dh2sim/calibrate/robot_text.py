@@ -1,0 +1,140 @@
+"""The calibrated robot as a robot file: the author's own text with other numbers, where that can be."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from dh2sim.calibrate.result import Calibration
+from dh2sim.errors import Dh2simError
+from dh2sim.robot.edit import can_be_edited, with_cells
+from dh2sim.robot.read import parse_robot
+from dh2sim.robot.spec import AngleUnit, Convention, Pose, RobotSpec, Units
+from dh2sim.robot.write import UnitWriter, comment_lines, robot_file_text
+from dh2sim.robot.yaml_tree import Node, Report, compose
+from dh2sim.typing import Array
+
+_NUMBERS: Final = ("a", "alpha", "beta", "d", "theta")
+
+
+def calibrated_text(calibration: Calibration, *, header: Sequence[str] = (), folder: Path | None = None) -> str:
+    """Return the text of the calibrated robot's file.
+
+    Where only numbers change, and rows become Hayati's, comments, parameters and the order of keys are those of the
+    file that the robot was read from; else it is written anew below the comments that it began with.
+
+    Args:
+        calibration: Of the robot.
+        header: Lines of comments to begin with.
+        folder: Where the file will stand: paths of meshes are relative to it.
+    """
+    robot, original = calibration.robot, calibration.original
+    source = original.source_file
+    units = original.units if source is not None else Units(angle=AngleUnit.DEG)
+    anew = robot_file_text(
+        robot,
+        header=[*header, *_first_comments("" if source is None else source.text)],
+        folder=folder,
+        angle=units.angle,
+        length=units.length,
+    )
+    if source is None:
+        return anew
+    meshes = [robot.base.mesh, robot.tool.mesh, *(row.link.mesh for row in robot.rows)]
+    if any(mesh is not None for mesh in meshes):
+        return anew  # whose paths are relative to where the file will stand
+    try:
+        edited = "".join(f"{line}\n" for line in comment_lines(header)) + _edited(source.text, robot, original)
+        same = _plain(parse_robot(edited)) == _plain(robot)
+    except (Dh2simError, KeyError, ValueError):
+        return anew
+    return edited if same else anew
+
+
+def _plain(spec: RobotSpec) -> str:
+    return robot_file_text(spec, angle=AngleUnit.RAD)
+
+
+def _first_comments(text: str) -> Iterator[str]:
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            return
+        yield line.removeprefix("#").removeprefix(" ")
+
+
+def _edited(text: str, robot: RobotSpec, original: RobotSpec) -> str:
+    """Return a robot file's text with the numbers of another robot.
+
+    Raises:
+        ValueError: More than numbers is different.
+    """
+    if not can_be_edited(text):
+        raise ValueError("the file has anchors")
+    writer = UnitWriter(units=original.units)
+    cells: dict[tuple[int | str | None, str], str | None] = {}
+    for index, (new, old) in enumerate(zip(robot.rows, original.rows, strict=True)):
+        if new.convention is not old.convention:
+            if new.convention is not Convention.HAYATI:
+                raise ValueError("a row has another convention")
+            cells[index, "convention"] = new.convention.value
+        for key in _NUMBERS:
+            value = getattr(new, key)
+            if value != getattr(old, key):
+                cells[index, key] = writer.length(value) if key in ("a", "d") else writer.angle(value)
+    # a later edit must not move what an earlier one found: cells last
+    text = _with_points(text, robot, original, writer)
+    text = _with_pose(text, "base", robot.base.pose, original.base.pose, writer)
+    text = _with_pose(text, "tool", robot.tool.pose, original.tool.pose, writer)
+    return with_cells(text, cells) if cells else text
+
+
+def _with_points(text: str, robot: RobotSpec, original: RobotSpec, writer: UnitWriter) -> str:
+    """Exchange centres of mass of links whose frames have moved along their axes."""
+    places: list[tuple[Node, float]] = []
+    root = compose(text, Report(""))
+    for index, (new, old) in enumerate(zip(robot.rows, original.rows, strict=True)):
+        if new.link.com is None or old.link.com is None or np.array_equal(new.link.com, old.link.com):
+            continue
+        for axis in np.flatnonzero(new.link.com != old.link.com).tolist():
+            node = root.at("joints", index, "link", "com", axis)
+            if node is None:
+                raise ValueError("a centre of mass is not written as a list")
+            places.append((node, float(new.link.com[axis])))
+    for node, value in sorted(places, key=lambda place: -place[0].start):
+        text = text[: node.start] + writer.length(value) + text[node.end :]
+    return text
+
+
+def _with_pose(text: str, key: str, new: Pose, old: Pose, writer: UnitWriter) -> str:
+    """Exchange the numbers of base or tool, or write them before the joints where there are none."""
+    for part, write in (("xyz", writer.length), ("rpy", writer.angle)):
+        wanted: Array = getattr(new, part)
+        if np.array_equal(wanted, getattr(old, part)):
+            continue
+        numbers = [write(value) for value in wanted.tolist()]
+        root = compose(text, Report(""))
+        node = root.at(key, part)
+        if node is not None and isinstance(node.value, list):
+            for each, number in reversed(list(zip(node.value, numbers, strict=True))):
+                text = text[: each.start] + number + text[each.end :]
+            continue
+        if node is not None:
+            raise ValueError(f"{part} of {key} is not written as a list")
+        line = f"{part}: [{', '.join(numbers)}]"
+        whole = root.at(key)
+        if whole is None:
+            entry = root.entry("joints")
+            if entry is None or root.flow:
+                raise ValueError("no line of its own for joints")
+            text = text[: entry.start] + f"{key}: {{{line}}}\n" + text[entry.start :]
+        elif whole.flow:
+            start = text.index("{", whole.start) + 1
+            rest = ", " if re.match(r"\s*\}", text[start:]) is None else ""
+            text = text[:start] + line + rest + text[start:]
+        else:
+            text = text[: whole.start] + f"{line}\n{' ' * (whole.column - 1)}" + text[whole.start :]
+    return text

@@ -1,0 +1,389 @@
+"""``dh2sim calibrate``: a table fitted to measurements."""
+
+from __future__ import annotations
+
+import math
+import os
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from dh2sim.cli.common import RobotArgument, load_all
+from dh2sim.cli.output import json_text, require_free, table_lines
+from dh2sim.messages import counted, listed, printable, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dh2sim.calibrate.held_out import Errors
+    from dh2sim.calibrate.measurements import Kind, Measurements
+    from dh2sim.calibrate.result import Calibration, ParameterResult
+    from dh2sim.robot.spec import RobotSpec
+
+WIDTH: Final = 80
+_UNITS: Final = {
+    "m": (1.0, False), "mm": (1e-3, False), "um": (1e-6, False), "µm": (1e-6, False), "cm": (1e-2, False),
+    "rad": (1.0, True), "mrad": (1e-3, True), "deg": (math.pi / 180.0, True),
+}  # fmt: skip
+
+
+def calibrate(
+    robot: RobotArgument,
+    data: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[DATA]",
+            help="Measurements, a CSV file: a column for each joint by name, and x, y, z with an orientation, or "
+            "distance, or socket; units in the header, as in 'joint_1 [deg]'.",
+        ),
+    ] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            metavar="pose|position|distance|socket",
+            help="What was measured. [default: what the columns are for]",
+        ),
+    ] = None,
+    unknown: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="What to fit, with commas: base, tool, a, alpha, d, theta, beta; a row's name; or one number such "
+            "as joint_2.theta. [default: all]",
+        ),
+    ] = None,
+    prior: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SIGMAS",
+            help="How far the table's numbers may be off, one sigma: '1mm,1mrad', or by name: 'theta=5mrad,d=2mm'. "
+            "[default: not known]",
+        ),
+    ] = None,
+    robust: Annotated[bool, typer.Option("--robust", help="Find rows that are far off, and leave them out.")] = False,
+    groups: Annotated[
+        str | None,
+        typer.Option(
+            metavar="COLUMN",
+            help="Rows with the same value are held out together. [default: placement, group, station or socket]",
+        ),
+    ] = None,
+    noise: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SIGMA",
+            help="Of a component of the measurements: '5e-5' (m, and rad), '0.05mm', '0.05mm,0.1mrad'. "
+            "[default: estimated]",
+        ),
+    ] = None,
+    from_run: Annotated[
+        Path | None,
+        typer.Option(
+            "--from-run", metavar="RUN", help="Use recordings of a run as measurements, with --noise added to them."
+        ),
+    ] = None,
+    rows: Annotated[
+        int | None, typer.Option("--rows", metavar="N", help="Rows to take from the run. [default: 100]")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="FILE", help="Write the calibrated robot file.")
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random number generator.")] = 0,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in rad and m.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Fit a robot's table, base and tool to measurements, and say how far to trust it.
+
+    Only what the measurements tell is fitted: of parameters that do the same, one; the report names them. Rows
+    between nearly parallel axes become Hayati rows. Errors are also found at measurements held out of the fit, by
+    placement.
+
+    \b
+    Examples:
+      dh2sim calibrate franka_panda sockets.csv --groups placement -o my_panda.yaml
+      dh2sim calibrate ur5e poses.csv --noise 0.05mm,0.1mrad
+      dh2sim calibrate puma560 points.csv --unknown base,tool,theta --robust --json
+      dh2sim calibrate stanford --from-run run.zarr --noise 5e-5 -o calibrated.yaml
+    """
+    require_free(out, force=force)
+    [spec] = load_all([robot])
+    if (data is None) == (from_run is None):
+        raise typer.BadParameter(
+            "give a file of measurements, or a run with --from-run"
+            if data is None
+            else "cannot be combined with DATA",
+            param_hint="DATA" if data is None else "--from-run",
+        )
+    if rows is not None and from_run is None:
+        raise typer.BadParameter("needs --from-run", param_hint="--rows")
+
+    from dh2sim.calibrate.calibration import calibrate as calibrated
+
+    sigma = _noise(noise)
+    measured = _measured(spec, data, from_run, kind, groups, sigma, rows, seed)
+    names = None if unknown is None else [word.strip() for word in unknown.split(",") if word.strip()]
+    found = calibrated(spec, measured, unknown=names, prior=_prior(prior), robust=robust, noise=sigma, seed=seed)
+    if out is not None:
+        _write_robot(found, out)
+    if as_json:
+        from dh2sim.calibrate.data import calibration_data
+
+        print(json_text(calibration_data(found)))
+    elif not quiet:
+        print("\n".join(_lines(found)))
+        if out is not None:
+            print(printable(f"\nwritten: {out}"))
+
+
+def _measured(
+    spec: RobotSpec,
+    data: Path | None,
+    run: Path | None,
+    kind: str | None,
+    groups: str | None,
+    sigma: float | tuple[float, float] | None,
+    rows: int | None,
+    seed: int,
+) -> Measurements:
+    if data is not None:
+        from dh2sim.calibrate.data_file import read_measurements
+
+        return read_measurements(data, spec, kind=_kind(kind), groups=groups)
+    assert run is not None
+    if sigma is None:
+        raise typer.BadParameter("needs --noise: recordings of a simulation have none", param_hint="--from-run")
+    if groups is not None:
+        raise typer.BadParameter(
+            "cannot be combined with --from-run, whose rollouts are the groups", param_hint="--groups"
+        )
+    from dh2sim.calibrate.measurements import Kind
+    from dh2sim.simulate.run_measurements import COUNT, run_measurements
+
+    count = COUNT if rows is None else rows
+    if count < 1:
+        raise typer.BadParameter(f"must be at least 1, got {count}", param_hint="--rows")
+    return run_measurements(spec, run, noise=sigma, kind=_kind(kind) or Kind.POSE, count=count, seed=seed)
+
+
+def _kind(text: str | None) -> Kind | None:
+    from dh2sim.calibrate.measurements import OTHER_KINDS, Kind
+    from dh2sim.cli.common import choice
+
+    return choice(text, Kind, "--kind", other_names=OTHER_KINDS)
+
+
+def _quantity(text: str, option: str, *, angle: bool | None = None) -> tuple[float, bool | None]:
+    """Return a number in SI units, and whether it is an angle; None where no unit says.
+
+    Raises:
+        BadParameter: It is no positive number with a unit that is known.
+    """
+    word = text.strip()
+    unit = next((unit for unit in sorted(_UNITS, key=len, reverse=True) if word.endswith(unit)), "")
+    number = word.removesuffix(unit).strip() if unit else word
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise typer.BadParameter(
+            f"expected a positive number with a unit ({listed(_UNITS)}), found {shown(text)}", param_hint=option
+        )
+    factor, is_angle = _UNITS.get(unit, (1.0, None))
+    if angle is not None and is_angle is not None and is_angle is not angle:
+        raise typer.BadParameter(f"{shown(text)} is {'an angle' if is_angle else 'a length'}", param_hint=option)
+    return value * factor, is_angle
+
+
+def _noise(text: str | None) -> float | tuple[float, float] | None:
+    if text is None:
+        return None
+    parts = [_quantity(part, "--noise", angle=k == 1) for k, part in enumerate(text.split(","))]
+    if len(parts) > 2:
+        raise typer.BadParameter("expected one or two numbers, of lengths and of angles", param_hint="--noise")
+    return (parts[0][0], parts[1][0]) if len(parts) == 2 else parts[0][0]
+
+
+def _prior(text: str | None) -> dict[str, float] | None:
+    if text is None:
+        return None
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        name, is_named, number = part.partition("=")
+        if is_named:
+            found[name.strip()] = _quantity(number, "--prior")[0]
+            continue
+        value, angle = _quantity(part, "--prior")
+        if angle is None:
+            raise typer.BadParameter(
+                f"{shown(part.strip())} needs a unit, such as 1mm or 1mrad", param_hint="--prior"
+            )
+        found["angle" if angle else "length"] = value
+    return found
+
+
+def _write_robot(found: Calibration, out: Path) -> None:
+    from dh2sim.calibrate.robot_text import calibrated_text
+    from dh2sim.files import atomic_file
+
+    text = calibrated_text(found, header=_header(found), folder=out.absolute().parent)
+    with atomic_file(out) as draft:
+        draft.write_text(text, encoding="utf-8")
+
+
+def _header(found: Calibration) -> list[str]:
+    measured = found.measured
+    source = f" of {os.path.basename(measured.file)}" if measured.file else ""
+    line = f"Note: calibrated with {_what(measured)}{source}: {_error(found.errors, measured.kind)} off"
+    if found.held_out is not None and found.held_out.fitted is not None:
+        line += f", {_error(found.held_out.fitted, measured.kind)} where it had not been measured"
+    return [f"{line}; {_error(found.errors_before, measured.kind)} before."]
+
+
+# ---------------------------------------------------------------------------- the report
+
+
+def _what(measured: Measurements) -> str:
+    rows = {"pose": "pose", "position": "position", "distance": "distance"}.get(measured.kind, "row")
+    text = counted(len(measured), rows)
+    if measured.socket is not None:
+        text += f" in {counted(len(set(measured.socket_names())), 'socket')}"
+    if measured.groups is not None and measured.group_name != "socket":
+        text += f", {counted(len(set(measured.groups)), measured.group_name)}"
+    return text
+
+
+def _error(errors: Errors, kind: str) -> str:
+    text = f"{1e3 * errors.length:.3g} mm"
+    return text if math.isnan(errors.angle) or kind != "pose" else f"{text} and {1e3 * errors.angle:.3g} mrad"
+
+
+def _lines(found: Calibration) -> list[str]:
+    """Return what is printed, at most 80 columns wide as far as names allow."""
+    fit, measured = found.fit, found.measured
+    lines = [f"{found.robot.name}: calibrated with {_what(measured)}", ""]
+    robot = sum(parameter.told.value == "fitted" for parameter in found.parameters)
+    rows = [("told", f"{found.identifiable} parameters of the robot, {found.possible} at most by this kind")]
+    nuisance = len(fit.basis.kept) - robot
+    if nuisance:
+        rows.append(("", f"and {nuisance} of {'stations' if measured.socket is None else 'sockets'}"))
+    rows.append(("condition", f"{fit.basis.condition:.3g}, in {counted(fit.iterations, 'step')}"))
+    known = fit.sigma.length_known
+    if known:
+        rows.append(("chi2 per dof", f"{fit.chi2_per_dof:.3f}, expected 1 ± {found.chi2_spread:.3f} ({fit.dof} dof)"))
+    noise = f"{1e3 * fit.sigma.length:.4g} mm"
+    if measured.rotation is not None:
+        noise += f", {1e3 * fit.sigma.angle:.4g} mrad"
+    rows.append(("noise", f"{noise} a component, {'as given' if known else f'estimated ({fit.dof} dof)'}"))
+    rows.append(
+        (
+            "the tool",
+            f"moved by {1e3 * found.moved.length:.3g} mm inside the limits, known to "
+            f"{1e3 * found.predicted.length:.2g} mm",
+        )
+    )
+    width = max(len(left) for left, _ in rows)
+    lines += [f"{left:<{width}}  {right}" for left, right in rows]
+    lines += ["", *_error_lines(found)]
+    lines += ["", *_parameter_lines(found)]
+    for title, which in (("Folded", "folded"), ("Without effect", "unseen"), ("Held", "held")):
+        lines += _told_lines(found, title, which)
+    lines += _outlier_lines(found)
+    for note in found.notes:
+        lines += textwrap.wrap(f"Note: {note}", WIDTH, subsequent_indent="      ", break_on_hyphens=False)
+    return [printable(line) for line in lines]
+
+
+def _cells(errors: Errors | None, columns: Sequence[str]) -> list[str]:
+    values = [math.nan if errors is None else getattr(errors, column) for column in columns]
+    return ["-" if math.isnan(value) else f"{1e3 * value:.3f}" for value in values]
+
+
+def _error_lines(found: Calibration) -> list[str]:
+    """Return the errors before and after, and held out."""
+    columns, heads = ["length"], {"length": "mm", "angle": "mrad", "artefact": "distance mm"}
+    if found.measured.kind == "pose":
+        columns.append("angle")
+    if not math.isnan(found.errors.artefact):
+        columns.append("artefact")
+    whole = [("error, rms", *(heads[column] for column in columns))]
+    whole.append(("as it was", *_cells(found.errors_before, columns)))
+    whole.append(("calibrated", *_cells(found.errors, columns)))
+    held = found.held_out
+    if held is not None and held.fitted is not None:
+        whole.append((f"held out by {held.by}: as it was", *_cells(held.nominal, columns)))
+        whole.append(("  calibrated", *_cells(held.fitted, columns)))
+        whole.append(("  predicted", *_cells(held.predicted, columns)))
+    lines = table_lines(whole, left=1)
+    if held is None:
+        lines.append("Nothing is held out: there is only one group.")
+    elif any(fold.reason for fold in held.folds):
+        failed = next(fold for fold in held.folds if fold.reason)
+        lines += textwrap.wrap(f"Without {listed(failed.groups)}: {failed.reason}", WIDTH, break_on_hyphens=False)
+    return lines
+
+
+def _nominal(parameter: ParameterResult, spec: RobotSpec) -> str:
+    from dh2sim.robot.write import UnitWriter
+
+    if parameter.nominal is None:
+        return ""
+    writer = UnitWriter(units=spec.units)
+    text = writer.angle(parameter.nominal) if parameter.is_angle else writer.length(parameter.nominal)
+    return text if len(text) <= 12 else f"{float(text):.9g}"
+
+
+def _parameter_lines(found: Calibration) -> list[str]:
+    units = found.original.units
+    rows = [("parameter", f"was ({units.angle}, {units.length})", "change", "sigma", "")]
+    for parameter in found.parameters:
+        if parameter.told.value == "fitted" and parameter.sigma is not None:
+            unit = "mrad" if parameter.is_angle else "mm"
+            rows.append(
+                (
+                    parameter.name,
+                    _nominal(parameter, found.original),
+                    f"{1e3 * parameter.change:+.4f}",
+                    f"{1e3 * parameter.sigma:.4f}",
+                    unit,
+                )
+            )
+    return [line.rstrip() for line in table_lines(rows, left=1)]
+
+
+def _told_lines(found: Calibration, title: str, which: str) -> list[str]:
+    """Return which parameters stay as they were, and why: those with the same reason together."""
+    reasons: dict[str, list[str]] = {}
+    for parameter in found.parameters:
+        if parameter.told.value == which:
+            reason = parameter.reason if which == "held" else ", ".join(parameter.into)
+            reasons.setdefault(reason, []).append(parameter.name)
+    lines = []
+    for reason, names in reasons.items():
+        into = f" into {reason}" if which == "folded" else f": {reason}" if reason else ""
+        text = f"{title}: {', '.join(names)}{into}"
+        lines += textwrap.wrap(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+    return ["", *lines] if lines else []
+
+
+def _outlier_lines(found: Calibration, most: int = 10) -> list[str]:
+    if not found.outliers:
+        return [""] if found.notes else []
+    rows = [("outlier", "", "sigmas", "mm", "")]
+    rows += [
+        (
+            outlier.place,
+            outlier.group,
+            f"{outlier.times:.1f}",
+            "-" if math.isnan(outlier.length) else f"{1e3 * outlier.length:.3f}",
+            "left out" if outlier.left_out else "",
+        )
+        for outlier in found.outliers[:most]
+    ]
+    lines = ["", *(line.rstrip() for line in table_lines(rows, left=2))]
+    if len(found.outliers) > most:
+        lines.append(f"and {len(found.outliers) - most} more")
+    return [*lines, ""] if found.notes else lines

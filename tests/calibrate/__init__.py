@@ -1,0 +1,1 @@
+"""Tests of dh2sim/calibrate."""

@@ -1,0 +1,92 @@
+"""``dh2sim calibrate``: measurements in, a robot file and a report out."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.read import load_robot
+from tests.calibrate.measured import off, random_q
+from tests.program import dh2sim
+from tests.sample_robots import robot
+
+
+@pytest.fixture(scope="module")
+def points(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Positions of a Stanford arm that is off its table, in six placements."""
+    nominal = robot("stanford")
+    q = random_q(nominal, 60, 1)
+    p = table_tool_pose(off(nominal, 1e-3, 2), q)[:, :3, 3] + 5e-5 * np.random.default_rng(3).normal(size=(60, 3))
+    lines = [
+        ",".join(
+            [f"joint_{i} [{'mm' if i == 3 else 'deg'}]" for i in range(1, 7)]
+            + ["x [mm]", "y [mm]", "z [mm]", "placement"]
+        )
+    ]
+    for k, (each, point) in enumerate(zip(q.tolist(), (1e3 * p).tolist(), strict=True)):
+        joints = [1e3 * value if i == 2 else math.degrees(value) for i, value in enumerate(each)]
+        lines.append(",".join([*map(repr, [*joints, *point]), f"place {k % 6}"]))
+    file = tmp_path_factory.mktemp("points") / "points.csv"
+    file.write_text("\n".join(lines) + "\n")
+    return file
+
+
+def test_the_report_says_what_is_told_and_how_well(points: Path, tmp_path: Path) -> None:
+    out = tmp_path / "my_stanford.yaml"
+    run = dh2sim("calibrate", "stanford", points, "--noise", "0.05mm", "-o", out)
+    assert (run.status, run.err) == (0, "")
+    lines = run.out.splitlines()
+    assert lines[0] == "stanford: calibrated with 60 positions, 6 placements"
+    assert any(line.startswith("told          25 parameters of the robot, 25 at most") for line in lines)
+    assert any(line.startswith("held out by placement: as it was") for line in lines)
+    assert "Folded: joint_1.d into base.z" in lines
+    assert max(map(len, lines[:-1])) <= 80
+    calibrated = load_robot(out)
+    q = random_q(calibrated, 100, 5)
+    true = off(robot("stanford"), 1e-3, 2)
+    errors = table_tool_pose(calibrated, q)[:, :3, 3] - table_tool_pose(true, q)[:, :3, 3]
+    assert np.linalg.norm(errors, axis=1).max() < 2e-4
+    text = out.read_text(encoding="utf-8")
+    assert "# Note: calibrated with 60 positions, 6 placements of points.csv" in text
+    assert "printed: [45, 60, 0.2, 45, 0, -60]       # the slides' other pose" in text
+    assert [row.limits.position for row in calibrated.rows] == [row.limits.position for row in robot("stanford").rows]
+    again = dh2sim("calibrate", "stanford", points, "-o", out)
+    assert again.status == 2
+    assert "exists already" in again.err
+
+
+def test_json_is_the_same_as_data(points: Path) -> None:
+    run = dh2sim("calibrate", "stanford", points, "--json", "--unknown", "base,tool,theta")
+    assert (run.status, run.err) == (0, "")
+    data = json.loads(run.out)
+    assert data["kind"] == "position"
+    assert data["grouped_by"] == "placement"
+    assert len(data["held_out"]["folds"]) == 6
+    assert {each["told"] for each in data["parameters"] if each["name"].endswith(".alpha")} == {"held"}
+    assert data["errors"]["nominal"]["length"] > data["errors"]["calibrated"]["length"] > 5e-5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "give a file of measurements, or a run with --from-run"),
+        (["no.csv"], "no.csv: cannot be read"),
+        (["DATA", "--noise", "fast"], "expected a positive number with a unit"),
+        (["DATA", "--prior", "1"], "'1' needs a unit, such as 1mm or 1mrad"),
+        (["DATA", "--kind", "points"], "It is called 'position' here"),
+        (["DATA", "--unknown", "thta"], "Did you mean 'theta'?"),
+        (["DATA", "--groups", "day"], "there is no column 'day' to group by"),
+        (["DATA", "--kind", "socket"], "missing column socket of --kind socket"),
+        (["--from-run", "run.zarr"], "needs --noise"),
+    ],
+)
+def test_wrong_arguments_are_told(arguments: list[str], message: str, points: Path) -> None:
+    run = dh2sim("calibrate", "stanford", *[str(points) if word == "DATA" else word for word in arguments])
+    assert run.status == 2
+    assert message in run.err
+    assert run.out == ""
