@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import chain, product
 from typing import Protocol
 
@@ -25,8 +25,9 @@ from dh2sim.inverse.loop import (
     pose_and_jacobian,
     pose_error,
 )
+from dh2sim.inverse.nearly_singular import near_solutions
 from dh2sim.inverse.pencil import build_pencil
-from dh2sim.inverse.polish import polish
+from dh2sim.inverse.polish import polish, refine
 from dh2sim.inverse.slides import OppositeSlides, ThreeSlides
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.typing import Array
@@ -35,6 +36,12 @@ CONVERGED = 1e-12
 """Error, in lengths of the arm and rad, up to which a configuration of six joints reaches a pose."""
 REACHED = 1e-10
 """Error up to which one of fewer joints does, whose pose may have been rounded, and a singular one."""
+_MET = 1e-11
+"""Least singular value below which a solution is singular by all that rounding leaves to be seen."""
+_STUCK = 1e-6
+"""Error up to which a configuration that reaches no pose may be in the valley of nearly singular solutions."""
+_ROUNDING = 1e-14
+"""Error, in lengths of the arm and rad, that is not to be seen."""
 _BLUNT = 1e-8
 """Least singular value below which a solution cannot be determined better."""
 SAME = 1e-6
@@ -51,6 +58,10 @@ _VIRTUAL = 0.05
 """How far virtual joints of a candidate may be from zero."""
 _NUDGE = 1e-6
 """Size of changes, in lengths of the arm and rad, that make singular eliminations regular."""
+_NEAR_BY = 4
+"""Poses near a nearly singular one whose solutions are counted, too,"""
+_APART = 1e-3
+"""and how far from it they are, in lengths of the arm and rad."""
 _GATE = 0.3
 """Error of a candidate, in lengths of the arm and rad, above which it is none."""
 _DOUBTFUL = 1e-5
@@ -88,16 +99,27 @@ class Found:
     """Coordinates of all joints in the arm's units, shape (M, n)."""
     sigma: Array
     """Least singular value of the Jacobian of the joints that move, in the arm's units, shape (M,)."""
+    error: Array
+    """What is left of the pose, in lengths of the arm and rad, shape (M,)."""
     J: Array = field(repr=False)
     """Jacobians of all joints in the arm's units, shape (M, 6, n)."""
+    unsure: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    """Indices of nearly singular poses at which every elimination is ill-conditioned: solutions may be missing."""
 
     def of(self, chosen: Indices | Flags) -> Found:
         """Return some of them, by index or bool."""
-        return Found(pose=self.pose[chosen], q=self.q[chosen], sigma=self.sigma[chosen], J=self.J[chosen])
+        return replace(
+            self,
+            pose=self.pose[chosen],
+            q=self.q[chosen],
+            sigma=self.sigma[chosen],
+            error=self.error[chosen],
+            J=self.J[chosen],
+        )
 
     def among(self, poses: Indices) -> Found:
         """Return the same solutions with their poses' indices among others."""
-        return Found(pose=poses[self.pose], q=self.q, sigma=self.sigma, J=self.J)
+        return replace(self, pose=poses[self.pose], unsure=poses[self.unsure])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -137,8 +159,10 @@ class Method:
         """Return the configuration in which all joints are locked, for the poses that it reaches."""
         q = np.stack([np.broadcast_to(locked[joint], (len(T),)) for joint in range(self.arm.n)], axis=1)
         frame, J = pose_and_jacobian(self.arm, q)
-        (reached,) = np.nonzero(np.linalg.norm(pose_error(frame, T), axis=1) < REACHED)
-        return Found(pose=reached, q=q[reached], sigma=np.ones(len(reached)), J=J[reached])
+        error = np.linalg.norm(pose_error(frame, T), axis=1)
+        (reached,) = np.nonzero(error < REACHED)
+        found = Found(pose=np.arange(len(T)), q=q, sigma=np.ones(len(T)), error=error, J=J)
+        return found.of(reached)
 
     def _solve_block(self, T: Array, locked: Mapping[int, Array]) -> Found:
         found = self.solve_by(self.eliminations[0], T, locked) if self.eliminations else _joined([], self.arm.n)
@@ -152,7 +176,43 @@ class Method:
                 values = {joint: q if len(q) == 1 else q[again] for joint, q in locked.items()}
                 more = self._searched(T[again], values) if other is None else self.solve_by(other, T[again], values)
                 found = self.distinct(_joined([found, more.among(again)], self.arm.n))
+                if other is None:
+                    found = self._sharp(found)
+                    found = replace(found, unsure=self._unsure(again, found, T, locked))
         return found
+
+    def _unsure(self, poses: Indices, found: Found, T: Array, locked: Mapping[int, Array]) -> Indices:
+        """Return of some poses those that may have more solutions: fewer were found than near by poses have."""
+        poses = np.intersect1d(poses, np.flatnonzero(self.doubtful(found, len(T))))
+        if not len(poses) or not self.eliminations:
+            return poses
+        poses = poses[self._condition(poses, T, locked, all_of_them=True) >= _ILL]
+        if not len(poses):
+            return poses
+        # where solutions have met, one stands for two
+        met = np.where(found.sigma < _MET, 2, 1)
+        counts = np.bincount(found.pose, weights=met, minlength=len(T))[poses]
+        values = {joint: q if len(q) == 1 else q[poses] for joint, q in locked.items()}
+        rng = np.random.default_rng(_SEED)
+        sure = (counts > 0) & (counts % 2 == 0)
+        for _ in range(_NEAR_BY):
+            near = T[poses] @ _small_motions(rng, 1, _APART)[0]
+            sure &= (
+                np.bincount(self.solve_by(self.eliminations[0], near, values).pose, minlength=len(poses)) <= counts
+            )
+        unsure: Indices = poses[np.logical_not(sure)]
+        return unsure
+
+    @staticmethod
+    def _sharp(found: Found) -> Found:
+        """Return solutions without those that rounding leaves beside others in the valley of nearly singular ones.
+
+        How far a configuration is from the solution nearby is what is left of the pose over the singular value. Where
+        that is much for all singular solutions of a pose, the pose itself is rounded, and they are what there is.
+        """
+        blunt = (found.error > SAME * found.sigma) & (found.error > _ROUNDING)
+        sharp = np.unique(found.pose[~blunt & (found.sigma < NEARLY_SINGULAR)])
+        return found.of(~(blunt & np.isin(found.pose, sharp)))
 
     def doubtful(self, found: Found, poses: int) -> Flags:
         """Whether solutions of a pose may be missing: there are none, an odd number, or singular ones; bool (N,)."""
@@ -183,25 +243,54 @@ class Method:
         asked = again[(counts % 2 == 0) if last else (counts == 0)]
         if not len(asked) or not self.eliminations:
             return again
-        values = {joint: q if len(q) == 1 else q[asked] for joint, q in locked.items()}
-        loop = close_loop(self.arm, T[asked], values, self.virtual)
+        return np.setdiff1d(again, asked[self._condition(asked, T, locked, all_of_them=last) < _ILL])
+
+    def _condition(self, poses: Indices, T: Array, locked: Mapping[int, Array], *, all_of_them: bool) -> Array:
+        """Return how ill-conditioned the first, or else the best elimination is at some poses."""
+        values = {joint: q if len(q) == 1 else q[poses] for joint, q in locked.items()}
+        loop = close_loop(self.arm, T[poses], values, self.virtual)
         condition = self.eliminations[0].condition(loop)
-        for other in self.eliminations[1:] if last else ():
+        for other in self.eliminations[1:] if all_of_them else ():
             if not isinstance(other, Nudged):  # which is regular where the arm itself is singular
                 condition = np.minimum(condition, other.condition(loop))
-        return np.setdiff1d(again, asked[condition < _ILL])
+        return condition
 
     def _searched(self, T: Array, locked: Mapping[int, Array]) -> Found:
-        """Return what Levenberg-Marquardt finds from scattered starts: the last resort where the arm is singular."""
+        """Return what is found in other ways: the last resort where all eliminations are ill-conditioned.
+
+        That is, in the valleys that lead through what eliminations leave, and by Levenberg-Marquardt's steps from
+        scattered starts.
+        """
         starts = scattered_configurations(self.ranges[:, 0], self.ranges[:, 1], _STARTS)
         pose = np.repeat(np.arange(len(T)), _STARTS)
         q = np.tile(starts, (len(T), 1))
         for joint, value in locked.items():
             q[:, joint] = value[0] if len(value) == 1 else value[pose]
-        return self.polished(pose, q, T, gate=math.inf)
+        parts = [self.polished(pose, q, T, gate=math.inf)]
+        pose, q, error = self._stuck(T, locked)
+        for k in dict.fromkeys(pose.tolist()) if int(self.moving.sum()) == 6 else ():
+            own = np.flatnonzero(pose == k)
+            near = near_solutions(self.arm, q[own[np.argsort(error[own])]], T[k], self.moving)
+            parts.append(self.polished(np.full(len(near), k), near, T))
+        return _joined(parts, self.arm.n)
+
+    def _stuck(self, T: Array, locked: Mapping[int, Array]) -> tuple[Indices, Array, Array]:
+        """Return configurations of eliminations that almost reach poses, with their poses and errors."""
+        parts = []
+        for elimination in self.eliminations:
+            pose, q = self._candidates(elimination, T, locked)
+            q, error, _ = polish(self.arm, q, T[pose], self.moving, gate=_GATE)
+            stuck = (error > CONVERGED) & (error < _STUCK)
+            parts.append((pose[stuck], q[stuck], error[stuck]))
+        pose, q, error = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return pose, q, error
 
     def solve_by(self, elimination: Elimination, T: Array, locked: Mapping[int, Array]) -> Found:
         """Return the solutions of N poses that one elimination leads to."""
+        return self.polished(*self._candidates(elimination, T, locked), T)
+
+    def _candidates(self, elimination: Elimination, T: Array, locked: Mapping[int, Array]) -> tuple[Indices, Array]:
+        """Return configurations of all joints that an elimination leads to, and their poses."""
         loop = close_loop(self.arm, T, locked, self.virtual)
         candidates = elimination.candidates(loop)
         pose, ring = candidates.pose, candidates.q
@@ -212,40 +301,53 @@ class Method:
         q[:, self.moving] = ring
         for joint, value in locked.items():
             q[:, joint] = value[0] if len(value) == 1 else value[pose]
-        return self.polished(pose, q, T)
+        return pose, q
 
     def polished(self, pose: Indices, q: Array, T: Array, gate: float = _GATE) -> Found:
         """Return the distinct solutions that configurations lead to, if their errors are below the gate."""
         q, error, J = polish(self.arm, q, T[pose], self.moving, gate=gate)
-        extent = 1.0 + np.abs(q[:, np.logical_not(self.arm.turns)]).max(axis=1, initial=0.0)  # rounding grows with it
+        stuck = np.flatnonzero((error > CONVERGED) & (error < _STUCK))
+        if len(stuck):
+            q[stuck], error[stuck], J[stuck] = refine(self.arm, q[stuck], T[pose[stuck]], self.moving)
+        extent = _extents(q, np.array(self.arm.turns))  # rounding grows with it
         reached = error < extent * REACHED
         J, error, extent = J[reached], error[reached], extent[reached]
         sigma = np.asarray(np.linalg.svd(J[:, :, self.moving], compute_uv=False)[:, -1], dtype=np.float64)
-        found = Found(pose=pose[reached], q=q[reached], sigma=sigma, J=J)
+        found = Found(pose=pose[reached], q=q[reached], sigma=sigma, error=error, J=J)
         if not self.virtual:
             found = found.of((error < extent * CONVERGED) | (sigma < _BLUNT))
         return self.distinct(found)
 
     def distinct(self, found: Found) -> Found:
-        """Return solutions without those that are the same but for whole turns, in the order of their poses."""
+        """Return solutions without those that are the same but for whole turns, in the order of their poses.
+
+        Of equal ones the one that is nearest to its pose is kept.
+        """
         turns = np.array(self.arm.turns)
         q = np.where(turns, _wrapped(found.q), found.q)
         weights = 1.0 + np.sqrt(2.0 + np.arange(self.arm.n))  # no two joints count alike
         key = np.where(turns, np.sin(q + weights), q) @ weights
         order = np.lexsort([key, found.pose])
-        pose, q, key, sigma = found.pose[order], q[order], key[order], found.sigma[order]
-        tolerance = np.where(sigma < NEARLY_SINGULAR, SAME_IF_SINGULAR, SAME)
-        farthest = 2.0 * float(weights.sum()) * tolerance  # keys of equal solutions are no farther from each other
-        new = np.ones(len(pose), dtype=np.bool_)
-        for lag in range(1, min(_NEIGHBOURS, len(new) - 1) + 1):
-            near = np.flatnonzero((pose[lag:] == pose[:-lag]) & (key[lag:] - key[:-lag] <= farthest[lag:]))
+        found, q, key = found.of(order), q[order], key[order]
+        tolerance = np.where(found.sigma < NEARLY_SINGULAR, SAME_IF_SINGULAR, SAME)
+        extent = _extents(q, turns)[:, None]  # far slides are as exact as they are far
+        farthest = 2.0 * float(weights.sum()) * tolerance * extent[:, 0]  # keys of equal solutions are no farther
+        first = np.arange(len(q))
+        for lag in range(1, min(_NEIGHBOURS, len(q) - 1) + 1):
+            near = np.flatnonzero(
+                (found.pose[lag:] == found.pose[:-lag]) & (key[lag:] - key[:-lag] <= farthest[lag:])
+            )
             if not len(near):
                 break
             gap = q[near + lag] - q[near]
-            apart = np.abs(np.where(turns, _wrapped(gap), gap)).max(axis=1)
-            new[near[apart <= tolerance[near + lag]] + lag] = False
-        order = order[new]
-        return Found(pose=pose[new], q=q[new], sigma=sigma[new], J=found.J[order])
+            apart = np.abs(np.where(turns, _wrapped(gap), gap / extent[near])).max(axis=1)
+            near = near[apart <= tolerance[near + lag]]
+            first[near + lag] = np.minimum(first[near + lag], near)
+        while (first[first] != first).any():
+            first = first[first]
+        sharpest = np.lexsort([found.error, first])
+        chosen = sharpest[np.flatnonzero(np.diff(first[sharpest], prepend=-1))]
+        return replace(found.of(chosen), q=q[chosen])
 
 
 def choose_method(arm: Arm, moving: Flags, ranges: Array) -> Method:
@@ -279,11 +381,12 @@ def _tried(
     T[:, :3], T[:, 3, 3] = pose_and_jacobian(arm, q)[0], 1.0
     locked = {int(joint): q[:, joint] for joint in np.flatnonzero(np.logical_not(moving))}
     loop = close_loop(arm, T, locked, virtual)
-    drawn = Found(pose=np.arange(len(q)), q=q, sigma=np.ones(len(q)), J=pose_and_jacobian(arm, q)[1])
+    J = pose_and_jacobian(arm, q)[1]
+    drawn = Found(pose=np.arange(len(q)), q=q, sigma=np.ones(len(q)), error=np.zeros(len(q)), J=J)
     bare = Method(arm=arm, moving=moving, ranges=ranges, virtual=virtual, eliminations=(), found_share=0.0)
     trials: list[_Trial] = []
     share = 0.0
-    nudges = _nudges(rng)
+    nudges = _small_motions(rng, 6, _NUDGE)
     nudged = loop.moved(nudges)
     for seen, hidden in ((loop, (0,)), (loop, (1, 2)), (nudged, (0,)), (nudged, (1, 2))):
         for elimination in _eliminations(seen, hidden, rng):
@@ -302,7 +405,10 @@ def _tried(
     best = [trial.elimination for trial in trials[:2]]
     # near a singularity another kind may be regular, and at one an arm that is nearly the same
     others = [trial.elimination for trial in trials[2:] if trials[0].is_another(trial)]
-    best += [*others[:1], *(Nudged(elimination=elimination, nudges=_nudges(rng)) for elimination in best[:1])]
+    best += [
+        *others[:1],
+        *(Nudged(elimination=elimination, nudges=_small_motions(rng, 6, _NUDGE)) for elimination in best[:1]),
+    ]
     return replace(bare, eliminations=tuple(best), found_share=share)
 
 
@@ -344,16 +450,17 @@ class Nudged:
         return self.elimination.condition(loop.moved(self.nudges))
 
 
-def _nudges(rng: np.random.Generator) -> Array:
-    nudges = np.zeros((6, 4, 4))
-    turns, shifts = _NUDGE * rng.normal(size=(2, 6, 3))
+def _small_motions(rng: np.random.Generator, count: int, size: float) -> Array:
+    """Return random motions of about a size, in lengths of the arm and rad, shape (count, 4, 4)."""
+    motions = np.zeros((count, 4, 4))
+    turns, shifts = size * rng.normal(size=(2, count, 3))
     x, y, z = turns.T
-    nudges[:, 0, 1], nudges[:, 0, 2], nudges[:, 1, 2] = -z, y, -x
-    nudges[:, :3, :3] += np.eye(3) - np.swapaxes(nudges[:, :3, :3], 1, 2)
-    left, _, right = np.linalg.svd(nudges[:, :3, :3])
-    nudges[:, :3, :3] = left @ right
-    nudges[:, :3, 3], nudges[:, 3, 3] = shifts, 1.0
-    return nudges
+    motions[:, 0, 1], motions[:, 0, 2], motions[:, 1, 2] = -z, y, -x
+    motions[:, :3, :3] += np.eye(3) - np.swapaxes(motions[:, :3, :3], 1, 2)
+    left, _, right = np.linalg.svd(motions[:, :3, :3])
+    motions[:, :3, :3] = left @ right
+    motions[:, :3, 3], motions[:, 3, 3] = shifts, 1.0
+    return motions
 
 
 def _eliminations(loop: Loop, hidden: tuple[int, ...], rng: np.random.Generator) -> Iterator[Elimination]:
@@ -400,17 +507,23 @@ def _virtual_links(count: int, rng: np.random.Generator, *, wrist: bool) -> tupl
     return (*links, inverse_poses(product))
 
 
+def _extents(q: Array, turns: Flags) -> Array:
+    """Return how far configurations lead, in lengths of the arm, shape (M,): 1 unless slides are farther out."""
+    return np.asarray(1.0 + np.abs(q[:, ~turns]).max(axis=1, initial=0.0))
+
+
 def _wrapped(q: Array) -> Array:
     """Return angles within half a turn of zero."""
     return np.asarray(q - 2.0 * np.pi * np.round(q / (2.0 * np.pi)))
 
 
 def _joined(parts: list[Found], n: int) -> Found:
-    if not parts:
-        return Found(pose=np.zeros(0, dtype=np.int64), q=np.zeros((0, n)), sigma=np.zeros(0), J=np.zeros((0, 6, n)))
-    return Found(
-        pose=np.concatenate([part.pose for part in parts]),
-        q=np.concatenate([part.q for part in parts]),
-        sigma=np.concatenate([part.sigma for part in parts]),
-        J=np.concatenate([part.J for part in parts]),
+    none = Found(
+        pose=np.zeros(0, dtype=np.intp),
+        q=np.zeros((0, n)),
+        sigma=np.zeros(0),
+        error=np.zeros(0),
+        J=np.zeros((0, 6, n)),
     )
+    joined = {f.name: np.concatenate([getattr(part, f.name) for part in (none, *parts)]) for f in fields(Found)}
+    return Found(**joined)

@@ -19,6 +19,13 @@ _NEAR = 1e-3
 """What is not as near as that to its pose after a few steps is not on its way to a solution nearby."""
 _LONGEST = 1.0
 """Longest step of a coordinate, rad or lengths of the arm."""
+_CAREFUL_STEPS = 100
+_EXACT = 2e-15
+"""What is left of a pose where careful steps end."""
+_PROBE = 1e-3
+"""How far along a step its curvature is measured, rad or lengths of the arm."""
+_BENT = 0.75
+"""Acceleration, as a share of the step, above which the step is too long for it."""
 
 
 def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) -> tuple[Array, Array, Array]:
@@ -72,3 +79,48 @@ def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) 
             keep &= norm[active] < _NEAR
         active, J, error = active[keep], J[keep], error[keep]
     return q, norm, all_J
+
+
+def refine(arm: Arm, q: Array, T: Array, moving: Flags) -> tuple[Array, Array, Array]:
+    """Return what :func:`polish` returns of configurations near nearly singular solutions, which it does not reach.
+
+    The way there leads along a valley of the error that is bent: a straight step as long as needed leaves it. So
+    steps are parabolas, with the acceleration that keeps them in the valley, and their damping is found by trial; and
+    as the squares of the least singular values are lost in J^T J, J itself is decomposed. Source: M. K. Transtrum, J.
+    P. Sethna, Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares minimization, 2012.
+
+    Args:
+        arm: The arm.
+        q: Coordinates of all its joints, in its own units, shape (M, n).
+        T: Poses to reach, positions in units of the arm's length, shape (M, 4, 4).
+        moving: Which joints may move, bool, shape (n,).
+    """
+    q = np.array(q)
+    frame, J = pose_and_jacobian(arm, q)
+    error = pose_error(frame, T)
+    norm = np.linalg.norm(error, axis=1)
+    damping = np.full(len(q), 1e-16)
+    for _ in range(_CAREFUL_STEPS):
+        active = np.flatnonzero((norm > _EXACT) & (damping < 1.0))
+        if not len(active):
+            break
+        moved = J[active][:, :, moving]
+        U, S, Vt = np.linalg.svd(moved, full_matrices=False)
+        inverse = np.swapaxes(Vt * (S / (S * S + damping[active, None]))[:, :, None], 1, 2) @ np.swapaxes(U, 1, 2)
+        velocity = inverse @ error[active][:, :, None]
+        probe = _PROBE / np.maximum(np.abs(velocity).max(axis=1, keepdims=True), 1e-300)
+        ahead = q[active]
+        ahead[:, moving] += (probe * velocity)[:, :, 0]
+        bending = (pose_and_jacobian(arm, ahead)[1][:, :, moving] - moved) @ velocity / probe
+        acceleration = -0.5 * inverse @ bending
+        lengths = [np.linalg.norm(x, axis=(1, 2)) for x in (velocity, acceleration)]
+        trial = q[active]
+        trial[:, moving] += (velocity + acceleration)[:, :, 0]
+        frame, J_trial = pose_and_jacobian(arm, trial)
+        error_trial = pose_error(frame, T[active])
+        norm_trial = np.linalg.norm(error_trial, axis=1)
+        better = (norm_trial < norm[active]) & (lengths[1] <= _BENT * lengths[0])
+        took = active[better]
+        q[took], norm[took], J[took], error[took] = (x[better] for x in (trial, norm_trial, J_trial, error_trial))
+        damping[active] = np.where(better, 0.1 * damping[active], 5.0 * np.maximum(damping[active], 1e-22))
+    return q, norm, J

@@ -39,6 +39,7 @@ from dh2sim.typing import Array, read_only
 
 VERIFIED: Final = 1e-10
 """Residual up to which a configuration is a solution."""
+UNSURE: Final = "The pose is nearly singular and no elimination is well-conditioned there: solutions may be missing."
 ODD: Final = "Solutions come in pairs, but an odd number was found: at least one is missing."
 _EQUAL: Final = 1e-6
 """Distance of configurations below which they are the same."""
@@ -147,6 +148,8 @@ class InverseSolver:
             results = self._results(method, found, poses, near, free, limits=limits)
             for i in np.flatnonzero(lacking):
                 results[i] = replace(results[i], complete=False, notes=(*results[i].notes, ODD))
+            for i in found.unsure:
+                results[i] = replace(results[i], complete=False, notes=(*results[i].notes, UNSURE))
             for k, paths in families.items():
                 count = int((found.pose == k).sum())
                 results[k] = self._with_families(results[k], count, arm, paths, poses[k], near, free, limits=limits)
