@@ -39,6 +39,7 @@ _HOMES = {
     "ShapeSpec": "robot.spec",
     "Solutions": "inverse.solutions",
     "SymbolicForm": "symbolic.request",
+    "TableBatch": "kinematics.table_batch",
     "ToolSpec": "robot.spec",
     "Trajectory": "trajectory.trajectory",
     "Workspace": "workspace.workspace",
@@ -107,6 +108,7 @@ if TYPE_CHECKING:
     from dh2sim.kinematics.frame_assignment.recover import recover_table as recover_table
     from dh2sim.kinematics.serial_chain import SerialChain as SerialChain
     from dh2sim.kinematics.serial_chain import SerialJoint as SerialJoint
+    from dh2sim.kinematics.table_batch import TableBatch as TableBatch
     from dh2sim.mobility.result import Mobility as Mobility
     from dh2sim.mobility.robot_mechanism import find_mobility as find_mobility
     from dh2sim.model.build import build_model as build_model

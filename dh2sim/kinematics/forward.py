@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Unpack
 
 import numpy as np
@@ -110,7 +111,12 @@ def reference_joint_poses(chain: KinematicChain, q: ArrayLike) -> tuple[Array, .
     Raises:
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite.
     """
-    coordinates = iter(joint_vector(chain, q).tolist())
+    return _reference_joint_poses(chain, tuple(joint_vector(chain, q).tolist()))
+
+
+@lru_cache(maxsize=8)  # those of zero and home are asked for several times while a model is built
+def _reference_joint_poses(chain: KinematicChain, q: tuple[float, ...]) -> tuple[Array, ...]:
+    coordinates = iter(q)
     poses: list[Array] = []
     for joint in chain.joints:
         pose = compose(poses[-1], joint.T_parent_joint) if poses else joint.T_parent_joint

@@ -15,6 +15,7 @@ _SNAP_TURNS = 16
 _SNAP_WIDTH = 4e-16
 
 
+@lru_cache(maxsize=4096)  # robots that differ in some numbers have most of their angles in common
 def sin_cos(angle: float) -> tuple[float, float]:
     """Return the sine and the cosine of ``angle``.
 

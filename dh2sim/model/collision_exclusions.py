@@ -86,14 +86,14 @@ def _overlaps(chain: KinematicChain, shapes: Sequence[Sequence[Shape]], q: Array
     if not owner:
         return result
     a, b, r, link = np.array(starts), np.array(ends), np.array(radii), np.array(owner)
-    for k in range(len(owner)):
-        near = segment_distance(a[k], b[k], a, b) <= 1.001 * (r[k] + r)
-        result[link[k], link[near]] = True
+    k, other = (index.ravel() for index in np.indices((len(owner), len(owner))))
+    near = segment_distance(a[k], b[k], a[other], b[other]) <= 1.001 * (r[k] + r[other])
+    result[link[k[near]], link[other[near]]] = True
     return result | result.T
 
 
 def segment_distance(a: Array, b: Array, starts: Array, ends: Array) -> Array:
-    """Return the distance, m, shape (k,), of a segment from a to b, shape (3,), to k segments, shape (k, 3) each.
+    """Return the distance, m, shape (k,), of segments from a to b, shape (3,) or (k, 3), to k others, shape (k, 3).
 
     Those that are parallel to within 1e-6 rad count as parallel, and those shorter than 1e-100 m as points. (Ericson,
     Real-Time Collision Detection, 5.1.9.)

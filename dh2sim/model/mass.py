@@ -106,7 +106,8 @@ def combine(parts: Iterable[MassProperties]) -> MassProperties:
     moved = [
         shift_inertia(part.inertia, part.mass, [float(part.com[i]) - com[i] for i in range(3)]) for part in parts
     ]
-    inertia = [[math.fsum(float(tensor[i][j]) for tensor in moved) for j in range(3)] for i in range(3)]
+    tensors = [tensor.tolist() for tensor in moved]
+    inertia = [[math.fsum(tensor[i][j] for tensor in tensors) for j in range(3)] for i in range(3)]
     least = NOTHING * (inertia[0][0] + inertia[1][1] + inertia[2][2])
     inertia = [[0.0 if abs(inertia[i][j]) < least else inertia[i][j] for j in range(3)] for i in range(3)]
     return MassProperties(mass=mass, com=read_only(com), inertia=read_only(inertia))
@@ -115,9 +116,10 @@ def combine(parts: Iterable[MassProperties]) -> MassProperties:
 def shift_inertia(inertia: Array, mass: float, offset: list[float]) -> Array:
     """Return the inertia, shape (3, 3), about a point ``offset`` (m) from the centre: I + m (o·o E - o oᵀ)."""
     square = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]
+    rows = inertia.tolist()
     return read_only(
         [
-            [float(inertia[i, j]) + mass * ((square if i == j else 0.0) - offset[i] * offset[j]) for j in range(3)]
+            [rows[i][j] + mass * ((square if i == j else 0.0) - offset[i] * offset[j]) for j in range(3)]
             for i in range(3)
         ]
     )

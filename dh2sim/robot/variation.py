@@ -10,20 +10,23 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from dh2sim.errors import Problem, RobotError
 from dh2sim.messages import Loc, did_you_mean, listed, loc_of, path_of, shown
-from dh2sim.robot.expressions import names_in
-from dh2sim.robot.fields import WRONG, Color, Dimension, Kind, Number, Numbers, Scope, Tree
+from dh2sim.robot.expressions import CONSTANTS, evaluate_in, names_in
+from dh2sim.robot.fields import IN_SI, WRONG, Color, Dimension, Kind, Number, Numbers, Scope, Tree
 from dh2sim.robot.parts import Inertia, InertiaNumbers, NamedParts, Part, Parts
 from dh2sim.robot.read import Places, evaluate_parameters, plain_node, units_of
 from dh2sim.robot.spec import ROBOT, Dynamics, RobotSpec, Row, Units, check_robot, robot_fields, robot_of_checked
 from dh2sim.robot.write import robot_file_text
 from dh2sim.robot.yaml_tree import Report, compose
+from dh2sim.typing import Array
 
 CELLS: Final = ("a", "alpha", "d", "theta", "beta")
 """Of a row of a table."""
@@ -93,6 +96,29 @@ class Variation:
         """
         return self._file.robot(self._file.checked(dict(zip(self._locs, values, strict=True))))
 
+    def geometry(self, values: Array) -> dict[Loc, Array]:
+        """Return the numbers of the table, the base and the tool that differ, computed for many robots at once.
+
+        Args:
+            values: In the order of the names and the units of the robot file, shape (T, names).
+
+        Returns:
+            In rad and m, shape (T,), by place: ``("joints", 1, "a")``, ``("tool", "xyz", 2)``. They may differ from
+            those of ``make`` in the last bit; whether there are such robots is not checked.
+
+        Raises:
+            RobotError: A name is not that of such a number, or of a parameter.
+        """
+        given = dict(zip(self._locs, values.T, strict=True))
+        others = [
+            Problem(path=name, message="is not a number of the table, the base or the tool's pose")
+            for name, loc in zip(self.names, self._locs, strict=True)
+            if loc[0] != "parameters" and not _is_geometry(loc)
+        ]
+        if others:
+            raise RobotError(others)
+        return self._file.geometry(given)
+
 
 class _UnknownNameError(ValueError):
     """No number of the robot has this name."""
@@ -141,6 +167,35 @@ class _Document:
     def robot(self, checked: Tree) -> RobotSpec:
         """Return the robot that a checked tree describes."""
         return robot_of_checked(robot_fields(checked, units_of(checked)))
+
+    def geometry(self, given: Mapping[Loc, Array]) -> dict[Loc, Array]:
+        """Return the numbers of the robot's geometry that depend on those that are given, in SI units."""
+        found = {loc: array for loc, array in given.items() if loc[0] != "parameters"}
+        names: dict[str, Array] = {name: np.asarray(value) for name, value in self._parameters.items()}
+        changed = {str(loc[1]): array for loc, array in given.items() if loc[0] == "parameters"}
+        own = self._tree.get("parameters") or {}
+        texts = {name: text for name, text in own.items() if isinstance(text, str) and name not in changed}
+        names |= changed
+        for _ in texts:  # once more for each, as one may need another
+            for name, text in texts.items():
+                if changed.keys() & {*names_in(text)}:
+                    names[name] = changed[name] = evaluate_in(text, _Arrays(names))
+        rows = self._spec.rows
+        places: list[Loc] = [("joints", i, cell) for i in range(len(rows)) for cell in CELLS]
+        places += [(owner, key, i) for owner in ("base", "tool") for key in ("xyz", "rpy") for i in range(3)]
+        for loc in places:
+            text = _at(self._tree, loc)
+            if loc not in found and isinstance(text, str) and changed.keys() & {*names_in(text)}:
+                found[loc] = evaluate_in(text, _Arrays(names))
+        length = float(IN_SI[self._units["length"]])
+        return {
+            loc: np.radians(array)
+            if _is_angle(loc) and self._units["angle"] == "deg"
+            else array
+            if _is_angle(loc)
+            else array * length
+            for loc, array in found.items()
+        }
 
     def value(self, loc: Loc) -> float:
         """Return a number of the file itself; NaN where it has none."""
@@ -245,6 +300,52 @@ def _default(loc: Loc) -> float:
     owner = {"dynamics": Dynamics, "inertia": InertiaNumbers}.get(str(whole), Row)
     default = next((each.default for each in fields(owner) if each.name == last), None)
     return default if isinstance(default, float) else math.nan
+
+
+def _is_geometry(loc: Loc) -> bool:
+    """Whether a place holds a number of the table, the base or the tool's pose."""
+    match loc:
+        case ("joints", _, cell):
+            return cell in CELLS
+        case ("base" | "tool", "xyz" | "rpy", _):
+            return True
+        case _:
+            return False
+
+
+def _is_angle(loc: Loc) -> bool:
+    return loc[-1] in ("alpha", "theta", "beta") or loc[1] == "rpy"
+
+
+class _Arrays:
+    """Arrays of doubles, for expressions of many robots at once."""
+
+    def __init__(self, names: Mapping[str, Array]) -> None:
+        self._names = names
+
+    def number(self, text: str) -> Array:
+        return np.asarray(float(text))
+
+    def name(self, name: str) -> Array:
+        return np.asarray(CONSTANTS[name]) if name in CONSTANTS else self._names[name]
+
+    def call(self, function: str, arguments: list[Array]) -> Array:
+        return np.asarray(_FUNCTIONS[function](*arguments))
+
+    def power(self, base: Array, exponent: Array) -> Array:
+        return np.asarray(np.power(base, exponent))
+
+
+_FUNCTIONS: Final[Mapping[str, Callable[..., Any]]] = {
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+    "tan": np.tan,
+    "asin": np.arcsin,
+    "acos": np.arccos,
+    "atan": np.arctan,
+    "atan2": np.arctan2,
+}
 
 
 def _inside(kind: Kind) -> str:
