@@ -728,7 +728,7 @@ class Robot:
 
         if rollouts is not None:
             options["rollouts"] = rollouts
-        return rollout(self.model, out=out, threads=threads, resume=resume, overwrite=overwrite, **options)
+        return rollout(self._written, out=out, threads=threads, resume=resume, overwrite=overwrite, **options)
 
     def calibrate(
         self,

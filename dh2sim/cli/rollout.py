@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import INTERRUPTED, RobotArgument, build_all
+from dh2sim.cli.common import INTERRUPTED, RobotArgument, build_any
 from dh2sim.cli.output import json_text, make_console, progress_bar, size_text
-from dh2sim.cli.runs import clipped_controls, contacts
+from dh2sim.cli.runs import clipped_controls, contacts, loops
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def rollout(
       dh2sim plot run.zarr --what joints
       dh2sim render run.zarr
     """
-    model = build_all([robot])[0]
+    model = build_any([robot])[0]
     from dh2sim.simulate.description import describe
     from dh2sim.simulate.options import RolloutOptions
     from dh2sim.simulate.prepare import prepare
@@ -250,7 +250,7 @@ def _print_summary(job: Job, summary: RunDescription, progress: Progress, out: P
         counts.append(f"stopped early {summary.unstable:,} ({reasons})")
     if summary.not_run:
         counts.append(f"not run {summary.not_run:,}")
-    counts += [*contacts(summary), *clipped_controls(summary)]
+    counts += [*contacts(summary), *loops(summary), *clipped_controls(summary)]
     width = make_console().width
     print(
         textwrap.fill(

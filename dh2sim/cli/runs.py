@@ -155,7 +155,13 @@ def _sections(description: RunDescription) -> Iterator[tuple[str, list[str]]]:
     yield "randomised", [changes or "nothing"]
     yield (
         "rollouts",
-        [_counts(description), *_early_stops(description), *contacts(description), *clipped_controls(description)],
+        [
+            _counts(description),
+            *_early_stops(description),
+            *contacts(description),
+            *loops(description),
+            *clipped_controls(description),
+        ],
     )
     every = "every one" if description.every == 1 else f"one in {description.every}"
     yield (
@@ -201,6 +207,19 @@ def contacts(description: RunDescription) -> list[str]:
         return []
     where = f"{' and '.join(first.links)} in rollout {first.rollout} at {first.time:.4g} s"
     return [f"links touched in {description.touched:,} (first: {where})"]
+
+
+WIDE = 1e-3
+"""Of the size of a mechanism: loops that open further are not closed well."""
+
+
+def loops(description: RunDescription) -> list[str]:
+    """Return how far loops were open at most, and what helps where that is much; empty for a robot without any."""
+    found = description.loop_gap
+    if found is None:
+        return []
+    text = f"loops open by at most {1000 * found.gap:.2g} mm, {found.share:.1g} of the size ({found.closure})"
+    return [f"{text}; a shorter --timestep closes them better" if found.share > WIDE else text]
 
 
 def clipped_controls(description: RunDescription) -> list[str]:

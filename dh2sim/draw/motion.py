@@ -91,14 +91,32 @@ def motion_of_run(rollout: RolloutData) -> Motion:
         model = recorded_model(rollout.attributes, scene=True)
     except RunError as error:
         raise PictureError(f"{rollout.run}: {error}") from error
-    parts = [rollout.values(name) for name in ("base_pose", "qpos") if name in rollout.data]
-    qpos = np.concatenate(parts, axis=1)
-    if qpos.shape[1] != model.nq:
-        raise PictureError(
-            f"{rollout.run}: {qpos.shape[1]} positions were recorded, but the model in the run's attributes has "
-            f"{model.nq}"
-        )
-    return Motion(model=model, qpos=read_only(qpos), time=read_only(rollout.values("time")))
+    return Motion(model=model, qpos=read_only(_recorded(rollout, model)), time=read_only(rollout.values("time")))
+
+
+def _recorded(rollout: RolloutData, model: Any) -> Array:
+    """Return MuJoCo's positions, shape (count, nq); bodies that stand for closures stay where the model has them.
+
+    Raises:
+        PictureError: The recorded joints are not those of the model.
+    """
+    base = [rollout.values("base_pose")] if "base_pose" in rollout.data else []
+    recorded = rollout.values("qpos")
+    if "closure" not in rollout.data.coords:
+        qpos = np.concatenate([*base, recorded], axis=1)
+        if qpos.shape[1] != model.nq:
+            raise PictureError(
+                f"{rollout.run}: {qpos.shape[1]} positions were recorded, but the model in the run's attributes has "
+                f"{model.nq}"
+            )
+        return qpos
+    qpos = np.tile(model.qpos0, (len(recorded), 1))
+    for name, values in zip(rollout.data["joint"].values.tolist(), recorded.T, strict=True):
+        joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, str(name))
+        if joint < 0:
+            raise PictureError(f"{rollout.run}: joint {name} is not in the model in the run's attributes")
+        qpos[:, model.jnt_qposadr[joint]] = values
+    return qpos
 
 
 def motion_of_robot(robot: RobotModel | MechanismModel, configuration: str | None = None) -> Motion:

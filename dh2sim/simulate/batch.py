@@ -9,6 +9,8 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
+from dh2sim.errors import ControllerError
+from dh2sim.simulate.closed_loops import ClosedLoops, Kinematics, joint_inertia
 from dh2sim.simulate.contacts import FirstContacts
 from dh2sim.simulate.dataset_layout import FINISHED, STATUS
 from dh2sim.simulate.mujoco_runtime import VELOCITY_STAGE, forward, set_models
@@ -47,6 +49,17 @@ class JointSpace:
             reduced -= M[:, BASE:, k, None] * follows[:, None, k, :]
         return reduced
 
+    def forget(self) -> None:
+        """Do nothing: nothing is kept."""
+
+    def bias(self, mass: Array, force: Array) -> Array:
+        """Return what ``force`` does: velocities are in it already."""
+        return self.force(mass, force)
+
+    def holding(self, mass: Array, force: Array) -> Array:
+        """Return the joints' forces that balance those of all degrees of freedom."""
+        return self.force(mass, force)
+
     def force(self, mass: Array, force: Array) -> Array:
         """Return the joints' forces, shape (batch, n), from those of all degrees of freedom, shape (batch, nv)."""
         if not self._floating:
@@ -59,11 +72,78 @@ class JointSpace:
         return reduced
 
 
+class LoopSpace:
+    """Reduces them to those of a mechanism's driven joints, which all others follow; see ``closed_loops``."""
+
+    def __init__(self, plant: Plant, loops: ClosedLoops, batch: Batch) -> None:
+        """Describe a plant; what MuJoCo computes of the batch afterwards is used."""
+        self._loops, self._at, self._v = loops, Kinematics.of(batch), batch.bind("qvel")
+        self._now: tuple[Array, Array] | None = None
+        self._index = _dense_index(plant.model)
+        carried = loops.carries(plant.model.dof_bodyid)
+        self._related = carried | carried.T  # joints of different branches have no inertia in common
+
+    def _dense(self, mass: Array) -> Array:
+        return np.where(self._related, np.take(mass, self._index, axis=1), 0.0)
+
+    def inertia(self, mass: Array) -> Array:
+        """Return the inertia, shape (batch, driven, driven).
+
+        Raises:
+            ControllerError: The driven joints do not determine the others.
+        """
+        return joint_inertia(self._dense(mass), self._motions()[0])
+
+    def force(self, mass: Array, force: Array) -> Array:  # noqa: ARG002 - a base that floats needs the mass
+        """Return the driven joints' forces, shape (batch, driven), that do what those of all joints do.
+
+        Raises:
+            ControllerError: The driven joints do not determine the others.
+        """
+        return np.asarray((self._motions()[0].transpose(0, 2, 1) @ force[:, :, None])[:, :, 0])
+
+    def bias(self, mass: Array, force: Array) -> Array:
+        """Return ``force`` with what the velocities of the loops require in addition.
+
+        Raises:
+            ControllerError: The driven joints do not determine the others.
+        """
+        _, drift = self._motions()
+        return self.force(mass, force + (self._dense(mass) @ drift[:, :, None])[:, :, 0])
+
+    def holding(self, mass: Array, force: Array) -> Array:
+        """Return the driven joints' forces that balance those of all joints, the least where there are several."""
+        if self._loops.determined:
+            return self.force(mass, force)
+        return self._loops.balancing(self._at, force)
+
+    def forget(self) -> None:
+        """Note that the batch has other states now."""
+        self._now = None
+
+    def _motions(self) -> tuple[Array, Array]:
+        """Return how all joints follow the driven ones, and their accelerations while these have none."""
+        if not self._loops.determined:
+            driven, free = len(self._loops.driven), self._loops.freedoms
+            raise ControllerError(
+                f"{driven} driven joint{'s' * (driven != 1)} and {free} freedom{'s' * (free != 1)} at the assembly: "
+                "forces of the driven joints follow from a motion only where they are as many as the freedoms, and "
+                "determine all other joints; say in 'actuated' which are driven"
+            )
+        if self._now is None:
+            self._now = self._loops.motions_and_drift(self._at, self._v)
+        return self._now
+
+
 def _of_base(M: Array) -> Array:
     """Return the floating base's own inertia, or the identity where a simulation failed before it was computed."""
     own = M[:, :BASE, :BASE].copy()
     own[~own.any(axis=(1, 2))] = np.eye(BASE)
     return own
+
+
+def _joint_space(plant: Plant, batch: Batch) -> JointSpace | LoopSpace:
+    return JointSpace(plant) if plant.loops is None else LoopSpace(plant, plant.loops, batch)
 
 
 def _dense_index(model: mujoco.MjModel) -> NDArray[np.intp]:
@@ -80,10 +160,9 @@ class BatchObservation:
     """The current states of a persistent batch; see ``Observation``. Arrays are copies."""
 
     def __init__(self, plant: Plant, batch: Batch, gravity_forces: GravityForces) -> None:
-        """Observe a batch that is at its start."""
+        """Observe a batch that is at its start; ``plant`` is the robot as its controller sees it."""
         self._plant, self._batch, self._gravity_forces = plant, batch, gravity_forces
-        self._first_q, self._first_v = (7, 6) if plant.floating else (0, 0)
-        self._space = JointSpace(plant)
+        self._made: JointSpace | LoopSpace | None = None
         self._gravity: Array | None = None
         self._fields: dict[str, Array] = {}
         self.step = 0
@@ -92,6 +171,8 @@ class BatchObservation:
         """Note that the batch has taken a step."""
         self.step += 1
         self._gravity = None
+        if self._made is not None:
+            self._made.forget()
 
     @property
     def time(self) -> float:
@@ -101,12 +182,12 @@ class BatchObservation:
     @property
     def q(self) -> Array:
         """Joint positions, shape (batch, n)."""
-        return np.array(self._batch.bind("qpos")[:, self._first_q :])
+        return np.array(self._batch.bind("qpos")[:, self._plant.positions])
 
     @property
     def v(self) -> Array:
         """Joint velocities, shape (batch, n)."""
-        return np.array(self._batch.bind("qvel")[:, self._first_v :])
+        return np.array(self._batch.bind("qvel")[:, self._plant.velocities])
 
     @property
     def mass_matrix(self) -> Array:
@@ -116,12 +197,15 @@ class BatchObservation:
     @property
     def bias(self) -> Array:
         """Coriolis, centrifugal and gravity forces, shape (batch, n)."""
-        return self._space.force(self._field("M"), self._field("qfrc_bias"))
+        return self._space.bias(self._field("M"), self._field("qfrc_bias"))
 
     @property
     def passive(self) -> Array:
         """Forces of springs and viscous damping, shape (batch, n)."""
-        return np.array(self._field("qfrc_passive")[:, self._first_v :])
+        passive = self._field("qfrc_passive")
+        if self._plant.loops is not None:
+            return self._space.force(self._field("M"), passive)
+        return np.array(passive[:, self._plant.velocities])
 
     @property
     def gravity(self) -> Array:
@@ -129,6 +213,13 @@ class BatchObservation:
         if self._gravity is None:
             self._gravity = self._gravity_forces.forces(self._batch.bind("qpos"))
         return self._gravity.copy()
+
+    @property
+    def _space(self) -> JointSpace | LoopSpace:
+        if self._made is None:
+            self._made = _joint_space(self._plant, self._batch)
+            forward(self._batch)  # as in ``_field``
+        return self._made
 
     def _field(self, name: str) -> Array:
         if name not in self._fields:  # a field has what is computed after it was bound
@@ -143,7 +234,6 @@ class GravityForces:
     def __init__(self, plant: Plant, simulations: int, threads: int, factors: dict[str, Array]) -> None:
         """Describe the models, which are made when they are first needed."""
         self._plant, self._simulations, self._threads, self._factors = plant, simulations, threads, factors
-        self._space = JointSpace(plant)
         self._batch: Batch | None = None
 
     def forces(self, qpos: Array) -> Array:
@@ -152,10 +242,12 @@ class GravityForces:
             self._batch = Batch(self._plant.model, self._simulations, self._threads)
             set_models(self._batch, self._plant, as_fields=bool(self._factors))
             apply_scales(self._batch, self._plant, self._factors)
+            self._space = _joint_space(self._plant, self._batch)
         mass, force = self._batch.bind("M"), self._batch.bind("qfrc_bias")
         self._batch.bind("qpos")[:] = qpos
         forward(self._batch)
-        return self._space.force(mass, force)
+        self._space.forget()
+        return self._space.holding(mass, force)
 
 
 WARNINGS = {
@@ -182,6 +274,8 @@ class MonitoredBatch:
         self.status = np.full(batch.nsim, FINISHED, dtype=np.int8)
         self.stop_step = np.full(batch.nsim, -1, dtype=np.int64)
         self.saturation = np.zeros((batch.nsim, len(plant.actuators)), dtype=np.int64)
+        self.gaps = np.zeros((batch.nsim, len(plant.gaps)))
+        """The greatest of each closure so far, m."""
         self.contacts = FirstContacts(plant, batch.nsim, substeps=recorder.substeps)
 
     @property
@@ -236,6 +330,17 @@ class MonitoredBatch:
         if self.batch.warning.any():
             failed |= self.batch.warning[:, :, 1].any(axis=1)
         return np.flatnonzero(failed & self.alive)
+
+    def see_gaps(self, simulations: Any, sensors: Array) -> None:
+        """Note how far closures are open.
+
+        Args:
+            simulations: Which simulations.
+            sensors: Their sensor data at some time steps, shape (simulations, steps, sensors).
+        """
+        for k, sensor in enumerate(self.plant.gaps):
+            now = sensor.gap(sensors).max(axis=1, initial=0.0)
+            self.gaps[simulations, k] = np.fmax(self.gaps[simulations, k], now)
 
     def look(self, step: int) -> None:
         """Compute what MuJoCo derives from the states at the beginning of a time step, or at the end of the run."""

@@ -150,16 +150,17 @@ def _simulate_batch(
     """Simulate rollouts in one batch; ``start`` has the named configuration of each where they have designs."""
     options, name = job.options, job.controller.name
     factors = scales(plant, options, rollouts)
-    q0, v0 = job.initial.states(plant, options, rollouts, start)
-    qpos0 = np.concatenate([np.tile(_base_pose(plant), (len(q0), 1)), q0], axis=1)
+    qpos0, qvel0 = job.initial.states(plant, options, rollouts, start)
+    controlled = plant.controlled
     gravity = GravityForces(plant, len(rollouts), threads, factors)
     controller = job.controller.make(
         RolloutBatch(
-            plant=plant,
+            plant=controlled,
             steps=run_steps,
             rollouts=rollouts,
-            q0=read_only(q0),
-            v0=read_only(v0),
+            q0=read_only(qpos0[:, controlled.positions]),
+            v0=read_only(qvel0[:, controlled.velocities]),
+            qpos0=read_only(qpos0),
             gravity0=read_only(gravity.forces(qpos0)),
             generators=Generators(options.seed, rollouts, Purpose.CONTROLLER),
         )
@@ -171,24 +172,26 @@ def _simulate_batch(
     set_models(batch, plant, as_fields=bool(factors))
     apply_scales(batch, plant, factors)
     batch.bind("qpos")[:] = qpos0
-    batch.bind("qvel")[:, plant.model.nv - plant.n :] = v0
+    batch.bind("qvel")[:] = qvel0
     monitored = MonitoredBatch(plant, batch, recorder, options.steps)
     monitored.contacts.number_as(job.plant.model)
     for state in recorder.state_fields:
         recorder.put_field(state, 0, batch.bind(state)[:, None])
     if isinstance(controller, ClosedLoop):
-        simulate_closed_loop(monitored, controller, BatchObservation(plant, batch, gravity), name)
+        simulate_closed_loop(monitored, controller, BatchObservation(controlled, batch, gravity), name)
     elif not isinstance(controller, OpenLoop):
         raise ControllerError(f"controller '{name}' has neither 'control' nor 'controls'")
     elif stepwise:
         scheduled = Scheduled(controller, monitored, name)
-        simulate_closed_loop(monitored, scheduled, BatchObservation(plant, batch, gravity), name)
+        simulate_closed_loop(monitored, scheduled, BatchObservation(controlled, batch, gravity), name)
     else:
         simulate_open_loop(monitored, controller, name)
     _record_reference(recorder, controller, job, len(rollouts))
     recorder.end(monitored.stop_step)
     arrays["status"][:], arrays["stop_step"][:] = monitored.status, monitored.stop_step
     arrays["saturation"][:] = monitored.saturation
+    if plant.gaps:
+        arrays["loop_gap"][:] = monitored.gaps
     monitored.contacts.forget_after(monitored.stop_step)
     arrays["contact_step"][:] = monitored.contacts.step
     arrays["contact_link_a"][:], arrays["contact_link_b"][:] = monitored.contacts.links.T
@@ -196,17 +199,13 @@ def _simulate_batch(
         arrays[f"{quantity}_scale"][:] = values
 
 
-def _base_pose(plant: Plant) -> Array:
-    return np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0] if plant.floating else [])
-
-
 def _record_reference(recorder: Recorder, controller: object, job: Job, simulations: int) -> None:
     if not (isinstance(controller, Follows) and recorder.wants("qpos_ref")):
         return
-    name, total = job.controller.name, job.options.steps + 1
+    name, total, plant = job.controller.name, job.options.steps + 1, job.plant
     for first in range(0, total, REFERENCE_STEPS):
         count = min(REFERENCE_STEPS, total - first)
-        shapes, axes = [(simulations, count, recorder.joints)], "rollouts, time steps, joints"
+        shapes, axes = [(simulations, count, plant.controlled.n)], "rollouts, time steps, joints"
         returned = controller.reference(first, count)
         try:
             q, v = returned
@@ -216,4 +215,8 @@ def _record_reference(recorder: Recorder, controller: object, job: Job, simulati
             ) from error
         for variable, what, values in (("qpos_ref", "positions", q), ("qvel_ref", "velocities", v)):
             given = checked(values, shapes, axes, controller=name, what=f"reference {what}")
+            if plant.independent is not None:  # passive joints have no reference
+                every = np.full((simulations, count, plant.n), np.nan)
+                every[:, :, plant.independent] = given
+                given = every
             recorder.put(variable, first, given)

@@ -154,6 +154,7 @@ def _sizes(plant: Plant, options: RolloutOptions, variables: Iterable[Variable],
         "twist": len(TWIST),
         "link": len(links(plant)),
         "row": rows,
+        "closure": len(plant.gaps),
     }
     used = {"step", "interval", "joint", *(name for variable in variables for name in variable.dimensions)}
     return {name: size for name, size in sizes.items() if name in used}
@@ -174,6 +175,9 @@ def _variables(
     words = "time step at whose beginning links of the robot first touched, or -1"
     yield _per_rollout("contact_step", (), LONG, NO_CONTACT, "1", words)
     bodies = {NO_CONTACT: "none", **links_with_shapes(plant.model)}
+    if plant.gaps:
+        words = "greatest distance, at any time step, between what the closure holds together"
+        yield _per_rollout("loop_gap", ("closure",), DOUBLE, np.nan, "m", words, size=plant.size)
     flags = {"flag_values": list(bodies), "flag_meanings": " ".join(bodies.values())}
     for name, which in (("contact_link_a", "one"), ("contact_link_b", "the other")):
         yield _per_rollout(name, (), INT, NO_CONTACT, "1", f"{which} of the links that touched then", **flags)
@@ -292,6 +296,7 @@ def _coordinates(
         "twist": TWIST,
         "link": tuple(plant.model.body(i).name for i in links(plant)),
         "row": tuple(row.name for row in rows),
+        "closure": tuple(sensor.closure for sensor in plant.gaps),
     }
     for name, texts in labels.items():
         if name in sizes:

@@ -52,6 +52,17 @@ class FirstContact:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LoopGap:
+    """How far the loops of a mechanism are open at most."""
+
+    closure: str
+    gap: float
+    """m"""
+    share: float
+    """Of the mechanism's size."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RunDescription:
     """A description of a run. Rollouts of a block that is not committed count as not run."""
 
@@ -70,6 +81,8 @@ class RunDescription:
     """Rollouts in which links of the robot touch at least once; None for a run that does not contain it."""
     first_contact: FirstContact | None
     """Of the first of these rollouts."""
+    loop_gap: LoopGap | None
+    """Of all rollouts and time steps; None without closed loops."""
     saturated: int
     """Rollouts in which the controller wanted a control outside its range at least once."""
     saturated_joints: Mapping[str, int]
@@ -154,6 +167,7 @@ def describe(path: str | PathLike[str]) -> RunDescription:
         reasons=MappingProxyType({name: count for name, count in counts.items() if count}),
         touched=None if contact_step is None else int((contact_step >= 0).sum()),
         first_contact=None if contact_step is None else _first_contact(run, contact_step, timestep),
+        loop_gap=_loop_gap(run, done),
         saturated=int((saturation[done] > 0).any(axis=1).sum()),
         saturated_joints=MappingProxyType(_by_joint(run, saturation[done] > 0)),
         steps=settings["steps"],
@@ -205,6 +219,15 @@ def _first_contact(run: StoredRun, contact_step: NDArray[Any], timestep: float) 
     return FirstContact(rollout=rollout, step=step, time=step * timestep, links=(links[0], links[1]))
 
 
+def _loop_gap(run: StoredRun, done: NDArray[np.bool_]) -> LoopGap | None:
+    if "loop_gap" not in run.manifest.variables or not done.any():
+        return None
+    gaps = run.values("loop_gap")[done].max(axis=0)
+    widest = int(np.argmax(gaps))
+    gap, size = float(gaps[widest]), float(run.manifest.variables["loop_gap"].attributes["size"])
+    return LoopGap(closure=str(run.values("closure")[widest]), gap=gap, share=gap / size)
+
+
 def _by_joint(run: StoredRun, clipped: NDArray[np.bool_]) -> dict[str, int]:
     """Return the number of rollouts for each joint, from where its actuator was clipped, shape (rollouts, actuators).
 
@@ -229,7 +252,7 @@ def resumed(command: str) -> str:
 
 def _json(value: Any) -> Any:
     match value:
-        case RecordedVariable() | EarlyStop() | FirstContact():
+        case RecordedVariable() | EarlyStop() | FirstContact() | LoopGap():
             return {name: _json(getattr(value, name)) for name in value.__dataclass_fields__}
         case Mapping():
             return {name: _json(item) for name, item in value.items()}

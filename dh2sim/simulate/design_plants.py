@@ -10,9 +10,11 @@ import mujoco
 import numpy as np
 
 from dh2sim.errors import Dh2simError, MismatchError, Problem, RobotError
+from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
 from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
 from dh2sim.kinematics.table_oracle import table_mechanism_frames
 from dh2sim.model.build import build_model
+from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
 from dh2sim.robot.spec import ActuatorType
@@ -42,18 +44,23 @@ class PlantRecipe:
     """What drives every joint; None: what the robot file says."""
     mjcf: MjcfOptions
 
-    def shown(self, model: RobotModel) -> RobotModel:
-        """Return a robot as it is simulated, with its own actuators."""
-        return without_meshes(with_base_mass(model) if self.mjcf.floating_base else model)
+    def shown(self, model: RobotModel | MechanismModel) -> RobotModel | MechanismModel:
+        """Return a robot as it is simulated, with its own actuators; the base of a mechanism does not float."""
+        if self.mjcf.floating_base and isinstance(model, RobotModel):
+            model = with_base_mass(model)
+        return without_meshes(model)
 
-    def text(self, model: RobotModel) -> str:
+    def text(self, model: RobotModel | MechanismModel) -> str:
         """Return the MJCF that is simulated.
 
         Raises:
             ModelError: An MJCF cannot hold the robot.
         """
         shown = self.shown(model)
-        return to_mjcf(shown if self.actuation is None else with_actuators(shown, self.actuation), self.mjcf)
+        driven = shown if self.actuation is None else with_actuators(shown, self.actuation)
+        if isinstance(driven, MechanismModel):
+            return to_mechanism_mjcf(driven, self.mjcf)
+        return to_mjcf(driven, self.mjcf)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

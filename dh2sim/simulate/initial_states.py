@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,10 @@ import numpy as np
 from mujoco.batch import Batch
 
 from dh2sim.errors import SettingsError
+from dh2sim.formats.mjcf.mechanism import joint_coordinates
 from dh2sim.messages import did_you_mean, listed
+from dh2sim.model.mechanism import MechanismModel
+from dh2sim.simulate.closed_loops import ClosedLoops
 from dh2sim.simulate.mujoco_runtime import forward, set_models
 from dh2sim.simulate.options import REFERENCE, STARTS, RolloutOptions
 from dh2sim.simulate.plant import Plant
@@ -25,6 +28,9 @@ MOST_FILE_BYTES = 2**30
 TRIES = 50
 """Draws of a random configuration before one in which links touch is taken."""
 
+OPEN = 1e-6
+"""By which loops may be open in states that are given: sizes of the mechanism, rad, and their rates."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InitialStates:
@@ -34,6 +40,8 @@ class InitialStates:
     """'random', or the configuration or file that ``given`` comes from."""
     given: Array | None = field(default=None, repr=False)
     """Joint positions and velocities, rad, m and their rates, shape (1 or rollouts, 2, n)."""
+    closed: tuple[Array, Array] | None = field(default=None, repr=False)
+    """MuJoCo's positions and velocities of all joints of a mechanism in them, shapes (…, nq) and (…, nv)."""
     digest: str = ""
     """SHA-256 of ``given``; empty for home and zero, which are the robot's."""
     named: bool = False
@@ -42,19 +50,59 @@ class InitialStates:
     def states(
         self, plant: Plant, options: RolloutOptions, rollouts: Sequence[int], own: Array | None = None
     ) -> tuple[Array, Array]:
-        """Return joint positions and velocities at the start of some rollouts, each of shape (batch, n).
+        """Return MuJoCo's positions and velocities at the start of some rollouts, shapes (batch, nq) and (batch, nv).
 
-        Random configurations lie inside the limits, uniformly, and no links touch in them if such are found. Rollouts
-        with designs of their own that start in a named configuration do so in their design's, ``own``.
+        Random configurations lie inside the limits, uniformly, and no links touch in them if such are found. Those of
+        a mechanism are where its driven joints get to from the assembly. Rollouts with designs of their own that
+        start in a named configuration do so in their design's, ``own``.
         """
+        qpos, qvel = np.zeros((len(rollouts), plant.model.nq)), np.zeros((len(rollouts), plant.model.nv))
+        if plant.floating:
+            qpos[:, 3] = 1.0  # of the base's quaternion
         if own is not None and self.named:
-            return own.copy(), np.zeros(own.shape)
-        if self.given is not None:
-            one = len(self.given) == 1
-            chosen = self.given if one else self.given[np.asarray(rollouts)]
-            states = np.broadcast_to(chosen, (len(rollouts), 2, plant.n))
-            return states[:, 0].copy(), states[:, 1].copy()
-        return _random(plant, options.seed, rollouts), np.zeros((len(rollouts), plant.n))
+            qpos[:, plant.positions] = own
+            return qpos, qvel
+        if self.given is None and plant.loops is not None:
+            return _random_closed(plant, plant.loops, options.seed, rollouts), qvel
+        if self.given is None:
+            qpos[:, plant.positions] = _random(plant, options.seed, rollouts)
+            return qpos, qvel
+        chosen = np.zeros(1, dtype=int) if len(self.given) == 1 else np.asarray(rollouts)
+        if self.closed is not None:
+            qpos[:], qvel[:] = (of[chosen] for of in self.closed)
+        else:
+            qpos[:, plant.positions], qvel[:, plant.velocities] = self.given[chosen, 0], self.given[chosen, 1]
+        return qpos, qvel
+
+    def on_loops(self, plant: Plant, robot: MechanismModel) -> InitialStates:
+        """Return the states with MuJoCo's positions and velocities of all joints, those inside closures too.
+
+        Raises:
+            SettingsError: Loops are open in a state, or its velocities would open them.
+        """
+        loops = plant.loops
+        if self.given is None or loops is None:
+            return self
+        qpos = np.zeros((len(self.given), plant.model.nq))
+        qpos[:, plant.positions] = self.given[:, 0]
+        if plant.helpers:
+            for row, q in zip(qpos, self.given[:, 0], strict=True):
+                for name, value in joint_coordinates(robot, q).items():
+                    row[plant.model.joint(name).qposadr[0]] = value
+        v = self.given[:, 1]
+        open_, qvel = loops.rates(qpos, v[:, list(plant.independent or ())])
+        apart = np.abs(qvel[:, plant.velocities] - v).max(axis=1, initial=0.0) > OPEN * (
+            1.0 + np.abs(v).max(initial=0.0)
+        )
+        for wrong, what in (
+            (open_ > OPEN, "the loops are open"),
+            (apart, "the velocities of passive joints are not those that the driven ones' give them"),
+        ):
+            if wrong.any():
+                row = int(np.argmax(wrong))
+                where = f" of rollout {row}" if len(qpos) > 1 else ""
+                raise _refused(f"{self.name}: in the state{where} {what}")
+        return replace(self, closed=(read_only(qpos), read_only(qvel)))
 
     def check(self, plant: Plant) -> None:
         """Require positions that are given to be inside the limits.
@@ -206,16 +254,44 @@ def _random(plant: Plant, seed: int, rollouts: Sequence[int]) -> Array:
     sources = Generators(seed, rollouts, Purpose.START)
     batch = Batch(plant.model, len(rollouts), nthread=1)
     set_models(batch, plant)
-    first = 7 if plant.floating else 0
     qpos, contacts = batch.bind("qpos"), batch.bind("ncon")
     q = np.zeros((len(rollouts), plant.n))
     left = np.arange(len(rollouts))
     for _ in range(TRIES):
         for i in left.tolist():
             q[i] = sources[i].uniform(lower[i], upper[i])
-        qpos[left, first:] = q[left]
+        qpos[left, 7 if plant.floating else 0 :] = q[left]
         forward(batch, left)
         left = left[contacts[left] > 0]
         if not len(left):
             break
     return q
+
+
+DRAWS = 10
+"""Of driven joints from their whole range; after that, ever nearer to the assembly."""
+
+
+def _random_closed(plant: Plant, loops: ClosedLoops, seed: int, rollouts: Sequence[int]) -> Array:
+    """Return random positions of a mechanism, shape (batch, nq): where drawn driven joints are reached."""
+    driven = plant.controlled
+    half = driven.free_half_ranges
+    lower = np.where(np.isfinite(driven.lower), driven.lower, driven.home - half)
+    upper = np.where(np.isfinite(driven.upper), driven.upper, driven.home + half)
+    sources = Generators(seed, rollouts, Purpose.START)
+    start = np.tile(loops.start, (len(rollouts), 1))
+    batch = Batch(plant.model, len(rollouts), nthread=1)
+    place, contacts = batch.bind("qpos"), batch.bind("ncon")
+    found, left = start.copy(), np.arange(len(rollouts))
+    for draw in range(TRIES):
+        share = 0.5 ** max(0, draw - DRAWS + 1)
+        drawn = np.array([sources[i].uniform(lower, upper) for i in left.tolist()])
+        qpos, reached = loops.follow(start[left], driven.home + share * (drawn - driven.home))
+        place[left] = qpos
+        forward(batch, left)
+        reached &= contacts[left] == 0
+        found[left[reached]] = qpos[reached]
+        left = left[~reached]
+        if not len(left):
+            break
+    return found

@@ -115,7 +115,9 @@ class _Segment:
         self._qpos = monitored.batch.bind("qpos")
         recorder, data = monitored.recorder, mujoco.MjData(monitored.plant.model)
         # positions and the number of contacts always, for the first contact of each rollout
-        self._fields = tuple(dict.fromkeys((*recorder.state_fields, *recorder.derived_fields, "qpos", "ncon")))
+        gaps = ("sensordata",) if monitored.plant.gaps else ()
+        fields = (*recorder.state_fields, *recorder.derived_fields, "qpos", "ncon", *gaps)
+        self._fields = tuple(dict.fromkeys(fields))
         shapes = {field: np.shape(getattr(data, field)) for field in self._fields}
         width = monitored.plant.model.nu + sum(int(np.prod(shape)) for shape in shapes.values())
         self.steps = max(16, min(monitored.steps, SEGMENT_BYTES // (8 * monitored.batch.nsim * max(1, width))))
@@ -139,6 +141,9 @@ class _Segment:
             out["ncon"][np.isin(running, failed)] = 0
             self._step_by_step(failed, before, controls, first, count)
         monitored.contacts.see_many(running, first, out["ncon"], start, out["qpos"])
+        if monitored.plant.gaps:
+            went_on = np.flatnonzero(~np.isin(running, failed))
+            monitored.see_gaps(running[went_on], out["sensordata"][went_on])
 
     def _advance(
         self, controls: Array, rows: Any, ids: NDArray[np.int32] | None, count: int, out: dict[str, NDArray[Any]]
@@ -176,6 +181,8 @@ class _Segment:
                 )
             went_on = ~np.isin(left, stopped)
             monitored.contacts.see_many(left[went_on], first + j, out["ncon"][went_on], start, out["qpos"][went_on])
+            if monitored.plant.gaps:
+                monitored.see_gaps(left[went_on], out["sensordata"][went_on])
             left = left[went_on]
             if not len(left):
                 return
@@ -192,7 +199,10 @@ def _end(monitored: MonitoredBatch) -> None:
         for field in ("sensordata", "energy")
         if field in monitored.recorder.derived_fields
     }
+    sensors = monitored.batch.bind("sensordata") if monitored.plant.gaps else None
     monitored.look(monitored.steps)
+    if sensors is not None:
+        monitored.see_gaps(monitored.rows, sensors[monitored.rows][:, None])
     for field, values in fields.items():
         monitored.recorder.put_field(field, monitored.steps, values[monitored.rows][:, None], monitored.rows, DERIVED)
 
@@ -227,11 +237,14 @@ def simulate_closed_loop(
     states = {field: batch.bind(field) for field in recorder.state_fields}
     pages = _Pages(monitored)
     contacts, qpos = batch.bind("ncon"), batch.bind("qpos")
+    sensors = batch.bind("sensordata") if monitored.plant.gaps else None
     monitored.look(0)
     for step in range(monitored.steps):
         if not monitored.alive.any():
             break
         monitored.contacts.see(np.flatnonzero(monitored.alive), step, contacts[monitored.rows], qpos[monitored.rows])
+        if sensors is not None:
+            monitored.see_gaps(monitored.rows, sensors[monitored.rows][:, None])
         for field, values in derived.items():
             if field != "qacc":
                 pages.note(field, "before", values)
@@ -253,6 +266,8 @@ def simulate_closed_loop(
             monitored.count(outside[:, None], step, 1)
         observation.advance()
     pages.flush()
+    if sensors is not None:
+        monitored.see_gaps(monitored.rows, sensors[monitored.rows][:, None])
     for field, values in derived.items():
         recorder.put_field(field, monitored.steps, values[:, None], only=DERIVED)
 

@@ -5,15 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from dh2sim.errors import EngineError
+from dh2sim.formats.mjcf.mechanism import ARM, GAP, HELPER, HELPERS
+from dh2sim.kinematics.loop_motion import actuated_joints
+from dh2sim.model.actuators import seen_inertias
+from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import unloaded_gains
 from dh2sim.mujoco_warnings import mujoco_warnings
+from dh2sim.simulate.closed_loops import ClosedLoops
 from dh2sim.typing import Array, read_only
 
 FREE_TURN: Final = math.pi
@@ -22,11 +28,42 @@ FREE_SLIDE: Final = 1.0
 """m: half the range of a joint that slides without limits."""
 
 
+Columns: TypeAlias = slice | NDArray[np.intp]
+"""Which of MuJoCo's positions or velocities."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GapSensor:
+    """Where a closure's gap is read from."""
+
+    closure: str
+    places: tuple[int, ...]
+    """First of three numbers each, among MuJoCo's sensor data: m."""
+    turns: tuple[int, ...]
+    """First of four numbers each, a unit quaternion."""
+    arm: float
+    """m: by which an angle becomes a distance."""
+
+    def gap(self, data: Array) -> Array:
+        """Return the gap, m, shape (…), from sensor data of shape (…, sensors)."""
+        found = np.zeros(data.shape[:-1])
+        for k in self.places:
+            x, y, z = (data[..., k + i] for i in range(3))
+            found = np.maximum(found, np.sqrt(x * x + y * y + z * z))
+        for k in self.turns:
+            x, y, z = (data[..., k + i] for i in (1, 2, 3))
+            found = np.maximum(found, self.arm * 2.0 * np.sqrt(x * x + y * y + z * z))
+        return found
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plant:
     """A compiled model with its limits, joints and actuators in the order of the table.
 
     Where the rollouts of a batch have designs of their own, all arrays have shape (batch, n) or (batch, actuators).
+
+    Of a mechanism there are two: that of all its joints, which is simulated and recorded; and ``controlled``, which
+    has the driven joints alone, since the others follow.
     """
 
     model: mujoco.MjModel = field(repr=False)
@@ -60,6 +97,18 @@ class Plant:
     each: tuple[Plant, ...] = field(default=(), repr=False)
     """The plant of each rollout of a batch whose rollouts have designs of their own; ``model`` is that of the first,
     and they all have its bodies, joints and actuators."""
+    positions: Columns = field(repr=False)
+    """Where the joints are among MuJoCo's positions."""
+    velocities: Columns = field(repr=False)
+    """Where they are among its velocities."""
+    loops: ClosedLoops | None = field(default=None, repr=False)
+    """Of a mechanism."""
+    gaps: tuple[GapSensor, ...] = ()
+    """What measures how far each of its closures is open."""
+    helpers: frozenset[int] = frozenset()
+    """Bodies that are no links: they stand for closures."""
+    independent: tuple[int, ...] | None = None
+    """Which of the joints a controller sees; None for all."""
 
     @property
     def models(self) -> tuple[mujoco.MjModel, ...]:
@@ -70,6 +119,35 @@ class Plant:
     def n(self) -> int:
         """Number of moving joints."""
         return len(self.joints)
+
+    @property
+    def controlled(self) -> Plant:
+        """The robot as a controller sees it: of a mechanism, the joints that are driven."""
+        if self.independent is None:
+            return self
+        which = list(self.independent)
+        assert not isinstance(self.velocities, slice)
+        assert not isinstance(self.positions, slice)
+        return replace(
+            self,
+            joints=tuple(self.joints[k] for k in which),
+            turns=tuple(self.turns[k] for k in which),
+            driven=tuple(which.index(k) for k in self.driven),
+            lower=read_only(self.lower[which]),
+            upper=read_only(self.upper[which]),
+            velocity=read_only(self.velocity[which]),
+            kp=read_only(self.kp[which]),
+            kv=read_only(self.kv[which]),
+            home=read_only(self.home[which]),
+            positions=self.positions[which],
+            velocities=self.velocities[which],
+            independent=None,
+        )
+
+    @property
+    def size(self) -> float:
+        """Of a mechanism, m; 1 for a serial robot."""
+        return 1.0 if self.loops is None else self.loops.size
 
     @property
     def free_half_ranges(self) -> Array:
@@ -87,8 +165,8 @@ def batch_plant(plants: Sequence[Plant]) -> Plant:
     return replace(plants[0], **own, each=tuple(plants))
 
 
-def compile_plant(mjcf: str, robot: RobotModel) -> Plant:
-    """Compile the text that ``to_mjcf`` wrote of a robot.
+def compile_plant(mjcf: str, robot: RobotModel | MechanismModel) -> Plant:
+    """Compile the text that ``to_mjcf`` or ``to_mechanism_mjcf`` wrote of a robot.
 
     Raises:
         EngineError: MuJoCo refuses it.
@@ -103,8 +181,8 @@ def compile_plant(mjcf: str, robot: RobotModel) -> Plant:
     return make_plant(compiled, robot)
 
 
-def make_plant(compiled: mujoco.MjModel, robot: RobotModel) -> Plant:
-    """Describe a robot that was compiled from what ``to_mjcf`` wrote.
+def make_plant(compiled: mujoco.MjModel, robot: RobotModel | MechanismModel) -> Plant:
+    """Describe a robot that was compiled from what ``to_mjcf`` or ``to_mechanism_mjcf`` wrote.
 
     Args:
         compiled: The compiled model.
@@ -112,26 +190,72 @@ def make_plant(compiled: mujoco.MjModel, robot: RobotModel) -> Plant:
     """
     floating = compiled.njnt > 0 and compiled.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE
     first = 1 if floating else 0
-    ids = range(first, compiled.njnt)
-    limited = np.array([bool(compiled.jnt_limited[i]) for i in ids], dtype=bool)
-    ranges = compiled.jnt_range[first:].reshape(-1, 2)
+    ids = np.arange(first, compiled.njnt)
+    more: dict[str, Any] = {"positions": slice(7 * first, None), "velocities": slice(6 * first, None)}
+    if isinstance(robot, MechanismModel):
+        ids = np.array([compiled.joint(joint.name).id for joint in robot.moving_joints], dtype=np.intp)
+        more = _of_mechanism(compiled, robot, ids)
+        seen, home = more.pop("seen"), robot.q
+    else:
+        seen, home = seen_inertias(robot.chain, robot.bodies, robot.home), robot.home
+    limited = compiled.jnt_limited[ids].astype(bool)
+    ranges = compiled.jnt_range[ids].reshape(-1, 2)
     controlled = compiled.actuator_ctrllimited.astype(bool)
     controls = compiled.actuator_ctrlrange.reshape(-1, 2)
-    gains = unloaded_gains(robot)
+    gains = unloaded_gains(robot, seen)
+    place = {int(joint): k for k, joint in enumerate(ids)}
     return Plant(
         model=compiled,
         timestep=float(compiled.opt.timestep),
         floating=bool(floating),
-        joints=tuple(compiled.joint(i).name for i in ids),
+        joints=tuple(compiled.joint(int(i)).name for i in ids),
         turns=tuple(compiled.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE for i in ids),
         actuators=tuple(compiled.actuator(i).name for i in range(compiled.nu)),
-        driven=tuple(int(compiled.actuator_trnid[i, 0]) - first for i in range(compiled.nu)),
+        driven=tuple(place[int(compiled.actuator_trnid[i, 0])] for i in range(compiled.nu)),
         lower=read_only(np.where(limited, ranges[:, 0], -np.inf)),
         upper=read_only(np.where(limited, ranges[:, 1], np.inf)),
         velocity=read_only([joint.velocity for joint in robot.moving_joints]),
         kp=read_only([kp for kp, _ in gains]),
         kv=read_only([kv for _, kv in gains]),
-        home=robot.home,
+        home=home,
         control_lower=read_only(np.where(controlled, controls[:, 0], -np.inf)),
         control_upper=read_only(np.where(controlled, controls[:, 1], np.inf)),
+        **more,
     )
+
+
+def _of_mechanism(compiled: mujoco.MjModel, robot: MechanismModel, ids: NDArray[np.intp]) -> dict[str, Any]:
+    """Return what a plant has of a mechanism, and under ``seen`` the inertia that each joint moves at home."""
+    start = np.array(compiled.qpos0)
+    driven = sorted(actuated_joints(robot.spec))
+    loops = ClosedLoops(compiled, ids[driven], start, robot.size)
+    seen = np.zeros(len(ids))  # the passive ones have no gains
+    seen[driven] = np.diag(loops.inertia(start))
+    helpers = {f"{closure.name}{HELPER}" for closure in robot.tree.closures if closure.type in HELPERS}
+    gaps = []
+    for closure in robot.tree.closures:
+        names = [closure.name, f"{closure.name}_1", f"{closure.name}_2"]
+        places = [_address(compiled, f"{name}{GAP}") for name in names]
+        turns = [_address(compiled, f"{closure.name}{GAP}_turn")]
+        gaps.append(
+            GapSensor(
+                closure=closure.name,
+                places=tuple(k for k in places if k is not None),
+                turns=tuple(k for k in turns if k is not None),
+                arm=ARM * robot.size,
+            )
+        )
+    return {
+        "positions": ids,
+        "velocities": ids,
+        "loops": loops,
+        "gaps": tuple(gaps),
+        "helpers": frozenset(k for k in range(compiled.nbody) if compiled.body(k).name in helpers),
+        "independent": tuple(driven),
+        "seen": np.maximum(seen - compiled.dof_armature[ids], 0.0).tolist(),
+    }
+
+
+def _address(compiled: mujoco.MjModel, sensor: str) -> int | None:
+    number = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_SENSOR, sensor)
+    return int(compiled.sensor_adr[number]) if number >= 0 else None

@@ -11,10 +11,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from dh2sim.errors import ControllerError, SettingsError
+from dh2sim.errors import AssemblyError, ControllerError, SettingsError
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import MjcfOptions
+from dh2sim.kinematics.loop_motion import named_configuration
 from dh2sim.messages import listed
+from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.simulate.block import Job, rehearse
 from dh2sim.simulate.controllers.registry import ControllerChoice, choose
@@ -25,6 +27,7 @@ from dh2sim.simulate.initial_states import InitialStates, read_initial_states, r
 from dh2sim.simulate.options import AUTO, REFERENCE, RolloutOptions
 from dh2sim.simulate.plant import Plant, compile_plant
 from dh2sim.simulate.records import SENSED
+from dh2sim.typing import Array
 
 BLOCK_BYTES = 2**26
 """Most that a block of rollouts records; two of them are in memory at a time."""
@@ -38,7 +41,7 @@ TIME_BYTES = 16
 T = TypeVar("T")
 
 
-def prepare(model: RobotModel, options: RolloutOptions, *, command: str = "") -> Job:
+def prepare(model: RobotModel | MechanismModel, options: RolloutOptions, *, command: str = "") -> Job:
     """Make a robot ready to be simulated.
 
     Args:
@@ -53,19 +56,24 @@ def prepare(model: RobotModel, options: RolloutOptions, *, command: str = "") ->
     """
     controller, initial = _resolved(model, options)
     options = options.replace(controller=controller.text, start=initial.name)
+    if isinstance(model, MechanismModel):
+        _check_mechanism(model, options)
     recipe = PlantRecipe(
         actuation=controller.actuation,
         mjcf=MjcfOptions(
             timestep=options.timestep,
             integrator=options.integrator,
             energy="energy" in options.record,
-            sensors=not SENSED.isdisjoint(options.record),
+            sensors=not SENSED.isdisjoint(options.record) or isinstance(model, MechanismModel),
             floating_base=options.floating_base,
         ),
     )
     mjcf = recipe.text(model)
     plant = compile_plant(mjcf, model)
     initial.check(plant)
+    if isinstance(model, MechanismModel):
+        initial = initial.on_loops(plant, model)
+        _check_driven(plant, controller)
     idle = [("randomize", problem) for problem in _idle(plant, options.randomize)]
     if idle:
         raise SettingsError(idle)
@@ -102,7 +110,7 @@ def prepare(model: RobotModel, options: RolloutOptions, *, command: str = "") ->
     return job
 
 
-def _designs(model: RobotModel, options: RolloutOptions) -> Designs:
+def _designs(model: RobotModel | MechanismModel, options: RolloutOptions) -> Designs:
     """Return the designs of a run, each of which there is a robot of.
 
     Raises:
@@ -126,7 +134,56 @@ def _designs(model: RobotModel, options: RolloutOptions) -> Designs:
     return designs
 
 
-def _resolved(model: RobotModel, options: RolloutOptions) -> tuple[ControllerChoice, InitialStates]:
+INDEPENDENT = frozenset({"sine", "random", "pd", "computed-torque", "gravity-compensation"})
+"""Controllers that give each driven joint something of its own."""
+
+
+def _check_mechanism(model: MechanismModel, options: RolloutOptions) -> None:
+    """Refuse what works on serial robots alone.
+
+    Raises:
+        SettingsError: The error names each option.
+    """
+    given = {"floating_base": options.floating_base, "vary": options.vary, "designs": options.designs}
+    problem = f"must not be given for {model.name}: it is a mechanism"
+    if problems := [(name, problem) for name, value in given.items() if value]:
+        raise SettingsError(problems)
+
+
+def _check_driven(plant: Plant, controller: ControllerChoice) -> None:
+    """Refuse to move the driven joints of a mechanism independently where its loops do not let them.
+
+    Raises:
+        SettingsError: They are more than the freedoms.
+    """
+    loops = plant.loops
+    if controller.name not in INDEPENDENT or loops is None or len(loops.driven) <= loops.freedoms:
+        return
+    names = listed(plant.controlled.joints)
+    problem = (
+        f"must be one of hold, passive, replay: {controller.name} moves {names} independently of each other, but the "
+        f"loops leave {loops.freedoms} freedom{'s' * (loops.freedoms != 1)} at the assembly. Say in 'actuated' which "
+        "joints are driven"
+    )
+    raise SettingsError([("controller", problem)])
+
+
+def _named(model: RobotModel | MechanismModel, start: str) -> Mapping[str, Array]:
+    """Return the configurations that have a name, of a mechanism with the loops closed in the one that is used.
+
+    Raises:
+        SettingsError: They cannot be closed near it.
+    """
+    configurations = model.spec.named_configurations
+    if not isinstance(model, MechanismModel) or start not in configurations:
+        return configurations
+    try:
+        return {**configurations, start: named_configuration(model.spec, start)}
+    except AssemblyError as error:
+        raise SettingsError([("start", str(error))]) from error
+
+
+def _resolved(model: RobotModel | MechanismModel, options: RolloutOptions) -> tuple[ControllerChoice, InitialStates]:
     """Find the controller and the initial states, and report at once what is wrong with either."""
     problems: list[tuple[str, str]] = []
 
@@ -152,7 +209,7 @@ def _resolved(model: RobotModel, options: RolloutOptions) -> tuple[ControllerCho
         lambda: (
             reference_start(first, joints)
             if start == REFERENCE and REFERENCE not in configurations and controller is not None
-            else read_initial_states(start, joints, configurations, options.rollouts)
+            else read_initial_states(start, joints, _named(model, start), options.rollouts)
         )
     )
     if problems or controller is None or initial is None:
@@ -162,7 +219,7 @@ def _resolved(model: RobotModel, options: RolloutOptions) -> tuple[ControllerCho
 
 def _idle(plant: Plant, randomize: Mapping[str, float]) -> Iterator[str]:
     """Yield what is wrong with randomizing a quantity that is zero in every joint or actuator."""
-    model, joints = plant.model, slice(plant.model.nv - plant.n, None)
+    model, joints = plant.model, plant.velocities
     values = {
         "friction": model.dof_frictionloss[joints],
         "damping": model.dof_damping[joints],
@@ -175,7 +232,7 @@ def _idle(plant: Plant, randomize: Mapping[str, float]) -> Iterator[str]:
 
 
 def _attributes(
-    model: RobotModel,
+    model: RobotModel | MechanismModel,
     options: RolloutOptions,
     plant: Plant,
     digests: Mapping[str, str],

@@ -94,18 +94,18 @@ def scales(plant: Plant, options: RolloutOptions, rollouts: Sequence[int]) -> di
 
 
 def links(plant: Plant) -> list[int]:
-    """Return the bodies that have mass."""
-    return [i for i in range(1, plant.model.nbody) if plant.model.body_mass[i] > 0.0]
+    """Return the links that have mass."""
+    bodies = range(1, plant.model.nbody)
+    return [i for i in bodies if plant.model.body_mass[i] > 0.0 and i not in plant.helpers]
 
 
 def apply_scales(batch: Batch, plant: Plant, factors: dict[str, Array]) -> None:
     """Give every simulation of a batch its own model."""
     if not factors:
         return
-    first = 6 if plant.floating else 0
     columns = {"mass": links(plant), "gain": list(range(len(plant.actuators)))}
     for name, values in factors.items():
-        which = columns.get(name, list(range(first, first + plant.n)))
+        which = columns.get(name, plant.velocities)
         for field in FIELDS[name]:
             expanded = batch.expand(field)
             expanded[:, which] *= values.reshape(values.shape + (1,) * (expanded.ndim - 2))

@@ -25,8 +25,8 @@ LARGEST: Final = 8192
 """Pixels along a side of a texture, a shadow map or the off-screen buffer."""
 _ELEMENTS: Final = frozenset(
     """mujoco compiler option flag default joint freejoint site geom inertial body worldbody asset material texture
-    contact exclude actuator position velocity motor sensor jointpos jointvel jointactuatorfrc framepos framequat
-    keyframe key statistic visual headlight global quality rgba map light camera include""".split()  # noqa: SIM905
+    contact exclude equality connect weld actuator position velocity motor sensor jointpos jointvel jointactuatorfrc
+    framepos framequat keyframe key statistic visual headlight global quality rgba map light camera include""".split()  # noqa: SIM905
 )
 """What models in runs are made of; none of them reads a file or takes more memory than its text, but for pictures."""
 _SIDES: Final = (

@@ -30,9 +30,10 @@ class Recorder:
         """Record every ``every``-th time step into ``arrays``, each with the batch's rollouts first."""
         self._arrays = arrays
         self._every = every
-        self._first_q, self._first_v = (7, 6) if plant.floating else (0, 0)
+        self._plant = plant
+        self._base_q, self._base_v = (7, 6) if plant.floating else (0, 0)
         self.substeps = plant.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
-        self.joints = n = plant.n
+        n = plant.n
         self._torque = slice(2 * n, 3 * n)  # sensors are in the order of ``add_sensors``
         self._tool = slice(3 * n, 3 * n + 7)
 
@@ -81,13 +82,13 @@ class Recorder:
         parts: dict[str, NDArray[Any]]
         match field:
             case "qpos":
-                parts = {"base_pose": values[..., : self._first_q], "qpos": values[..., self._first_q :]}
+                parts = {"base_pose": values[..., : self._base_q], "qpos": values[..., self._plant.positions]}
             case "qvel":
-                parts = {"base_twist": values[..., : self._first_v], "qvel": values[..., self._first_v :]}
+                parts = {"base_twist": values[..., : self._base_v], "qvel": values[..., self._plant.velocities]}
             case "sensordata":
                 parts = {"tool_pose": values[..., self._tool], "torque": values[..., self._torque]}
             case "qacc":
-                parts = {"qacc": values[..., self._first_v :]}
+                parts = {"qacc": values[..., self._plant.velocities]}
             case "energy":
                 parts = {"energy": values}
             case _:

@@ -14,7 +14,10 @@ import numpy as np
 
 from dh2sim.errors import SettingsError
 from dh2sim.extras import require_extra
+from dh2sim.kinematics.chain import spec_of
 from dh2sim.model.build import ModelLike, model_of
+from dh2sim.model.mechanism import MechanismModel, build_mechanism
+from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import load_robot
 from dh2sim.simulate.block import Block, Job, simulate_block
 from dh2sim.simulate.dataset_layout import Layout
@@ -58,7 +61,7 @@ class Progress:
 
 
 def rollout(
-    robot: ModelLike | str | PathLike[str],
+    robot: ModelLike | MechanismModel | str | PathLike[str],
     *,
     out: str | PathLike[str] | None = None,
     threads: int = 0,
@@ -93,8 +96,7 @@ def rollout(
     """
     require_extra("data", "xarray", what="a run as an xarray dataset")
     checked = RolloutOptions(**options)
-    model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
-    job = prepare(model, checked)
+    job = prepare(_model_of(robot), checked)
     if out is None:
         try:
             arrays = simulate_block(job, range(job.options.rollouts), threads=threads, advance=advance)
@@ -108,6 +110,14 @@ def rollout(
     with open_run(job, Path(out), resume=resume, overwrite=overwrite) as writer:
         fill(writer, job, threads=threads, advance=advance)
     return open_dataset(Path(out))
+
+
+def _model_of(robot: ModelLike | MechanismModel | str | PathLike[str]) -> RobotModel | MechanismModel:
+    if isinstance(robot, MechanismModel):
+        return robot
+    given = load_robot(robot) if isinstance(robot, str | PathLike) else robot
+    spec = spec_of(given)
+    return build_mechanism(spec) if spec.is_mechanism else model_of(given)
 
 
 def open_run(job: Job, path: Path, *, resume: bool = False, overwrite: bool = False) -> RunWriter:

@@ -29,6 +29,7 @@ def test_a_finished_run_is_described(tmp_path: Path) -> None:
         "reasons": {"bad_qacc": 1},
         "touched": None,
         "first_contact": None,
+        "loop_gap": None,
         "saturated": saturated,
         "saturated_joints": by_joint,
         "steps": 8,

@@ -11,6 +11,7 @@ from typing import Final
 
 from dh2sim.formats.mjcf.sites import add_site, placed
 from dh2sim.formats.mjcf.write import (
+    MjcfOptions,
     add_actuators,
     add_assets,
     add_contact,
@@ -18,6 +19,7 @@ from dh2sim.formats.mjcf.write import (
     add_geoms,
     add_inertial,
     add_joint,
+    add_option,
     add_sensors,
     class_name,
 )
@@ -34,8 +36,10 @@ from dh2sim.typing import Array, read_only
 
 TIMESTEP: Final = 0.0005
 """s; constraints are stiffer the shorter it is."""
-SOLREF: Final = (2 * TIMESTEP, 1.0)
-"""Time constant, s, the least that MuJoCo allows, and damping ratio of the constraints."""
+EXPORTED: Final = MjcfOptions(timestep=TIMESTEP)
+"""Of the files that ``dh2sim export`` writes."""
+DAMPING_RATIO: Final = 1.0
+"""Of the constraints; their time constant is two time steps, the least that MuJoCo allows."""
 SOLIMP: Final = (0.99, 0.9999, 0.0001, 0.5, 2.0)
 HELPERS: Final = {
     ClosureType.UNIVERSAL: ("hinge",),
@@ -45,15 +49,20 @@ HELPERS: Final = {
 """Joints, along or about the z axis of frame a, of a body of its own between the two links of a closure."""
 ARMATURE: Final = 1e-3
 """Of those joints, in moving masses, and sizes squared: a body without any would make the constraints soft."""
+HELPER: Final = "_joint"
+"""End of the names of those bodies."""
+GAP: Final = "_gap"
+"""End of the names of sensors that say how far constraints are open."""
 ARM: Final = 0.1
 """Distance, in sizes of the mechanism, of the two points of an axis that are connected."""
 
 
-def to_mechanism_mjcf(model: MechanismModel) -> str:
+def to_mechanism_mjcf(model: MechanismModel, options: MjcfOptions = EXPORTED) -> str:
     """Write a mechanism as MJCF.
 
     Args:
         model: The mechanism.
+        options: How it is simulated; its base is fixed.
 
     Returns:
         The text of the file. Spherical closures are ``connect``, revolute ones two of them on the axis, fixed ones
@@ -61,13 +70,7 @@ def to_mechanism_mjcf(model: MechanismModel) -> str:
     """
     mujoco = ET.Element("mujoco", model=model.name)
     child(mujoco, "compiler", angle="radian", autolimits="true", meshdir="meshes")
-    child(
-        mujoco,
-        "option",
-        timestep=number(TIMESTEP),
-        integrator="implicitfast",
-        gravity=numbers(model.spec.gravity),
-    )
+    add_option(mujoco, model, options)
     add_defaults(mujoco, model)
     materials = add_assets(mujoco, model)
     bodies = _tree(mujoco, model, materials)
@@ -76,9 +79,10 @@ def to_mechanism_mjcf(model: MechanismModel) -> str:
         equality = child(mujoco, "equality")
         poses = body_poses(model.tree, model.q)
         for closure in model.tree.closures:
-            _close(equality, bodies, model, closure, poses)
+            _close(equality, bodies, model, closure, poses, (2 * options.timestep, DAMPING_RATIO))
     add_actuators(mujoco, model)
     add_sensors(mujoco, model)
+    _add_gap_sensors(mujoco)
     keyframe = child(mujoco, "keyframe")
     for name, q in model.configurations().items():
         key = child(keyframe, "key", name=name, qpos=_qpos(mujoco, model, q))
@@ -121,6 +125,7 @@ def _close(
     model: MechanismModel,
     closure: Closure,
     poses: tuple[Array, ...],
+    solref: tuple[float, float],
 ) -> None:
     """Add the constraints of a closure, with the sites and the body that they need."""
     a, b = model.tree.frame(closure.a), model.tree.frame(closure.b)
@@ -132,7 +137,7 @@ def _close(
     if closure.type in HELPERS:
         T_a_b = compose(invert(frame_pose(poses, a)), frame_pose(poses, b))
         start = _helper_start(closure.type, T_a_b)
-        body_a = child(body_a, "body", name=f"{name}_joint", **placed(compose(T_a, start)))
+        body_a = child(body_a, "body", name=f"{name}{HELPER}", **placed(compose(T_a, start)))
         add_inertial(body_a, LIGHTEST)
         for kind in HELPERS[closure.type]:
             inertia = ARMATURE * model.mass * (model.size**2 if kind == "hinge" else 1.0)
@@ -148,14 +153,14 @@ def _close(
         case _:
             add_site(body_a, f"{name}_a", T_a, inertial)
             add_site(body_b, f"{name}_b", T_b, mass_b)
-            _constraint(equality, "weld", name, f"{name}_a", f"{name}_b")
+            _constraint(equality, "weld", name, f"{name}_a", f"{name}_b", solref)
             return
     for k, height in enumerate(points):
         suffix = "" if len(points) == 1 else f"_{k + 1}"
         along = joint_part(0.0, height)
         add_site(body_a, f"{name}_a{suffix}", compose(T_a, along), inertial)
         add_site(body_b, f"{name}_b{suffix}", compose(T_b, along), mass_b)
-        _constraint(equality, "connect", f"{name}{suffix}", f"{name}_a{suffix}", f"{name}_b{suffix}")
+        _constraint(equality, "connect", f"{name}{suffix}", f"{name}_a{suffix}", f"{name}_b{suffix}", solref)
 
 
 def _helper_start(kind: ClosureType, T_a_b: Array) -> Array:
@@ -168,12 +173,31 @@ def _helper_start(kind: ClosureType, T_a_b: Array) -> Array:
     return read_only([[x, -y, 0, 0], [y, x, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 
 
-def _constraint(equality: ET.Element, kind: str, name: str, site1: str, site2: str) -> None:
-    child(equality, kind, name=name, site1=site1, site2=site2, solref=numbers(SOLREF), solimp=numbers(SOLIMP))
+def _constraint(
+    equality: ET.Element, kind: str, name: str, site1: str, site2: str, solref: tuple[float, float]
+) -> None:
+    child(equality, kind, name=name, site1=site1, site2=site2, solref=numbers(solref), solimp=numbers(SOLIMP))
 
 
-def _qpos(mujoco: ET.Element, model: MechanismModel, q: Array) -> str:
-    """Return a joint vector in the order of the joints in the file, with those of the bodies in between."""
+def _add_gap_sensors(mujoco: ET.Element) -> None:
+    """Add a sensor of how far each constraint is open: the place of one of its sites seen from the other."""
+    sensors = mujoco.find("sensor")
+    assert sensors is not None
+    for constraint in mujoco.iterfind("equality/*"):
+        ends = {"objtype": "site", "objname": "site1", "reftype": "site", "refname": "site2"}
+        between = {key: constraint.get(value, value) for key, value in ends.items()}
+        child(sensors, "framepos", name=f"{constraint.get('name')}{GAP}", **between)
+        if constraint.tag == "weld":
+            child(sensors, "framequat", name=f"{constraint.get('name')}{GAP}_turn", **between)
+
+
+def joint_coordinates(model: MechanismModel, q: Array) -> dict[str, float]:
+    """Return the coordinates of all joints of the MJCF by name, those of the bodies in between among them.
+
+    Args:
+        model: The mechanism.
+        q: Joint vector at which its loops are closed, rad and m, shape (n,).
+    """
     values = {joint.name: float(value) for joint, value in zip(model.moving_joints, q, strict=True)}
     assembled, now = (body_poses(model.tree, vector) for vector in (model.q, q))
     for closure in model.tree.closures:
@@ -186,6 +210,12 @@ def _qpos(mujoco: ET.Element, model: MechanismModel, q: Array) -> str:
             angles = [atan2(float(T[1, column]), float(T[0, column])) for T in (before, after)]
             values[f"{closure.name}_slide"] = float(after[2, 3] - before[2, 3])
             values[f"{closure.name}_hinge"] = angles[1] - angles[0]
+    return values
+
+
+def _qpos(mujoco: ET.Element, model: MechanismModel, q: Array) -> str:
+    """Return a joint vector in the order of the joints in the file."""
+    values = joint_coordinates(model, q)
     world = mujoco.find("worldbody")
     assert world is not None
     return numbers(values[joint.get("name", "")] for joint in world.iter("joint"))

@@ -104,6 +104,19 @@ def to_mjcf(model: ModelLike, options: MjcfOptions = EXPORTED) -> str:
     model = model_of(model)
     mujoco = ET.Element("mujoco", model=model.name)
     child(mujoco, "compiler", angle="radian", autolimits="true", meshdir="meshes")
+    add_option(mujoco, model, options)
+    add_defaults(mujoco, model)
+    materials = add_assets(mujoco, model)
+    _bodies(mujoco, model, materials, options)
+    add_contact(mujoco, model)
+    add_actuators(mujoco, model)
+    add_sensors(mujoco, model)
+    add_keyframes(mujoco, model, floating_base=options.floating_base)
+    return document(mujoco, provenance(model))
+
+
+def add_option(mujoco: ET.Element, model: Written, options: MjcfOptions) -> None:
+    """Add the options of the simulation."""
     option = child(
         mujoco,
         "option",
@@ -114,15 +127,6 @@ def to_mjcf(model: ModelLike, options: MjcfOptions = EXPORTED) -> str:
     flags = {**({"energy": "enable"} if options.energy else {}), **({} if options.sensors else {"sensor": "disable"})}
     if flags:
         child(option, "flag", **flags)
-    add_defaults(mujoco, model)
-    materials = add_assets(mujoco, model)
-    _bodies(mujoco, model, materials, options)
-    add_contact(mujoco, model)
-    add_actuators(mujoco, model)
-    add_sensors(mujoco, model)
-    if options.keyframes:
-        add_keyframes(mujoco, model, floating_base=options.floating_base)
-    return document(mujoco, provenance(model))
 
 
 def add_defaults(mujoco: ET.Element, model: Written) -> None:

@@ -18,6 +18,7 @@ from dh2sim.simulate.controllers.trajectories import (
     centers,
     cubic_spline_weights,
     follow,
+    followed_by_loops,
     half_ranges,
     minimum_jerk,
     pieces,
@@ -28,6 +29,9 @@ from dh2sim.simulate.controllers.trajectories import (
 )
 from dh2sim.simulate.plant import Plant
 from dh2sim.typing import Array
+
+HALVINGS = 6
+"""Times that a motion is made smaller if a mechanism's loops do not let its driven joints follow it."""
 
 
 def actuator_types(plant: Plant) -> tuple[ActuatorType, ...]:
@@ -131,10 +135,16 @@ class RandomSpline:
         start = holding_controls(batch, against_gravity=False)
         center = centers(start, reach, self._lower, self._upper)
         self._pieces = math.floor(batch.steps * plant.timestep * rate) + 1
-        targets = center + reach * uniform(batch.generators, self._pieces, len(joints))
+        drawn, share = uniform(batch.generators, self._pieces, len(joints)), np.ones((len(start), 1))
         # a spline is nowhere faster than its points are apart
         most = np.where(position, INSIDE * fastest / rate, np.inf)
-        self._points = follow(start, [start, start, *targets], most)
+        for _ in range(HALVINGS):
+            targets = center + share * reach * drawn
+            self._points = follow(start, [start, start, *targets], most)
+            followed = followed_by_loops(batch, self.controls) if position.all() else np.ones(len(start), dtype=bool)
+            if followed.all():
+                break
+            share = np.where(followed[:, None], share, 0.5 * share)
 
     def controls(self, first: int, count: int) -> Array:
         """Return controls, shape (batch, count, actuators)."""
@@ -197,9 +207,14 @@ class Sine:
         fastest = MINIMUM_JERK_PEAK / fade * (away + reach) + reach * speed / total
         limit = INSIDE * plant.velocity
         reach = reach * np.where(fastest > limit, limit / np.where(fastest > limit, fastest, 1.0), 1.0)
-        self._center = centers(batch.q0, reach, plant.lower, plant.upper)
-        self._terms = [*(drawn * (reach / total)), self._center]
         self._lower, self._upper = widened(batch)
+        for _ in range(HALVINGS):
+            self._center = centers(batch.q0, reach, plant.lower, plant.upper)
+            self._terms = [*(drawn * (reach / total)), self._center]
+            followed = followed_by_loops(batch, self.controls)
+            if followed.all():
+                break
+            reach = np.where(followed[:, None], reach, 0.5 * reach)
 
     def controls(self, first: int, count: int) -> Array:
         """Return setpoints, rad or m, shape (batch, count, n)."""

@@ -84,6 +84,8 @@ class RolloutBatch:
     """Forces that balance gravity at the start, N·m or N, shape (batch, n)."""
     generators: Sequence[np.random.Generator]
     """One for each rollout, used by the controller alone."""
+    qpos0: Array | None = None
+    """Of a mechanism, MuJoCo's positions of all joints at the start, shape (batch, nq)."""
 
 
 @runtime_checkable

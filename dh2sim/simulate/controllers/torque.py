@@ -81,14 +81,18 @@ def _mobilities(plant: Plant) -> Array:
     data, inertia = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     lower = np.where(np.isfinite(plant.lower), plant.lower, -plant.free_half_ranges)
     upper = np.where(np.isfinite(plant.upper), plant.upper, plant.free_half_ranges)
+    poses = np.random.default_rng(0).uniform(lower, upper, (POSES, n))
+    if plant.loops is not None:
+        reached, _ = plant.loops.follow(np.tile(plant.loops.start, (1 + POSES, 1)), np.vstack([plant.home, poses]))
+        return np.array([np.linalg.inv(plant.loops.inertia(qpos)) for qpos in reached])
     found = np.empty((1 + POSES, n, n))
-    for k, q in enumerate([plant.home, *np.random.default_rng(0).uniform(lower, upper, (POSES, n))]):
-        data.qpos[model.nq - n :] = q
+    for k, q in enumerate([plant.home, *poses]):
+        data.qpos[plant.positions] = q
         mujoco.mj_kinematics(model, data)  # and what the mass matrix takes; contacts are of no account
         mujoco.mj_comPos(model, data)
         mujoco.mj_crb(model, data)
         mujoco.mj_fullM(model, data, inertia)
-        found[k] = np.linalg.inv(inertia)[model.nv - n :, model.nv - n :]
+        found[k] = np.linalg.inv(inertia)[plant.velocities, plant.velocities]
     return found
 
 

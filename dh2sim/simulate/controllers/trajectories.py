@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Final, TypeAlias
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from dh2sim.errors import ControllerError
 from dh2sim.simulate.controllers.options import Within
@@ -205,6 +206,8 @@ def _clear_of_links(batch: RolloutBatch, targets: Array, center: Array, reach: A
         reach: Half of its width, shape (n,) or (batch, n).
         most: Greatest distance between neighbouring waypoints, shape (n,) or (batch, n).
     """
+    if batch.plant.loops is not None:
+        return _reached_by_loops(batch, targets, center, reach, most)
     waypoints = follow(batch.q0, targets, most)
     models = batch.plant.models
     model = models[0]
@@ -242,6 +245,55 @@ def _clear_of_links(batch: RolloutBatch, targets: Array, center: Array, reach: A
             else:
                 waypoints[k, i] = before
     return waypoints
+
+
+def _reached_by_loops(batch: RolloutBatch, targets: Array, center: Array, reach: Array, most: Array) -> Array:
+    """Return the like for a mechanism: a target is drawn again if the loops cannot be closed all the way to it."""
+    loops = batch.plant.loops
+    assert loops is not None
+    assert batch.qpos0 is not None
+    qpos = batch.qpos0.copy()
+    again: dict[int, np.random.Generator] = {}
+    waypoints = [np.array(batch.q0)]
+    for drawn in targets:
+        before, wanted, left = waypoints[-1], drawn.copy(), np.arange(len(qpos))
+        point = before.copy()  # where none is found, it rests
+        for _ in range(_TRIES):
+            there = before[left] + np.clip(wanted[left] - before[left], -most, most)
+            found, reached = loops.follow(qpos[left], there)
+            good = left[reached]
+            qpos[good], point[good] = found[reached], there[reached]
+            left = left[~reached]
+            for i in left.tolist():  # a stream of its own, as above
+                if i not in again:
+                    again[i] = batch.generators[i].spawn(1)[0]
+                wanted[i] = center[i] + reach * again[i].uniform(-1.0, 1.0, size=len(wanted[i]))
+            if not len(left):
+                break
+        waypoints.append(point)
+    return np.stack(waypoints)
+
+
+_LOOK_EVERY: Final = 0.1
+"""s: between the places of a path at which loops are closed to see whether it can be followed."""
+
+
+def followed_by_loops(batch: RolloutBatch, path: Callable[[int, int], Array]) -> NDArray[np.bool_]:
+    """Return in which rollouts the loops of a mechanism can be closed all along a path of its driven joints.
+
+    Args:
+        batch: The rollouts.
+        path: Takes a first time step and a number of them; returns positions, shape (batch, count, n).
+    """
+    loops = batch.plant.loops
+    if loops is None or batch.qpos0 is None:
+        return np.ones(len(batch.rollouts), dtype=bool)
+    every = max(1, round(_LOOK_EVERY / batch.plant.timestep))
+    qpos, good = batch.qpos0.copy(), np.ones(len(batch.rollouts), dtype=bool)
+    for step in range(0, batch.steps, every):
+        left = np.flatnonzero(good)
+        qpos[left], good[left] = loops.follow(qpos[left], path(step, 1)[left, 0])
+    return good
 
 
 class SmoothReference:

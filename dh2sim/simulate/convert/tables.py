@@ -87,7 +87,7 @@ class Table:
 ORDER = (
     *("qpos", "qvel", "qpos_ref", "qvel_ref", "ctrl", "qacc", "torque"),
     *("tool_pose", "energy", "contacts", "base_pose", "base_twist"),
-    *("status", "stop_step", "contact_step", "contact_link_a", "contact_link_b", "saturation"),
+    *("status", "stop_step", "contact_step", "contact_link_a", "contact_link_b", "saturation", "loop_gap"),
 )
 """Order of columns; others follow by name."""
 NO_INTEGER = -1
