@@ -1,4 +1,4 @@
-"""Locks on folders, and hidden folders of processes at work, whose locks tell them from those of dead ones."""
+"""Locks on folders and files, and hidden folders of processes, told by their locks from those of dead ones."""
 
 from __future__ import annotations
 
@@ -24,14 +24,35 @@ _POLL: Final = 0.02
 """s between two attempts to lock a folder."""
 
 
+def lock_handle(handle: int, *, shared: bool = False) -> bool:
+    """Lock what a handle has opened, as long as it is open; return whether there are such locks here.
+
+    Raises:
+        BlockingIOError: It is locked.
+    """
+    if not _HAS_LOCKS:
+        return False
+    try:
+        fcntl.flock(handle, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError:
+        return False
+    return True
+
+
 class FolderLock:
-    """An exclusive lock on a folder among processes that use this class; the system drops it when a process ends.
+    """A lock on a folder among processes that use this class; the system drops it when a process ends.
 
     Where the system or the file system has no such locks, every lock is granted.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, shared: bool = False) -> None:
         """Lock a folder.
+
+        Args:
+            folder: The folder.
+            shared: Whether others may hold it as well who ask for no more than that.
 
         Raises:
             BlockingIOError: It is locked.
@@ -42,13 +63,19 @@ class FolderLock:
             return
         handle = os.open(folder, os.O_RDONLY)
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
+            effective = lock_handle(handle, shared=shared)
+        except BlockingIOError:
             os.close(handle)
-            if isinstance(error, BlockingIOError):
-                raise
-        else:
+            raise
+        if effective:
             self._handle = handle
+        else:
+            os.close(handle)
+
+    def share(self) -> None:
+        """Let others hold the lock as well who ask for no more than that."""
+        if self._handle is not None:
+            lock_handle(self._handle, shared=True)
 
     @property
     def effective(self) -> bool:
@@ -69,11 +96,14 @@ class FolderLock:
             self._handle = None
 
 
-def lock_folder(folder: Path, *, wait: bool = False, waiting: Callable[[Path], None] | None = None) -> FolderLock:
+def lock_folder(
+    folder: Path, *, shared: bool = False, wait: bool = False, waiting: Callable[[Path], None] | None = None
+) -> FolderLock:
     """Lock the folder that is at a path.
 
     Args:
         folder: The folder; it may be replaced by another meanwhile.
+        shared: Whether others may hold it as well who ask for no more than that.
         wait: Whether to wait until it is free.
         waiting: Called once with the folder if that takes longer than a moment.
 
@@ -84,7 +114,7 @@ def lock_folder(folder: Path, *, wait: bool = False, waiting: Callable[[Path], N
     begin, told = time.monotonic(), False
     while True:
         with suppress(*((BlockingIOError,) if wait else ())):
-            lock = FolderLock(folder)
+            lock = FolderLock(folder, shared=shared)
             if lock.holds(folder):
                 return lock
             lock.release()

@@ -30,7 +30,10 @@ if TYPE_CHECKING:
 
 def rollout(
     robot: RobotArgument,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="RUN.zarr", help="Folder to write the run to.")],
+    out: Annotated[
+        str,
+        typer.Option("--out", "-o", metavar="RUN.zarr", help="Folder to write the run to, or s3://BUCKET/RUN.zarr."),
+    ],
     rollouts: Annotated[
         int | None,
         typer.Option(metavar="N", help="Number of rollouts. [default: 256, or one for each of --designs]"),
@@ -65,7 +68,10 @@ def rollout(
     ] = "auto",
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random number generator.")] = 0,
     threads: Annotated[
-        int, typer.Option(min=0, max=1024, metavar="N", help="Number of threads; 0: one for each processor.")
+        int,
+        typer.Option(
+            min=0, max=1024, metavar="N", help="Number of threads; 0: one for each processor that it may use."
+        ),
     ] = 0,
     record: Annotated[
         str,
@@ -103,6 +109,29 @@ def rollout(
     floating_base: Annotated[bool, typer.Option("--floating-base", help="Let base_link move freely.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted run, or start it.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing run.")] = False,
+    share: Annotated[
+        str,
+        typer.Option(
+            metavar="I/N",
+            help="Simulate only the I-th of N shares of the run's blocks, beside other processes, on any machines, "
+            "that simulate others. [default: all]",
+            show_default=False,
+        ),
+    ] = "",
+    blocks: Annotated[
+        str,
+        typer.Option(
+            metavar="A:B",
+            help="The same for blocks A to B - 1 of the run, counted from 0. [default: all]",
+            show_default=False,
+        ),
+    ] = "",
+    block_size: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", help="Rollouts in a block. [default: some seconds' work, at most 64 MB]", show_default=False
+        ),
+    ] = None,
     as_json: Annotated[
         bool,
         typer.Option("--json", help="Print a description of the run as JSON, as 'dh2sim runs --json' does, alone."),
@@ -115,6 +144,9 @@ def rollout(
     rollouts in progress, and --resume continues. Unstable rollouts are stopped one by one, and marked. At the end it
     says in how many rollouts links of the robot touched, or a controller wanted more than an actuator can do.
 
+    With --share a run is made by many processes, in any order and on any machines that see the same folder: each
+    simulates its share of the blocks of rollouts, and one that dies is started again. See docs/scale.md.
+
     \b
     Examples:
       dh2sim rollout stanford --out run.zarr
@@ -123,6 +155,7 @@ def rollout(
       dh2sim rollout my_arm.yaml --out run.zarr --rollouts 100000 --resume
       dh2sim rollout puma560 --out run.zarr --randomize mass=0.2
       dh2sim rollout puma560 --out run.zarr --vary a2=0.05,d3=normal:0.01
+      dh2sim rollout stanford --out run.zarr --rollouts 100000 --share 3/16
     Then:
       dh2sim runs run.zarr               what it contains
       dh2sim plot run.zarr --what joints
@@ -132,7 +165,7 @@ def rollout(
     from dh2sim.simulate.description import describe
     from dh2sim.simulate.options import RolloutOptions
     from dh2sim.simulate.prepare import prepare
-    from dh2sim.simulate.run import fill, open_run
+    from dh2sim.simulate.run import check_share, choose_blocks, fill, open_run, with_block_size
 
     options = RolloutOptions(
         rollouts=rollouts,  # type: ignore[arg-type]  # None is as if it were not given
@@ -151,24 +184,37 @@ def rollout(
         per_design=per_design,
         floating_base=floating_base,
     )
-    job = prepare(model, options, command=shlex.join(["dh2sim", *sys.argv[1:]]))
-    with (
-        open_run(job, out, resume=resume, overwrite=overwrite) as writer,
-        _patient(quiet) as patience,
-        progress_bar("simulating", "rollouts", options.rollouts, quiet=quiet) as advance,
-    ):
-        progress = fill(writer, job, threads=threads, advance=advance, stopping=lambda: patience.arrived is not None)
-    summary = describe(out)
+    part, named, sharing = _share(share), _blocks(blocks), bool(share or blocks)
+    check_share(part, alone=named is None)
+    job = with_block_size(prepare(model, options, command=shlex.join(["dh2sim", *sys.argv[1:]])), block_size)
+    with open_run(job, out, resume=resume, overwrite=overwrite, join=sharing) as writer:
+        count = writer.layout.blocks
+        chosen = choose_blocks(count, share=part, blocks=None if named is None else range(count)[named])
+        total = sum(len(writer.layout.rollouts(block)) for block in chosen)
+        with _patient(quiet) as patience, progress_bar("simulating", "rollouts", total, quiet=quiet) as advance:
+            progress = fill(
+                writer,
+                job,
+                blocks=chosen,
+                threads=threads,
+                advance=advance,
+                stopping=lambda: patience.arrived is not None,
+            )
+        saved = total - sum(len(writer.layout.rollouts(block)) for block in writer.pending(chosen))
+    summary = describe(out) if as_json or not sharing else None
     if not quiet:
         with redirect_stdout(sys.stderr) if as_json else nullcontext():
-            _print_summary(job, summary, progress, out)
-    if as_json:
+            if sharing:
+                _print_part(job, progress, out, which=f"{len(chosen):,} of {count:,} blocks", rollouts=total)
+            elif summary is not None:
+                _print_summary(job, summary, progress, out)
+    if as_json and summary is not None:
         print(json_text(summary.to_json()))
     if progress.finished:
         return 0
     print(
-        f"dh2sim: interrupted; {summary.rollouts - summary.not_run:,} of {options.rollouts:,} rollouts are saved in "
-        f"{printable(str(out))}. Continue with the same command and --resume",
+        f"dh2sim: interrupted; {saved:,} of {total:,} rollouts are saved in {printable(out)}. Continue with the same "
+        f"command{'' if sharing else ' and --resume'}",
         file=sys.stderr,
     )
     return INTERRUPTED if patience.arrived == signal.SIGINT else 128 + int(patience.arrived or 0)
@@ -185,6 +231,34 @@ def _named(text: str, option: str, form: str) -> dict[str, str]:
             raise typer.BadParameter(f"'{name}' is given twice", param_hint=option)
         values[name] = value
     return values
+
+
+def _share(text: str) -> tuple[int, int] | None:
+    """Read ``I/N``."""
+    if not text:
+        return None
+    index, slash, count = text.partition("/")
+    if not (slash and _is_number(index) and _is_number(count)):
+        raise typer.BadParameter(f"'{text}' is not of the form I/N, as in 3/16", param_hint="--share")
+    return int(index), int(count)
+
+
+def _blocks(text: str) -> slice | None:
+    """Read ``A:B``, of which either may be left out, or a single number."""
+    if not text:
+        return None
+    first, colon, end = text.partition(":")
+    if not all(not word or _is_number(word) for word in (first, end)) or (not colon and not first):
+        raise typer.BadParameter(f"'{text}' is not of the form A:B, as in 10:20", param_hint="--blocks")
+    if not colon:
+        return slice(int(first), int(first) + 1)
+    if first and end and int(first) >= int(end):
+        raise typer.BadParameter(f"'{text}' ends before it begins", param_hint="--blocks")
+    return slice(int(first or 0), int(end) if end else None)
+
+
+def _is_number(text: str) -> bool:
+    return text.isascii() and text.isdigit() and len(text) < 19
 
 
 def _shares(text: str) -> dict[str, float]:
@@ -230,18 +304,35 @@ def _patient(quiet: bool) -> Iterator[_Patience]:
             signal.signal(kind, signal.SIG_DFL if handler is None else handler)
 
 
-def _print_summary(job: Job, summary: RunDescription, progress: Progress, out: Path) -> None:
+def _print_part(job: Job, progress: Progress, out: str, *, which: str, rollouts: int) -> None:
+    """Print what became of a part of a run, without reading what others have written."""
+    from dh2sim.simulate.store.reader import open_run
+
+    robot, controller = job.layout.attributes["robot"], printable(str(job.options.controller))
+    print(f"{robot}: {which}, {rollouts:,} rollouts, {controller}, in {printable(out)}")
+    if rollouts:
+        _print_speed(job, progress)
+    run = open_run(out)
+    done, count = len(run.recorded_blocks()), run.manifest.blocks
+    print(f"  the run has {done:,} of {count:,} blocks{': it is complete' if done == count else ''}")
+
+
+def _print_speed(job: Job, progress: Progress) -> None:
+    if not progress.rollouts:
+        print("  all of them were simulated before")
+        return
+    rate = progress.rollouts * job.options.steps / progress.seconds
+    took = f"{progress.seconds:.1f}" if progress.seconds >= 1.0 else f"{progress.seconds:.2g}"
+    print(f"  simulated {progress.rollouts:,} in {took} s: {rate:,.0f} steps/s")
+
+
+def _print_summary(job: Job, summary: RunDescription, progress: Progress, out: str) -> None:
     options = job.options
     print(
         f"{summary.robot}: {summary.rollouts:,} rollouts of {summary.steps:,} steps ({summary.duration:g} s), "
-        f"{printable(str(options.controller))}, in {printable(str(out))}"
+        f"{printable(str(options.controller))}, in {printable(out)}"
     )
-    if progress.rollouts:
-        rate = progress.rollouts * options.steps / progress.seconds
-        took = f"{progress.seconds:.1f}" if progress.seconds >= 1.0 else f"{progress.seconds:.2g}"
-        print(f"  simulated {progress.rollouts:,} in {took} s: {rate:,.0f} steps/s")
-    else:
-        print("  all of them were simulated before")
+    _print_speed(job, progress)
     recorded = [each.name for each in job.layout.variables if {"step", "interval"} & {*each.dimensions}]
     print(f"  recorded {', '.join(recorded)}: {size_text(summary.bytes_on_disk)}")
     counts = [f"finished {summary.finished:,}"]

@@ -5,17 +5,17 @@ from __future__ import annotations
 import json
 import sys
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import complain
+from dh2sim.cli.common import DONE, FELL_SHORT, complain
 from dh2sim.cli.output import make_console, progress_bar, size_text
 from dh2sim.errors import Dh2simError
-from dh2sim.messages import did_you_mean, printable
+from dh2sim.messages import did_you_mean, listed, printable
 
 if TYPE_CHECKING:
     from dh2sim.simulate.description import RunDescription
@@ -26,13 +26,17 @@ SHOWN = 5
 
 
 def runs(
-    paths: Annotated[list[Path], typer.Argument(metavar="RUN.zarr", help="Runs made by 'dh2sim rollout'.")],
+    paths: Annotated[list[str], typer.Argument(metavar="RUN.zarr", help="Runs made by 'dh2sim rollout'.")],
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON alone: an object for one run, a list for several.")
     ] = False,
     to: Annotated[
         str | None, typer.Option("--to", metavar="parquet|hdf5", help="Convert to this format instead of describing.")
     ] = None,
+    verify: Annotated[
+        bool,
+        typer.Option("--verify", help="Read every chunk, and fail unless all blocks are there and what was written."),
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -41,11 +45,11 @@ def runs(
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite existing files.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
-) -> None:
+) -> int:
     """Describe runs, or convert them to other formats.
 
     Prints robot, controller, the number of rollouts and which of them stopped early, what is recorded, size, speed
-    and versions, and how to continue a run that is not complete.
+    and versions, and how to continue a run that is not complete, and which of its blocks are missing.
 
     Parquet makes three tables: FILE has a row for every rollout, step and joint, and beside it are FILE's
     .steps.parquet and .rollouts.parquet. HDF5 makes one file, which xarray reads as the same dataset (netCDF-4).
@@ -54,6 +58,7 @@ def runs(
     Examples:
       dh2sim runs run.zarr
       dh2sim runs *.zarr --json
+      dh2sim runs run.zarr --verify
       dh2sim runs run.zarr --to parquet
       dh2sim runs run.zarr --to hdf5 --out results/run.h5
     """
@@ -61,8 +66,9 @@ def runs(
         if out is not None or overwrite:
             option = "--overwrite" if out is None else "--out"
             raise typer.BadParameter("only with --to: without it nothing is written", param_hint=option)
-        _describe(paths, as_json=as_json)
-        return
+        return _describe(paths, as_json=as_json, verify=verify)
+    if verify:
+        raise typer.BadParameter("not with --to", param_hint="--verify")
     if to not in FORMATS:
         guess = did_you_mean(to, FORMATS)
         raise typer.BadParameter(f"unknown format '{to}'.{guess} Allowed: {', '.join(FORMATS)}", param_hint="--to")
@@ -71,28 +77,38 @@ def runs(
     if out is not None and len(paths) > 1:
         raise typer.BadParameter("is one file; convert one run at a time", param_hint="--out")
     _convert(paths, to, out, overwrite=overwrite, quiet=quiet)
+    return DONE
 
 
-def _describe(paths: list[Path], *, as_json: bool) -> None:
+def _describe(paths: list[str], *, as_json: bool, verify: bool) -> int:
     from dh2sim.simulate.description import describe
+    from dh2sim.simulate.store.reader import damaged_blocks
 
     descriptions: list[RunDescription] = []
     errors: list[Dh2simError] = []
+    sound = True
     for path in paths:
         try:
+            damaged = damaged_blocks(path) if verify else []
+            if damaged:
+                sound = False
+                complain(f"'{path}': {_blocks_text(damaged)} damaged; resume it to compute them again")
+                continue
             descriptions.append(describe(path))
         except Dh2simError as error:
             errors.append(error)
+    sound &= not verify or all(description.complete for description in descriptions)
     if as_json:
-        if not errors:
+        if not errors and len(descriptions) == len(paths):
             values = [description.to_json() for description in descriptions]
             print(json.dumps(values[0] if len(values) == 1 else values, indent=2))
     else:
         for number, description in enumerate(descriptions):
             if number:
                 print()
-            _print(description)
+            _print(description, verified=verify)
     _raise_last(errors)
+    return DONE if sound else FELL_SHORT
 
 
 def _raise_last(errors: list[Dh2simError]) -> None:
@@ -102,14 +118,14 @@ def _raise_last(errors: list[Dh2simError]) -> None:
         raise errors[-1]
 
 
-def _convert(paths: list[Path], to: str, out: Path | None, *, overwrite: bool, quiet: bool) -> None:
+def _convert(paths: list[str], to: str, out: Path | None, *, overwrite: bool, quiet: bool) -> None:
     from dh2sim.simulate.convert.hdf5 import to_hdf5
     from dh2sim.simulate.convert.parquet import to_parquet
     from dh2sim.simulate.description import describe
 
     convert = {"parquet": to_parquet, "hdf5": to_hdf5}[to]
     for summary in [describe(path) for path in paths]:
-        path = Path(summary.path)
+        path = summary.path
         target = _beside(path, FORMATS[to]) if out is None else out
         with progress_bar("converting", "rollouts", summary.rollouts, quiet=quiet) as advance:
             written = convert(path, target, overwrite=overwrite, advance=advance)
@@ -118,24 +134,39 @@ def _convert(paths: list[Path], to: str, out: Path | None, *, overwrite: bool, q
                 print(f"{printable(str(file))}  {size_text(file.stat().st_size)}", flush=True)
         if summary.not_run:
             print(
-                f"dh2sim: {summary.not_run:,} of {summary.rollouts:,} rollouts of '{printable(str(path))}' are "
+                f"dh2sim: {summary.not_run:,} of {summary.rollouts:,} rollouts of '{printable(path)}' are "
                 "not run yet; their numbers are missing in what was written",
                 file=sys.stderr,
             )
 
 
-def _beside(run: Path, suffix: str) -> Path:
-    named = run if run.name not in ("", "..") else run.resolve()
+def _beside(run: str, suffix: str) -> Path:
+    """Return a file beside a run; for one in an object store, a file in the current folder."""
+    named = Path(run.rpartition("/")[2] if "://" in run else run)
+    if named.name in ("", ".."):
+        named = named.resolve()
     return named.with_name(named.name.removesuffix(".zarr") + suffix)
 
 
-def _print(description: RunDescription) -> None:
+def _blocks_text(blocks: Sequence[int]) -> str:
+    """Return numbers of blocks with the verb: 'block 3 is', 'blocks 3, 5 to 8 are'."""
+    spans: list[list[int]] = []
+    for block in blocks:
+        if spans and spans[-1][1] == block - 1:
+            spans[-1][1] = block
+        else:
+            spans.append([block, block])
+    texts = [str(first) if first == last else f"{first} to {last}" for first, last in spans]
+    return f"block {texts[0]} is" if len(blocks) == 1 else f"blocks {listed(texts)} are"
+
+
+def _print(description: RunDescription, *, verified: bool) -> None:
     from rich.text import Text
 
     console = make_console()
     verdict = ("complete", "bold green") if description.complete else ("not complete", "bold yellow")
     console.print(Text.assemble((printable(description.path), "bold"), "  ", verdict), soft_wrap=True)
-    for title, lines in _sections(description):
+    for title, lines in _sections(description, verified=verified):
         for number, line in enumerate(lines):
             wrapped = textwrap.wrap(
                 printable(line),
@@ -148,7 +179,7 @@ def _print(description: RunDescription) -> None:
             console.print(Text("\n".join(wrapped)), soft_wrap=True)
 
 
-def _sections(description: RunDescription) -> Iterator[tuple[str, list[str]]]:
+def _sections(description: RunDescription, *, verified: bool) -> Iterator[tuple[str, list[str]]]:
     yield "robot", [description.robot]
     yield "controller", [description.controller]
     changes = ", ".join(f"{name} ±{100 * share:g} %" for name, share in description.randomize.items())
@@ -163,6 +194,8 @@ def _sections(description: RunDescription) -> Iterator[tuple[str, list[str]]]:
             *clipped_controls(description),
         ],
     )
+    if not description.complete or verified:
+        yield "blocks", [_blocks_done(description, verified=verified)]
     every = "every one" if description.every == 1 else f"one in {description.every}"
     yield (
         "steps",
@@ -189,6 +222,12 @@ def _moment(created: str) -> str:
         return f"{datetime.fromisoformat(created).astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
     except ValueError:
         return created
+
+
+def _blocks_done(description: RunDescription, *, verified: bool) -> str:
+    done = f"{description.blocks_done:,} of {description.blocks:,} done{' and verified' if verified else ''}"
+    missing = description.blocks_missing
+    return f"{done}; {_blocks_text(missing)} missing" if missing else done
 
 
 def _counts(description: RunDescription) -> str:

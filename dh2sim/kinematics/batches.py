@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final, Literal, TypeAlias, TypedDict
@@ -13,6 +12,7 @@ from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.batch_frame import BLOCK
 from dh2sim.kinematics.straight_line import JACOBIAN, Kind
 from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.processors import available_processors
 from dh2sim.typing import Array
 
 THREADED: Final = 20_000
@@ -64,7 +64,7 @@ def thread_count(threads: int) -> int:
         raise ConfigurationError(f"threads must be a whole number, 0 for all processors, got {threads!r}")
     if threads:
         return int(threads)
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return available_processors()
 
 
 def require_shape(out: Array, shape: tuple[int, ...]) -> Array:

@@ -11,6 +11,7 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from dh2sim.errors import ControllerError
+from dh2sim.processors import available_processors
 from dh2sim.robot.variation import CELLS
 from dh2sim.simulate.batch import BatchObservation, GravityForces, MonitoredBatch
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, OpenLoop, RolloutBatch
@@ -59,7 +60,7 @@ def simulate_block(
     Args:
         job: The run.
         rollouts: Which of its rollouts.
-        threads: Number of threads, 0 for all processors; the result does not depend on it.
+        threads: Number of threads, 0 for one a processor that this process may use; the result does not depend on it.
         advance: Called with the number of rollouts that have been simulated since the last call.
 
     Returns:
@@ -70,6 +71,7 @@ def simulate_block(
     """
     arrays = _empty(job, rollouts)
     made: dict[int, DesignPlant] = {}
+    threads = threads or available_processors()
     with quiet_engine():
         for first in range(rollouts.start, rollouts.stop, BATCH_SIZE):
             part = range(first, min(first + BATCH_SIZE, rollouts.stop))

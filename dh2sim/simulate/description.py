@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
+import re
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
-from os import PathLike
-from pathlib import Path
+from os import PathLike, fspath
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.simulate.contacts import NO_CONTACT
 from dh2sim.simulate.dataset_layout import FINISHED, NOT_RUN, STATUS
-from dh2sim.simulate.store.reader import StoredRun, open_run
+from dh2sim.simulate.store.reader import StoredRun, open_run, reading
+
+_OF_A_PART: Final = re.compile(r"--(share|blocks)(=|$)")
+"""Options that choose a part of a run's blocks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,6 +102,8 @@ class RunDescription:
     bytes_on_disk: int
     blocks: int
     blocks_done: int
+    blocks_missing: tuple[int, ...]
+    """Those that are not committed."""
     seconds: float
     """Wall time of all committed blocks, s."""
     steps_per_second: float | None
@@ -134,19 +139,18 @@ def describe(path: str | PathLike[str]) -> RunDescription:
         RunError: There is no run.
         RunDamagedError: What is read is damaged, or a chunk is missing.
     """
-    run = open_run(Path(path))
+    run = open_run(path)
     run.check_coordinates()
     run.check_chunks()
     manifest, attributes = run.manifest, run.manifest.attributes
     settings, timestep, command = attributes["settings"], attributes["timestep"], str(attributes["command"])
     status, stop_step, saturation = (run.values(name) for name in ("status", "stop_step", "saturation"))
     done = np.zeros(manifest.rollouts, dtype=bool)
-    seconds = []
-    for block in run.recorded_blocks():
-        record = run.committed(block)
-        if record is not None:
-            done[manifest.part(block)] = True
-            seconds.append(record.seconds)
+    with reading(path):
+        committed = run.committed(run.recorded_blocks())
+    for block in committed:
+        done[manifest.part(block)] = True
+    seconds = [record.seconds for record in committed.values()]
     status = np.where(done, status, NOT_RUN)
     contact_step = None
     if "contact_step" in manifest.variables:
@@ -157,7 +161,7 @@ def describe(path: str | PathLike[str]) -> RunDescription:
     names = {value: name for name, value in STATUS.items()}
     sizes = [math.prod(stored.shape) * np.dtype(stored.dtype).itemsize for stored in manifest.variables.values()]
     return RunDescription(
-        path=str(path),
+        path=fspath(path),
         robot=attributes["robot"],
         controller=settings["controller"],
         rollouts=manifest.rollouts,
@@ -175,9 +179,10 @@ def describe(path: str | PathLike[str]) -> RunDescription:
         every=settings["every"],
         duration=settings["steps"] * timestep,
         variables=tuple(manifest.variables),
-        bytes_on_disk=sum(file.stat().st_size for file in run.path.rglob("*") if file.is_file()),
+        bytes_on_disk=run.bytes_stored(),
         blocks=manifest.blocks,
         blocks_done=len(seconds),
+        blocks_missing=tuple(block for block in range(manifest.blocks) if block not in committed),
         seconds=sum(seconds),
         steps_per_second=steps / sum(seconds) if sum(seconds) else None,
         seed=settings["seed"],
@@ -241,12 +246,16 @@ def _by_joint(run: StoredRun, clipped: NDArray[np.bool_]) -> dict[str, int]:
 
 
 def resumed(command: str) -> str:
-    """Return the command that resumes a run which another command began."""
+    """Return the command that resumes a run which another command began, all of it."""
     try:
         words = shlex.split(command)
     except ValueError:
         return f"{command} --resume"
-    kept = [word for word in words if word not in ("--overwrite", "--resume")]
+    kept, skipped = [], False
+    for word in words:
+        if not skipped and word not in ("--overwrite", "--resume") and not _OF_A_PART.match(word):
+            kept.append(word)
+        skipped = not skipped and word in ("--share", "--blocks")
     return shlex.join([*kept, "--resume"])
 
 

@@ -1,13 +1,12 @@
-"""Runs in memory and on disk; on disk each block is written while the next one is simulated."""
+"""Runs in memory and in stores, where each block is written while the next one is simulated."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
@@ -27,6 +26,7 @@ from dh2sim.simulate.prepare import prepare
 if TYPE_CHECKING:
     import xarray as xr
 
+    from dh2sim.simulate.store.storage import Place
     from dh2sim.simulate.store.writer import RunWriter
 
 
@@ -53,7 +53,7 @@ class Progress:
     """How far a run has come."""
 
     finished: bool
-    """Whether all blocks are written; False if the run was stopped before."""
+    """Whether all blocks that were asked for are written; False if the run was stopped before."""
     rollouts: int
     """Number of rollouts simulated and written this time."""
     seconds: float
@@ -67,6 +67,9 @@ def rollout(
     threads: int = 0,
     resume: bool = False,
     overwrite: bool = False,
+    share: tuple[int, int] | None = None,
+    blocks: Sequence[int] | None = None,
+    block_size: int | None = None,
     advance: Advance | None = None,
     **options: Unpack[RolloutKeywords],
 ) -> xr.Dataset:
@@ -74,10 +77,16 @@ def rollout(
 
     Args:
         robot: The robot, or its file or name.
-        out: Folder to write the run to, by convention named ``….zarr``; None to keep it in memory.
-        threads: Number of threads, 0 for one a processor. The result does not depend on it.
+        out: Folder to write the run to, by convention named ``….zarr``, or ``s3://BUCKET/NAME.zarr``; None to keep
+            it in memory.
+        threads: Number of threads, 0 for one a processor that this process may use. The result does not depend on it.
         resume: Whether to continue the run at ``out``, if there is one.
         overwrite: Whether to replace the run at ``out``.
+        share: ``(i, n)``: simulate only the i-th of n shares of the run's blocks, i from 1 to n, beside any number of
+            other processes that do so with the same options. Who comes first makes the run.
+        blocks: The same for these blocks, from 0.
+        block_size: Rollouts in a block, which is written as a whole; by default some seconds' work, at most 64 MB.
+            A run that exists keeps its own.
         advance: Called with the number of rollouts that are done since the last call.
         **options: What is simulated and recorded, the fields of ``RolloutOptions``: ``rollouts`` (256), ``steps`` or
             ``duration`` (2 s), ``timestep`` (0.002 s), ``integrator``, ``controller`` ('sine'), ``start`` ('home'),
@@ -96,8 +105,10 @@ def rollout(
     """
     require_extra("data", "xarray", what="a run as an xarray dataset")
     checked = RolloutOptions(**options)
-    job = prepare(_model_of(robot), checked)
+    job = with_block_size(prepare(_model_of(robot), checked), block_size)
     if out is None:
+        if share is not None or blocks is not None:
+            raise SettingsError([("share" if blocks is None else "blocks", "must be given together with out")])
         try:
             arrays = simulate_block(job, range(job.options.rollouts), threads=threads, advance=advance)
         except MemoryError as error:
@@ -107,9 +118,12 @@ def rollout(
         return to_dataset(job.layout, arrays)
     from dh2sim.simulate.store.reader import open_dataset
 
-    with open_run(job, Path(out), resume=resume, overwrite=overwrite) as writer:
-        fill(writer, job, threads=threads, advance=advance)
-    return open_dataset(Path(out))
+    check_share(share, alone=blocks is None)
+    part = share is not None or blocks is not None
+    with open_run(job, out, resume=resume, overwrite=overwrite, join=part) as writer:
+        chosen = choose_blocks(writer.layout.blocks, share=share, blocks=blocks)
+        fill(writer, job, blocks=chosen, threads=threads, advance=advance)
+    return open_dataset(out)
 
 
 def _model_of(robot: ModelLike | MechanismModel | str | PathLike[str]) -> RobotModel | MechanismModel:
@@ -120,11 +134,74 @@ def _model_of(robot: ModelLike | MechanismModel | str | PathLike[str]) -> RobotM
     return build_mechanism(spec) if spec.is_mechanism else model_of(given)
 
 
-def open_run(job: Job, path: Path, *, resume: bool = False, overwrite: bool = False) -> RunWriter:
-    """Create a run on disk, or open one to continue it.
+def with_block_size(job: Job, block_size: int | None) -> Job:
+    """Return a job with other blocks, which do not change its numbers; None: with the same.
 
     Raises:
-        SettingsError: Both ``resume`` and ``overwrite`` are given.
+        SettingsError: Blocks would be empty, or too large to be kept in memory.
+    """
+    if block_size is None:
+        return job
+    most = job.layout.block
+    if isinstance(block_size, bool) or not isinstance(block_size, int) or not 1 <= block_size <= most:
+        problem = f"must be a whole number from 1 to {most:,} (some seconds' work, or 64 MB), got {block_size!r}"
+        raise SettingsError([("block_size", problem)])
+    return replace(job, layout=replace(job.layout, block=block_size))
+
+
+def check_share(share: tuple[int, int] | None, *, alone: bool) -> None:
+    """Check that there is such a share, before a run is made.
+
+    Args:
+        share: ``(i, n)``, or None.
+        alone: Whether no blocks are named besides.
+
+    Raises:
+        SettingsError: There is none, or blocks are named as well.
+    """
+    if share is None:
+        return
+    if not alone:
+        raise SettingsError([("share", "must not be given together with blocks")])
+    index, shares = share
+    if not 1 <= index <= shares:
+        allowed = "1/1" if shares <= 1 else f"one of 1/{shares} to {shares}/{shares}"
+        raise SettingsError([("share", f"must be {allowed}, got {index}/{shares}")])
+
+
+def choose_blocks(
+    count: int, *, share: tuple[int, int] | None = None, blocks: Sequence[int] | None = None
+) -> Sequence[int]:
+    """Return the blocks of a share of a run of ``count`` blocks, those that are named, or all.
+
+    Raises:
+        SettingsError: Both are given, there is no such share, or the run has no such block.
+    """
+    check_share(share, alone=blocks is None)
+    if share is not None:
+        return range(share[0] - 1, count, share[1])
+    if blocks is None:
+        return range(count)
+    wrong = [block for block in blocks if not 0 <= block < count]
+    if wrong:
+        raise SettingsError([("blocks", f"must be from 0 to {count - 1}, got {wrong[0]}")])
+    return blocks
+
+
+def open_run(
+    job: Job, path: Place, *, resume: bool = False, overwrite: bool = False, join: bool = False
+) -> RunWriter:
+    """Create a run, open one to continue it, or join others that write to it.
+
+    Args:
+        job: The run.
+        path: Its folder, or its place in an object store.
+        resume: Whether to continue it, every block verified.
+        overwrite: Whether to replace it.
+        join: Whether to write to it beside others, who may have made it.
+
+    Raises:
+        SettingsError: Options are given that exclude each other.
         RunError: There is something else, or a run with other options.
         OutputError: It cannot be written.
     """
@@ -132,6 +209,11 @@ def open_run(job: Job, path: Path, *, resume: bool = False, overwrite: bool = Fa
 
     if resume and overwrite:
         raise SettingsError([("resume", "must not be given together with overwrite")])
+    if join and overwrite:
+        problem = "must not be given with a part of the blocks: each part would remove what the others have written"
+        raise SettingsError([("overwrite", problem)])
+    if join:
+        return RunWriter.join(path, job.layout)
     if resume:
         return RunWriter.resume(path, job.layout)
     return RunWriter.create(path, job.layout, overwrite=overwrite)
@@ -141,15 +223,17 @@ def fill(
     writer: RunWriter,
     job: Job,
     *,
+    blocks: Sequence[int] | None = None,
     threads: int = 0,
     advance: Advance | None = None,
     stopping: Callable[[], bool] = lambda: False,
 ) -> Progress:
-    """Simulate every block that is missing from a run.
+    """Simulate every block that is missing from a run, or from some of its blocks.
 
     Args:
         writer: Writes to the run.
         job: The run.
+        blocks: Those to look at; None: all.
         threads: Number of threads, 0 for one a processor.
         advance: Called with the number of rollouts that are done; those of an earlier run count at once.
         stopping: Called before every block; the run stops there if it returns True.
@@ -159,16 +243,21 @@ def fill(
         OutputError: A block cannot be written; those before it are safe.
     """
     report = advance or (lambda _: None)
-    pending = writer.pending()
-    report(job.options.rollouts - sum(len(writer.layout.rollouts(block)) for block in pending))
-    done = 0
+    chosen = range(writer.layout.blocks) if blocks is None else blocks
+    pending = writer.pending(chosen)
+    report(sum(len(writer.layout.rollouts(block)) for block in {*chosen} - {*pending}))
+    done, finished = 0, True
     start = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as pool:
         written: Future[None] | None = None
         for block in pending:
             if stopping():
+                finished = False
                 break
             rollouts = writer.layout.rollouts(block)
+            if not writer.pending([block]):  # another process was quicker
+                report(len(rollouts))
+                continue
             started = time.perf_counter()
             arrays = simulate_block(job, rollouts, threads=threads, advance=report)
             seconds = time.perf_counter() - started
@@ -179,8 +268,4 @@ def fill(
             done += len(rollouts)
         if written is not None:
             written.result()
-    return Progress(
-        finished=done == sum(len(writer.layout.rollouts(block)) for block in pending),
-        rollouts=done,
-        seconds=time.perf_counter() - start,
-    )
+    return Progress(finished=finished, rollouts=done, seconds=time.perf_counter() - start)

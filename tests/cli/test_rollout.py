@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 import pty
 import re
@@ -295,7 +296,7 @@ def test_every_example_of_the_help_works(folder: Path) -> None:
     write(folder, small("my_arm"))
     lines = dh2sim("rollout", "--help").out.split("Examples:\n")[1].split("  Then:")[0].splitlines()
     commands = [line.split()[1:] for line in lines if line.strip()]
-    assert len(commands) == 6
+    assert len(commands) == 7
     for number, command in enumerate(commands):
         at = command.index("--out") + 1
         run = dh2sim(*command[:at], f"{number}.zarr", *command[at + 1 :], *QUICK)
@@ -312,3 +313,56 @@ def test_help_of_the_command_simulates_nothing_and_imports_nothing_heavy() -> No
         [sys.executable, "-c", script], env=environment(), capture_output=True, text=True, timeout=60, check=True
     )
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+SHARED = ("planar_2r", "--rollouts", "10", "--steps", "4", "--block-size", "2", "--out", "run.zarr")
+
+
+def test_shares_in_any_order_make_the_run_of_one_process(folder: Path) -> None:
+    done = dh2sim("rollout", *SHARED, "--share", "2/3")
+    assert (done.status, done.err) == (0, "")
+    assert re.search(r"^planar_2r: 2 of 5 blocks, 4 rollouts, sine, in run.zarr\n  simulated 4 in ", done.out)
+    assert done.out.endswith("\n  the run has 2 of 5 blocks\n")
+    described = json.loads(dh2sim("runs", "run.zarr", "--json").out)
+    assert described["blocks_missing"] == [0, 2, 3]
+    incomplete = dh2sim("runs", "run.zarr", "--verify")
+    assert incomplete.status == 1
+    assert "  blocks      2 of 5 done and verified; blocks 0, 2 to 3 are missing\n" in incomplete.out
+    assert dh2sim("rollout", *SHARED, "--blocks", "2:4").status == 0
+    last = dh2sim("rollout", *SHARED, "--share", "1/1", "--json")
+    assert json.loads(last.out)["complete"]
+    assert "the run has 5 of 5 blocks: it is complete" in last.err
+    verified = dh2sim("runs", "run.zarr", "--verify")
+    assert verified.status == 0
+    assert "  blocks      5 of 5 done and verified\n" in verified.out
+    assert dh2sim("rollout", *SHARED[:-1], "one.zarr", "-q").status == 0
+    shared, one = (
+        {name: data for name, data in contents(Path(run)).items() if "/c." in name and "record" not in name}
+        for run in ("run.zarr", "one.zarr")
+    )
+    assert shared == one
+    chunk = Path("run.zarr/qpos/c.3.0.0")
+    chunk.write_bytes(chunk.read_bytes()[:-9] + bytes(9))
+    damaged = dh2sim("runs", "run.zarr", "--verify")
+    assert (damaged.status, damaged.out) == (1, "")
+    assert damaged.err == "dh2sim: 'run.zarr': block 3 is damaged; resume it to compute them again\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "reported"),
+    [
+        (("--share", "4/3"), "dh2sim: --share must be one of 1/3 to 3/3, got 4/3\n"),
+        (("--share", "0/1"), "dh2sim: --share must be 1/1, got 0/1\n"),
+        (("--share", "1-3"), "'1-3' is not of the form I/N, as in 3/16"),
+        (("--blocks", "a:b"), "'a:b' is not of the form A:B, as in 10:20"),
+        (("--blocks", "4:2"), "'4:2' ends before it begins"),
+        (("--share", "1/2", "--blocks", "1:2"), "dh2sim: --share must not be given together with --blocks\n"),
+        (("--share", "1/2", "--overwrite"), "dh2sim: --overwrite must not be given with a part of the blocks"),
+        (("--block-size", "11"), "dh2sim: --block-size must be a whole number from 1 to 10 "),
+    ],
+)
+def test_a_share_that_cannot_be_makes_no_run(folder: Path, options: tuple[str, ...], reported: str) -> None:
+    refused = dh2sim("rollout", *SHARED, *options)
+    assert (refused.status, refused.out) == (2, "")
+    assert reported in refused.err
+    assert not Path("run.zarr").exists()

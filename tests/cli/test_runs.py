@@ -124,6 +124,7 @@ def test_json_tells_the_same_alone(run: Path, arrays: Arrays) -> None:
         "bytes_in_memory": sum(array.nbytes for array in arrays.values()),
         "blocks": 3,
         "blocks_done": 3,
+        "blocks_missing": [],
         "seconds": SECONDS,
         "steps_per_second": STEPS / SECONDS,
         "seed": 0,

@@ -40,6 +40,7 @@ def test_a_finished_run_is_described(tmp_path: Path) -> None:
         "bytes_on_disk": sum(map(len, contents(path).values())),
         "blocks": 3,
         "blocks_done": 3,
+        "blocks_missing": [],
         "seconds": 0.75,
         "steps_per_second": (6 * 8 + 3) / 0.75,
         "seed": 0,
@@ -81,6 +82,7 @@ def test_rollouts_of_a_block_that_is_not_committed_count_as_not_run(tmp_path: Pa
     summary = describe(path)
     assert (summary.finished, summary.unstable, summary.not_run) == (2, 1, 4)
     assert (summary.blocks_done, summary.blocks, summary.seconds) == (1, 3, 0.25)
+    assert summary.blocks_missing == (0, 2)
 
 
 def test_a_chunk_that_is_missing_is_an_error(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from dh2sim.messages import closest, listed
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.controllers.reference import read_reference
 from dh2sim.simulate.dataset_layout import FORMAT
+from dh2sim.simulate.store.local import LocalStore
 from dh2sim.simulate.store.manifest import check_array
 from dh2sim.typing import Array, read_only
 
@@ -138,9 +139,10 @@ def read_run(path: Path, file: str, kind: str) -> Recording:
         if not (path / variable).is_dir():
             what = "positions" if positions else "controls"
             raise ControllerError(f"'{file}' has recorded no {what}; run it again with '{variable}' in record")
-        check_array(path / variable)
+        store = LocalStore(path)
+        check_array(store, variable)
         for array, most in ((labels, MOST_LABELS), ("joint", MOST_LABELS), (instants, MOST_INSTANTS)):
-            check_array(path / array, most=most)
+            check_array(store, array, most=most)
         names = tuple(str(name) for name in run[labels][:])
         joints = len(run["joint"][:])
         times = read_only(run[instants][:])

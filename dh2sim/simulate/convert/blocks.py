@@ -14,7 +14,10 @@ import numpy as np
 
 from dh2sim.errors import OutputError, RunDamagedError
 from dh2sim.files import atomic_files
+from dh2sim.simulate.store.local import LocalStore
+from dh2sim.simulate.store.places import open_store
 from dh2sim.simulate.store.reader import StoredRun, damaged_run, open_dataset, open_run, reading
+from dh2sim.simulate.store.storage import Place
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,18 +37,19 @@ class RunBlocks:
         Raises:
             RunDamagedError: A chunk is damaged.
         """
+        committed = self.stored.committed(range(self.stored.manifest.blocks))
         for block in range(self.stored.manifest.blocks):
             rollouts = self.stored.manifest.part(block)
             part = self.dataset.isel(rollout=rollouts)
-            if self.stored.committed(block) is not None:
-                with reading(self.stored.path):
+            if block in committed:
+                with reading(self.stored.store.name):
                     part = part.load()
             else:
                 part = _blank(part)
             yield range(rollouts.start, rollouts.stop), part
 
 
-def open_blocks(path: Path) -> RunBlocks:
+def open_blocks(path: Place) -> RunBlocks:
     """Open a run.
 
     Raises:
@@ -84,7 +88,7 @@ def no_progress(_rollouts: int) -> None:
 
 
 @contextmanager
-def output_files(paths: Sequence[Path], *, run: Path, overwrite: bool) -> Iterator[list[Path]]:
+def output_files(paths: Sequence[Path], *, run: Place, overwrite: bool) -> Iterator[list[Path]]:
     """Yield temporary files to write to; when the block ends well they become ``paths``, all or none.
 
     Args:
@@ -96,8 +100,9 @@ def output_files(paths: Sequence[Path], *, run: Path, overwrite: bool) -> Iterat
         OutputError: A file exists or cannot be written; what was there is unchanged.
     """
     folder = paths[0].parent
-    if folder.resolve().is_relative_to(run.resolve()):
-        raise OutputError(f"'{paths[0]}' would be inside the run '{run}'; name a file elsewhere")
+    store = open_store(run)
+    if isinstance(store, LocalStore) and folder.resolve().is_relative_to(store.path.resolve()):
+        raise OutputError(f"'{paths[0]}' would be inside the run '{store.name}'; name a file elsewhere")
     _refuse_existing(paths, overwrite=overwrite)
     with atomic_files(folder) as staging:
         yield [staging / path.name for path in paths]

@@ -15,6 +15,7 @@ import numpy as np
 from dh2sim.extras import require_extra
 from dh2sim.files import signals_deferred
 from dh2sim.simulate.convert.blocks import RunBlocks, attribute_text, no_progress, open_blocks, output_files, plain
+from dh2sim.simulate.store.storage import Place
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -29,7 +30,7 @@ LEVEL = 1
 
 
 def to_hdf5(
-    path: Path,
+    path: Place,
     out: Path,
     *,
     overwrite: bool = False,

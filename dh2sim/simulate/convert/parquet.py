@@ -22,6 +22,7 @@ from dh2sim.simulate.convert.blocks import (
     plain,
     refuse_folder,
 )
+from dh2sim.simulate.store.storage import Place
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -45,7 +46,7 @@ def parquet_files(out: Path) -> tuple[Path, Path, Path]:
 
 
 def to_parquet(
-    path: Path,
+    path: Place,
     out: Path,
     *,
     overwrite: bool = False,

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import struct
-from pathlib import Path
 from typing import Any, Final
 
 import google_crc32c
@@ -13,7 +11,7 @@ from numcodecs.blosc import Blosc  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from zarr.codecs import BloscCodec, Crc32cCodec
 
-from dh2sim.files import open_plain_file
+from dh2sim.simulate.store.storage import Store
 
 CODECS: Final = (BloscCodec(cname="lz4", clevel=3, shuffle="shuffle"), Crc32cCodec())
 """The codecs of variables in zarr's terms; ``encode`` writes the same bytes."""
@@ -21,7 +19,6 @@ LARGEST_CHUNK: Final = 2**31 - 2**16
 """Bytes that Blosc can compress at once, rounded down."""
 CHECKSUM_BYTES: Final = 4
 _BLOSC: Final = Blosc(cname="lz4", clevel=3, shuffle=Blosc.SHUFFLE)
-_PIECE: Final = 4 * 2**20
 ITEM_SIZES: Final = {"int8": 1, "int32": 4, "int64": 8, "float32": 4, "float64": 8, "string": 8}
 """Bytes of an item of every type that arrays of a run have; of text those that lengths take, twice."""
 READABLE_CODECS: Final = frozenset(("bytes", "blosc", "zstd", "gzip", "crc32c", "vlen-utf8"))
@@ -80,28 +77,25 @@ def decode_text(chunk: bytes) -> str | None:
     return data[8:].decode()
 
 
-def stored_checksum(path: Path) -> int | None:
-    """Return the checksum at the end of a chunk file, unverified; None if the file is missing or too short."""
+def stored_checksum(store: Store, key: str) -> int | None:
+    """Return the checksum at the end of a chunk, unverified; None if the chunk is missing or too short."""
     try:
-        with open_plain_file(path) as file:
-            file.seek(-CHECKSUM_BYTES, os.SEEK_END)
-            return int.from_bytes(file.read(CHECKSUM_BYTES), "little")
+        found = store.get(key, most=CHECKSUM_BYTES, last=CHECKSUM_BYTES)
     except OSError:
         return None
+    return int.from_bytes(found, "little") if len(found) == CHECKSUM_BYTES else None
 
 
-def verified_checksum(path: Path) -> int | None:
-    """Return the checksum at the end of a chunk file; None if the file is missing or differs from its checksum."""
+def verified_checksum(store: Store, key: str) -> int | None:
+    """Return the checksum at the end of a chunk; None if the chunk is missing or differs from its checksum."""
+    checksum, held = 0, b""
     try:
-        with open_plain_file(path) as file:
-            left = os.fstat(file.fileno()).st_size - CHECKSUM_BYTES
-            checksum = 0
-            while left > 0:
-                piece = file.read(min(left, _PIECE))
-                if not piece:
-                    return None
-                checksum = google_crc32c.extend(checksum, piece)
-                left -= len(piece)
-            return checksum if file.read() == checksum_bytes(checksum) else None
+        for piece in store.pieces(key):
+            whole = held + piece if len(piece) < CHECKSUM_BYTES else piece
+            if whole is piece:
+                checksum = google_crc32c.extend(checksum, held)
+            checksum = google_crc32c.extend(checksum, whole[:-CHECKSUM_BYTES])
+            held = whole[-CHECKSUM_BYTES:]
     except OSError:
         return None
+    return checksum if held == checksum_bytes(checksum) else None

@@ -17,15 +17,14 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Final
 
 from dh2sim.errors import RunDamagedError, RunError
-from dh2sim.files import read_plain_file
 from dh2sim.messages import listed, shown
 from dh2sim.simulate.dataset_layout import FORMAT as LAYOUT_FORMAT
 from dh2sim.simulate.options import MOST_ROLLOUTS
 from dh2sim.simulate.store.codec import ITEM_SIZES, LARGEST_CHUNK, READABLE_CODECS, is_known
+from dh2sim.simulate.store.storage import Store
 
 FORMAT: Final = 2
 """Version of the manifest and the records."""
@@ -133,34 +132,32 @@ def manifest_attributes(
     return {_STORE_MARK: FORMAT, **names, "digest": _digest(_own(root, names))}
 
 
-def is_run(path: Path) -> bool:
-    """Return whether a folder is a run of dh2sim, even a damaged one.
+def is_run(store: Store) -> bool:
+    """Return whether there is a run of dh2sim, even a damaged one.
 
     Raises:
         RunError: Its metadata may not be read.
     """
-    return _marked(*_group_nodes(path))
+    return _marked(*_group_nodes(store))
 
 
-def read_manifest(path: Path) -> Manifest:
+def read_manifest(store: Store) -> Manifest:
     """Return the manifest of a run.
 
     Raises:
         RunError: There is no run, or it is one of another version of dh2sim.
         RunDamagedError: Its metadata are damaged.
     """
-    if not path.exists():
-        raise RunError(f"there is no '{path}'")
-    root, blocks = _group_nodes(path)
+    root, blocks = _group_nodes(store)
     if not _marked(root, blocks):
-        raise RunError(f"'{path}' is not a run of dh2sim")
+        raise RunError(f"'{store.name}' is not a run of dh2sim" if store.exists() else f"there is no '{store.name}'")
     if root is None or blocks is None:
-        raise damaged_metadata((path if root is None else path / BLOCKS) / METADATA)
+        raise damaged_metadata(store.file(METADATA if root is None else f"{BLOCKS}/{METADATA}"))
     stored, attributes = _attributes(blocks), _attributes(root)
     for version, known in ((stored.get(_STORE_MARK, 1), FORMAT), (attributes.get(_MARK), LAYOUT_FORMAT)):
         if version is not None and version != known:
             raise RunError(
-                f"'{path}' was written by another version of dh2sim: its format is {version!r}, "
+                f"'{store.name}' was written by another version of dh2sim: its format is {version!r}, "
                 f"and this version reads {known}"
             )
     try:
@@ -169,10 +166,10 @@ def read_manifest(path: Path) -> Manifest:
     except (KeyError, TypeError):
         sound = False
     if not sound:
-        raise damaged_metadata(path / METADATA, path / BLOCKS / METADATA)
+        raise damaged_metadata(store.file(METADATA), store.file(f"{BLOCKS}/{METADATA}"))
     nodes = own["consolidated_metadata"]["metadata"]
     if problem := _problem(root, own, stored, attributes):
-        raise RunError(f"'{path}' is not a run as dh2sim writes it: {problem}")
+        raise RunError(f"'{store.name}' is not a run as dh2sim writes it: {problem}")
     return Manifest(
         attributes={name: value for name, value in attributes.items() if name != COORDINATES},
         coordinates={name: _stored_array(nodes[name]) for name in stored["coordinates"]},
@@ -182,7 +179,7 @@ def read_manifest(path: Path) -> Manifest:
     )
 
 
-def damaged_metadata(*files: Path) -> RunDamagedError:
+def damaged_metadata(*files: str) -> RunDamagedError:
     """Return the error for metadata that are not what was written; of several files one is damaged."""
     names = " or ".join(f"'{file}'" for file in files)
     return RunDamagedError(
@@ -191,16 +188,16 @@ def damaged_metadata(*files: Path) -> RunDamagedError:
     )
 
 
-def read_node(file: Path) -> dict[str, Any] | None:
+def read_node(store: Store, key: str) -> dict[str, Any] | None:
     """Return zarr's metadata of a group or an array, or None if they cannot be parsed.
 
     Raises:
         RunError: The file may not be read.
     """
     try:
-        node = json.loads(read_plain_file(file, MOST_METADATA))
+        node = json.loads(store.get(key, most=MOST_METADATA))
     except PermissionError as error:
-        raise RunError(f"cannot read '{file}': {error.strerror}") from error
+        raise RunError(f"cannot read '{store.file(key)}': {error.strerror}") from error
     except (OSError, ValueError, RecursionError):
         return None
     return node if isinstance(node, dict) else None
@@ -234,8 +231,8 @@ class BlockRecord:
         return record if sound and isinstance(record.seconds, float) and 0.0 <= record.seconds < math.inf else None
 
 
-def _group_nodes(path: Path) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
-    return read_node(path / METADATA), read_node(path / BLOCKS / METADATA)
+def _group_nodes(store: Store) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+    return read_node(store, METADATA), read_node(store, f"{BLOCKS}/{METADATA}")
 
 
 def _marked(root: dict[str, Any] | None, blocks: dict[str, Any] | None) -> bool:
@@ -317,17 +314,18 @@ def _shape_problem(node: Any) -> str | None:
     return None
 
 
-def check_array(folder: Path, *, most: int | None = None) -> None:
+def check_array(store: Store, name: str, *, most: int | None = None) -> None:
     """Check an array that dh2sim or xarray wrote, before zarr opens it; its numbers are read by the slice.
 
     Args:
-        folder: Of the array.
+        store: Of the run.
+        name: Of the array.
         most: Items that it may have, where it is to be read as a whole.
 
     Raises:
         RunError: It is none, its codecs are not those that xarray uses, or it is too large.
     """
-    node = read_node(folder / METADATA)
+    node = read_node(store, f"{name}/{METADATA}")
     problem = _shape_problem(node)
     if node is not None and problem is None:
         codecs = node.get("codecs")
@@ -337,7 +335,7 @@ def check_array(folder: Path, *, most: int | None = None) -> None:
         elif most is not None and math.prod(node["shape"]) > most:
             problem = "it is too large"
     if problem is not None:
-        raise RunError(f"'{folder}' cannot be read: {problem}")
+        raise RunError(f"'{store.file(name)}' cannot be read: {problem}")
 
 
 def _whole_numbers(value: Any, least: int) -> bool:

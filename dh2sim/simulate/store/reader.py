@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import os
-import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from os import PathLike
-from pathlib import Path
+from os import fspath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.errors import RunDamagedError, RunError
+from dh2sim.errors import RunDamagedError, RunDiffersError, RunError
 from dh2sim.extras import require_extra
-from dh2sim.files import read_plain_file
 from dh2sim.simulate.store.codec import CHECKSUM_BYTES, ITEM_SIZES, decode_text, stored_checksum, verified_checksum
 from dh2sim.simulate.store.manifest import (
     BLOCKS,
@@ -29,33 +25,37 @@ from dh2sim.simulate.store.manifest import (
     read_manifest,
     read_node,
 )
+from dh2sim.simulate.store.places import open_store
+from dh2sim.simulate.store.storage import Place, Store, run_all
 
 if TYPE_CHECKING:
     import xarray
 
 _MOST_RECORD = 2**20
 """Bytes of a record."""
+_READERS = 16
+"""Threads that read small files, most of which wait."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredRun:
-    """A run on disk: its manifest, and the files of its blocks."""
+    """A run as it is stored: its manifest, and the files of its blocks."""
 
-    path: Path
+    store: Store
     manifest: Manifest
 
-    def chunk(self, variable: str, block: int) -> Path:
-        """Return the file of a variable's chunk."""
-        return self.path / variable / self.manifest.variables[variable].chunk_name(block)
+    def chunk(self, variable: str, block: int) -> str:
+        """Return the key of a variable's chunk."""
+        return f"{variable}/{self.manifest.variables[variable].chunk_name(block)}"
 
-    def record_file(self, block: int) -> Path:
-        """Return the file of the record that commits a block."""
-        return self.path / BLOCKS / RECORD / f"c.{block}"
+    def record_file(self, block: int) -> str:
+        """Return the key of the record that commits a block."""
+        return f"{BLOCKS}/{RECORD}/c.{block}"
 
     def record(self, block: int) -> BlockRecord | None:
         """Return the record of a block, or None if there is no valid one."""
         try:
-            text = decode_text(read_plain_file(self.record_file(block), _MOST_RECORD))
+            text = decode_text(self.store.get(self.record_file(block), most=_MOST_RECORD))
         except OSError:
             return None
         record = None if text is None else BlockRecord.from_text(text)
@@ -63,21 +63,29 @@ class StoredRun:
             return None
         return record
 
-    def committed(self, block: int) -> BlockRecord | None:
-        """Return the record of a block if its chunks are there, else None; they are not read."""
-        return self._matching(block, stored_checksum)
+    def records(self, blocks: Iterable[int]) -> dict[int, BlockRecord]:
+        """Return the valid records of some blocks; their chunks are not looked at."""
+        wanted = list(blocks)
+        return _found(wanted, run_all(self.record, wanted, threads=_READERS))
 
-    def verified(self, block: int) -> BlockRecord | None:
-        """Return the record of a block if its chunks are what was written, else None; reads all of them."""
-        return self._matching(block, verified_checksum)
+    def committed(self, blocks: Iterable[int]) -> dict[int, BlockRecord]:
+        """Return the records of the blocks whose chunks are there; they are not read."""
+        wanted = list(blocks)
+        return _found(wanted, run_all(lambda block: self._matching(block, stored_checksum), wanted, threads=_READERS))
 
-    def _matching(self, block: int, checksum_of: Callable[[Path], int | None]) -> BlockRecord | None:
+    def verified(self, blocks: Iterable[int]) -> dict[int, BlockRecord]:
+        """Return the records of the blocks whose chunks are what was written; reads all of them."""
+        wanted = list(blocks)
+        return _found(wanted, run_all(lambda block: self._matching(block, verified_checksum), wanted))
+
+    def _matching(self, block: int, checksum_of: Callable[[Store, str], int | None]) -> BlockRecord | None:
         record = self.record(block)
         written = {name for name, variable in self.manifest.variables.items() if not variable.empty}
         if record is None or {*record.checksums} != written:
             return None
-        if any(checksum_of(self.chunk(name, block)) != checksum for name, checksum in record.checksums.items()):
-            return None
+        for name, checksum in record.checksums.items():
+            if checksum_of(self.store, self.chunk(name, block)) != checksum:
+                return None
         return record
 
     def check_coordinates(self) -> None:
@@ -87,26 +95,39 @@ class StoredRun:
             RunDamagedError: A file is missing or damaged.
         """
         for name, coordinate in self.manifest.coordinates.items():
-            file = self.path / name / coordinate.chunk_name(0)
-            if not coordinate.empty and verified_checksum(file) is None:
-                raise damaged_metadata(file)
+            file = f"{name}/{coordinate.chunk_name(0)}"
+            if not coordinate.empty and verified_checksum(self.store, file) is None:
+                raise damaged_metadata(self.store.file(file))
 
     def check_files(self) -> None:
         """Check that arrays have folders, and that coordinates have as many bytes as their sizes ask for.
 
-        So no size is believed that nothing on the disk stands for.
+        So no size is believed that nothing stored stands for.
 
         Raises:
             RunDamagedError: A file or folder is missing or differs.
         """
-        arrays = {**self.manifest.coordinates, **self.manifest.variables}
-        for folder in (*(self.path / name for name in arrays), self.path / BLOCKS, self.path / BLOCKS / RECORD):
-            if folder.is_symlink() or not folder.is_dir():
-                raise damaged_metadata(folder / METADATA)
+        folders: dict[str, dict[str, int]] = {}
+        for name in (*self.manifest.coordinates, *self.manifest.variables, BLOCKS, f"{BLOCKS}/{RECORD}"):
+            try:
+                folders[name] = self.store.list(name)
+            except OSError as error:
+                raise damaged_metadata(self.store.file(f"{name}/{METADATA}")) from error
         for name, coordinate in self.manifest.coordinates.items():
-            file = self.path / name / coordinate.chunk_name(0)
-            if not coordinate.empty and not _has_size(file, coordinate):
-                raise damaged_metadata(file)
+            file = coordinate.chunk_name(0)
+            if not coordinate.empty and not _has_size(folders[name].get(file, -1), coordinate):
+                raise damaged_metadata(self.store.file(f"{name}/{file}"))
+
+    def check_unchanged(self) -> None:
+        """Check that the run has not been replaced by another one since it was opened.
+
+        Raises:
+            RunDiffersError: It has, or is gone.
+        """
+        if (read_node(self.store, f"{BLOCKS}/{METADATA}") or {}).get("attributes", {}).get("digest") != (
+            self.manifest.digest
+        ):
+            raise RunDiffersError(f"'{self.store.name}' was replaced or removed while it was written to")
 
     def check_array_metadata(self) -> None:
         """Check that the metadata in the folder of every array are those in the root.
@@ -115,9 +136,9 @@ class StoredRun:
             RunDamagedError: A file is missing or damaged.
         """
         for name, expected in self.manifest.nodes.items():
-            file = self.path / name / METADATA
-            if read_node(file) != expected:
-                raise damaged_metadata(file)
+            file = f"{name}/{METADATA}"
+            if read_node(self.store, file) != expected:
+                raise damaged_metadata(self.store.file(file))
 
     def check_chunks(self) -> None:
         """Check that no chunk of a committed block is missing, without opening any; zarr would read it as blank.
@@ -125,14 +146,13 @@ class StoredRun:
         Raises:
             RunDamagedError: A chunk or a folder is missing.
         """
-        with reading(self.path):
+        with reading(self.store.name):
             blocks = self.recorded_blocks()
             for name, variable in self.manifest.variables.items():
-                with os.scandir(self.path / name) as entries:
-                    files = {entry.name: entry.is_file(follow_symlinks=False) for entry in entries}
+                files = self.store.list(name)
                 missing = any(variable.chunk_name(block) not in files for block in blocks)
-                if (missing and not variable.empty) or not all(files.values()):
-                    raise RunDamagedError(damaged_run(self.path))
+                if (missing and not variable.empty) or -1 in files.values():
+                    raise RunDamagedError(damaged_run(self.store.name))
 
     def recorded_blocks(self) -> list[int]:
         """Return the blocks that have a record, which is not read.
@@ -140,7 +160,7 @@ class StoredRun:
         Raises:
             OSError, ValueError: The folder cannot be listed, or contains something else.
         """
-        records = os.listdir(self.path / BLOCKS / RECORD)
+        records = self.store.list(f"{BLOCKS}/{RECORD}")
         found = sorted(int(name.removeprefix("c.")) for name in records if name.startswith("c."))
         return [block for block in found if block < self.manifest.blocks]
 
@@ -152,58 +172,81 @@ class StoredRun:
         """
         import zarr
 
-        with reading(self.path):
-            group = zarr.open_group(
-                self.path, mode="r", zarr_format=3
-            )  # its consolidated metadata are those of the manifest
+        with reading(self.store.name):
+            group = zarr.open_group(self.store.zarr, mode="r", zarr_format=3)  # consolidated: as in the manifest
             return np.asarray(group[variable][...])  # type: ignore[index]
 
+    def bytes_stored(self) -> int:
+        """Return the size of all files of the run."""
+        folders = ("", *self.manifest.coordinates, *self.manifest.variables, BLOCKS, f"{BLOCKS}/{RECORD}")
+        with reading(self.store.name):
+            return sum(size for folder in folders for size in self.store.list(folder).values() if size > 0)
 
-def open_run(path: Path) -> StoredRun:
+
+def open_run(place: Place) -> StoredRun:
     """Open a run for reading.
 
     Raises:
         RunError: There is no run.
         RunDamagedError: Its metadata are damaged.
     """
-    run = StoredRun(path=path, manifest=read_manifest(path))
+    store = open_store(place)
+    run = StoredRun(store=store, manifest=read_manifest(store))
     run.check_files()
     return run
 
 
-def open_dataset(path: str | PathLike[str]) -> xarray.Dataset:
+def damaged_blocks(path: Place) -> list[int]:
+    """Return the blocks of a run that have a record, but whose files are not what was written; reads all of them.
+
+    Raises:
+        RunError: There is no run.
+        RunDamagedError: Its metadata or coordinates are damaged.
+    """
+    run = open_run(path)
+    run.check_array_metadata()
+    run.check_coordinates()
+    with reading(path):
+        blocks = run.recorded_blocks()
+    return sorted({*blocks} - {*run.verified(blocks)})
+
+
+def open_dataset(path: Place) -> xarray.Dataset:
     """Open the dataset of a run; numbers are read when they are used.
 
     Rollouts that are not simulated yet have the ``status`` -1, and NaN for numbers. Use numbers inside ``reading``.
 
+    Args:
+        path: Its folder, or ``s3://BUCKET/NAME`` with the usual variables ``AWS_…`` of the environment.
+
     Raises:
         RunError: There is no run.
         RunDamagedError: Metadata or coordinates are damaged, or committed chunks are missing.
-        MissingExtraError: xarray is not installed.
+        MissingExtraError: xarray is not installed, or for an object store obstore is not.
     """
     require_extra("data", "xarray", what="a run as an xarray dataset")
     import xarray
 
-    run = open_run(Path(path))
+    run = open_run(path)
     run.check_coordinates()
     run.check_chunks()
-    with reading(run.path):
-        return xarray.open_dataset(run.path, engine="zarr", chunks=None, consolidated=True, zarr_format=3)
+    with reading(path):
+        return xarray.open_dataset(run.store.zarr, engine="zarr", chunks=None, consolidated=True, zarr_format=3)
 
 
-def _has_size(file: Path, coordinate: StoredArray) -> bool:
-    """Whether a file is a plain one with as many bytes as a coordinate takes; of text, at least as many."""
-    try:
-        found = file.lstat()
-    except OSError:
-        return False
+def _found(blocks: list[int], records: list[BlockRecord | None]) -> dict[int, BlockRecord]:
+    return {block: record for block, record in zip(blocks, records, strict=True) if record is not None}
+
+
+def _has_size(size: int, coordinate: StoredArray) -> bool:
+    """Whether a plain file of this size is that of a coordinate, or for text at least as large as it must be."""
     [count], text = coordinate.shape, coordinate.dtype == "string"
     least = count * (CHECKSUM_BYTES if text else ITEM_SIZES[coordinate.dtype]) + CHECKSUM_BYTES
-    return stat.S_ISREG(found.st_mode) and (found.st_size > least if text else found.st_size == least)
+    return size > least if text else size == least
 
 
 @contextmanager
-def reading(path: Path) -> Iterator[None]:
+def reading(path: Place) -> Iterator[None]:
     """Turn what zarr raises for a damaged chunk into an error for users; only read in this block.
 
     Raises:
@@ -217,6 +260,6 @@ def reading(path: Path) -> Iterator[None]:
         raise RunDamagedError(damaged_run(path)) from error
 
 
-def damaged_run(path: Path) -> str:
+def damaged_run(path: Place) -> str:
     """Return the message for a run with damaged chunks."""
-    return f"'{path}' is damaged; resume it with the same options to compute the damaged blocks again"
+    return f"'{fspath(path)}' is damaged; resume it with the same options to compute the damaged blocks again"

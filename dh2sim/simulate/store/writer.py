@@ -1,65 +1,62 @@
-"""Writing a run: make or resume it, lock it, and commit block after block."""
+"""Writing a run: make it, continue it or join others that write to it, and commit block after block."""
 
 from __future__ import annotations
 
 import errno
-import os
-from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Executor, ThreadPoolExecutor, wait
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from numpy.typing import NDArray
 
-from dh2sim.errors import RunDiffersError, RunOutputError
-from dh2sim.files import PARTIAL, partial_path, write_file
-from dh2sim.locks import FolderLock
+from dh2sim.errors import RunDiffersError, RunExistsError, RunOutputError
 from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.store.codec import checksum_bytes, encode, encode_text
 from dh2sim.simulate.store.compatibility import differences
-from dh2sim.simulate.store.directory import create_run, is_vacant, lock_run
+from dh2sim.simulate.store.directory import RunLock, create_run, is_vacant, lock_run
+from dh2sim.simulate.store.local import LocalStore
 from dh2sim.simulate.store.manifest import BlockRecord
 from dh2sim.simulate.store.metadata import make_metadata
+from dh2sim.simulate.store.objects import complete_objects, create_objects
+from dh2sim.simulate.store.places import open_store
 from dh2sim.simulate.store.reader import StoredRun, open_run
+from dh2sim.simulate.store.storage import Place, run_all
 
 _LAST: Final = "status"
-"""The variable whose chunk is written last: where a plain reader finds a status, the rest of the block is there."""
-_MOST_THREADS: Final = 4
+"""The variable whose chunk appears last: where a plain reader finds a status, the rest of the block is there."""
 _FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-
-_In = TypeVar("_In")
-_Out = TypeVar("_Out")
 
 
 class RunWriter:
-    """Writes blocks of rollouts to a run on disk, and holds an exclusive lock on it until closed.
+    """Writes blocks of rollouts to a run, beside any number of others that do so.
 
-    A block is committed whole or not at all, and is on the disk when ``write`` returns.
+    A block is committed whole or not at all, and is safe when ``write`` returns. Nothing that was committed is ever
+    removed: chunks are replaced by the same bytes at most, and a record is removed only where the chunks are not
+    those that it names.
     """
 
     layout: Layout
-    """Of the run; a resumed one keeps its size of blocks and its attributes."""
+    """Of the run; one that existed keeps its size of blocks and its attributes."""
 
-    def __init__(self, run: StoredRun, layout: Layout, lock: FolderLock) -> None:
-        """Use ``create`` or ``resume`` instead."""
+    def __init__(self, run: StoredRun, layout: Layout, lock: RunLock | None) -> None:
+        """Use ``create``, ``resume`` or ``join`` instead."""
         self.layout = layout
         self._run = run
         self._lock = lock
         self._variables = {variable.name: variable for variable in layout.variables}
-        self._pool = ThreadPoolExecutor(min(_MOST_THREADS, os.cpu_count() or 1), thread_name_prefix="run-writer")
         self._committed: set[int] = set()
 
     @classmethod
-    def create(cls, path: Path, layout: Layout, *, overwrite: bool = False) -> RunWriter:
+    def create(cls, path: Place, layout: Layout, *, overwrite: bool = False, alone: bool = True) -> RunWriter:
         """Make a new run.
 
         Args:
-            path: Its folder; missing folders above it are made.
+            path: Its folder, or its place in an object store; missing folders above it are made.
             layout: What it will contain.
             overwrite: Whether an existing run is replaced; it is deleted when the new one is in place.
+            alone: Whether to keep out others who resume it; who joins it is never kept out.
 
         Raises:
             RunExistsError: There is something at the path.
@@ -67,19 +64,24 @@ class RunWriter:
             RunError: A block is too large.
             RunOutputError: The run cannot be written; nothing was changed.
         """
-        path = Path(path)
-        lock = create_run(path, make_metadata(layout), overwrite=overwrite)
+        store, files = open_store(path), make_metadata(layout)
+        lock: RunLock | None = None
+        if isinstance(store, LocalStore):
+            lock = create_run(store.path, files, overwrite=overwrite, alone=alone)
+        else:
+            create_objects(store, files, overwrite=overwrite)
         try:
             return cls(open_run(path), layout, lock)
         except BaseException:
-            lock.release()
+            if lock is not None:
+                lock.release()
             raise
 
     @classmethod
-    def resume(cls, path: Path, layout: Layout) -> RunWriter:
+    def resume(cls, path: Place, layout: Layout) -> RunWriter:
         """Open a run to compute the blocks that are missing or damaged, or make it if there is none.
 
-        Every chunk is read.
+        Every chunk is read. Others may join it meanwhile, but not resume it as well.
 
         Raises:
             RunDiffersError: The run has other settings.
@@ -88,37 +90,72 @@ class RunWriter:
             RunError: It is not a run, or cannot be read.
             RunOutputError: It cannot be written.
         """
-        path = Path(path)
-        if is_vacant(path):
+        if _is_vacant(path):
             return cls.create(path, layout)
-        lock = lock_run(path)
+        writer = cls._open(path, layout, alone=True)
         try:
-            run = open_run(path)
-            changes = differences(run.manifest, layout)
-            if changes:
-                raise RunDiffersError(
-                    f"'{path}' was made with other settings: {'; '.join(changes)}. "
-                    "Use the same options, or choose another folder"
-                )
-            run.check_array_metadata()
-            run.check_coordinates()
-            writer = cls(run, replace(layout, attributes=run.manifest.attributes, block=run.manifest.block), lock)
-        except BaseException:
-            lock.release()
-            raise
-        try:
+            writer._run.check_array_metadata()
+            writer._run.check_coordinates()
             writer._find_committed()
         except BaseException:
             writer.close()
             raise
         return writer
 
-    def pending(self) -> tuple[int, ...]:
-        """Return the blocks that are not committed, or were found damaged when the run was opened."""
-        return tuple(block for block in range(self.layout.blocks) if block not in self._committed)
+    @classmethod
+    def join(cls, path: Place, layout: Layout, *, create: bool = True) -> RunWriter:
+        """Open a run that others may be writing to, trusting the records of the blocks that are committed.
+
+        Little is read, whatever the size of the run.
+
+        Args:
+            path: Its place.
+            layout: What it contains.
+            create: Whether to make the run if there is none.
+
+        Raises:
+            RunDiffersError: The run has other settings.
+            RunDamagedError: Its metadata are damaged.
+            RunError: It is not a run, or cannot be read.
+            RunOutputError: It cannot be written.
+        """
+        if create and _is_vacant(path):
+            with suppress(RunExistsError):  # another process was quicker
+                return cls.create(path, layout, alone=False)
+        return cls._open(path, layout, alone=False)
+
+    @classmethod
+    def _open(cls, path: Place, layout: Layout, *, alone: bool) -> RunWriter:
+        store, lock = open_store(path), None
+        if isinstance(store, LocalStore):
+            lock = lock_run(store.path, alone=alone)
+        try:
+            if not isinstance(store, LocalStore):
+                complete_objects(store, layout)
+            run = open_run(path)
+            changes = differences(run.manifest, layout)
+            if changes:
+                raise RunDiffersError(
+                    f"'{store.name}' was made with other settings: {'; '.join(changes)}. "
+                    "Use the same options, or choose another folder"
+                )
+            return cls(run, replace(layout, attributes=run.manifest.attributes, block=run.manifest.block), lock)
+        except BaseException:
+            if lock is not None:
+                lock.release()
+            raise
+
+    def pending(self, blocks: Iterable[int] | None = None) -> tuple[int, ...]:
+        """Return the blocks, of all or of some, that are not committed, or were found damaged by ``resume``."""
+        wanted = range(self.layout.blocks) if blocks is None else list(blocks)
+        unknown = [block for block in wanted if block not in self._committed]
+        self._committed.update(self._run.records(unknown))
+        return tuple(block for block in wanted if block not in self._committed)
 
     def write(self, block: int, arrays: Mapping[str, NDArray[Any]], seconds: float) -> None:
         """Commit a block: its chunks first, then the record that makes them count.
+
+        Nothing is written if another process has committed it.
 
         Args:
             block: Its number.
@@ -127,22 +164,19 @@ class RunWriter:
 
         Raises:
             RunOutputError: The block cannot be written; blocks that were committed before are safe.
+            RunDiffersError: Another process has committed other numbers meanwhile, or replaced the run.
         """
         self._check(block, arrays)
-        self._committed.discard(block)
         try:
             self._write(block, arrays, seconds)
-        except BaseException as error:
-            self._discard(block)
-            if isinstance(error, OSError):
-                raise self._cannot_write(error) from error
-            raise
+        except OSError as error:
+            raise self._cannot_write(error) from error
         self._committed.add(block)
 
     def close(self) -> None:
-        """Release the lock."""
-        self._pool.shutdown()
-        self._lock.release()
+        """Release the locks."""
+        if self._lock is not None:
+            self._lock.release()
 
     def __enter__(self) -> RunWriter:
         """Return the writer itself."""
@@ -151,41 +185,49 @@ class RunWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Release the lock."""
+        """Release the locks."""
         self.close()
 
     def _write(self, block: int, arrays: Mapping[str, NDArray[Any]], seconds: float) -> None:
-        """Write the files of a block; each step is on the disk before the next one begins."""
-
-        def write_chunk(name: str) -> int:
-            variable = self._variables[name]
-            data, checksum = encode(arrays[name], dtype=variable.dtype, length=self.layout.block, fill=variable.fill)
-            write_file(self._run.chunk(name, block), data, checksum_bytes(checksum))
-            return checksum
-
+        """Write the files of a block; each is safe before its record is written."""
         names = [name for name, stored in self._run.manifest.variables.items() if not stored.empty]
-        checksums: dict[str, int] = {}
-        for step in ([name for name in names if name != _LAST], [name for name in names if name == _LAST]):
-            checksums |= zip(step, _run_all(self._pool, write_chunk, step), strict=True)
-        record = BlockRecord(block=block, run=self._run.manifest.digest, seconds=float(seconds), checksums=checksums)
-        write_file(self._run.record_file(block), encode_text(record.to_text()))
+        names.sort(key=lambda name: name == _LAST)
 
-    def _discard(self, block: int) -> None:
-        """Remove the files of a block that is not committed, as far as possible; the record first."""
-        chunks = [self._run.chunk(name, block) for name in self._variables]
-        for path in (self._run.record_file(block), *chunks):
-            _remove(path)
-            _remove(partial_path(path))
+        def encoded(name: str) -> tuple[bytes, int]:
+            variable = self._variables[name]
+            return encode(arrays[name], dtype=variable.dtype, length=self.layout.block, fill=variable.fill)
+
+        made = dict(zip(names, run_all(encoded, names), strict=True))
+        checksums = {name: checksum for name, (_, checksum) in made.items()}
+        record = BlockRecord(block=block, run=self._run.manifest.digest, seconds=float(seconds), checksums=checksums)
+        self._run.check_unchanged()
+        if not self.pending([block]):
+            return
+        self._run.store.put(
+            {self._run.chunk(name, block): (data, checksum_bytes(number)) for name, (data, number) in made.items()}
+        )
+        file, data = self._run.record_file(block), encode_text(record.to_text())
+        if not self._run.store.put_new(file, data):
+            other = self._run.record(block)
+            if other is None:  # damaged
+                self._run.store.put({file: (data,)})
+            elif other.checksums != checksums:
+                raise RunDiffersError(
+                    f"block {block} of '{self._run.store.name}' was committed by another process with other numbers: "
+                    "the controller is not a function of its rollout, or the machines differ. Resume the run on one "
+                    "of them"
+                )
 
     def _find_committed(self) -> None:
-        """Read every chunk, and remove what does not belong to a committed block."""
+        """Read every chunk, and remove the records that name others, and what dead processes left."""
         blocks = range(self.layout.blocks)
-        records = _run_all(self._pool, self._run.verified, blocks)
-        self._committed.update(block for block in blocks if records[block] is not None)
-        for block in self.pending():
-            self._discard(block)
-        for file in self._run.path.rglob(f".*{PARTIAL}"):
-            _remove(file)
+        verified = self._run.verified(blocks)
+        self._committed.update(verified)
+        with suppress(OSError, ValueError):
+            for block in {*self._run.recorded_blocks()} - {*verified}:
+                self._run.store.delete(self._run.record_file(block))
+        if isinstance(self._run.store, LocalStore):
+            self._run.store.remove_partials()
 
     def _check(self, block: int, arrays: Mapping[str, NDArray[Any]]) -> None:
         length = len(self.layout.rollouts(block))
@@ -195,27 +237,18 @@ class RunWriter:
                 raise ValueError(f"'{variable.name}' must have the shape {expected}, got {shape}")
 
     def _cannot_write(self, error: OSError) -> RunOutputError:
-        safe = sum(len(self.layout.rollouts(block)) for block in self._committed)
+        blocks = self._committed
+        with suppress(OSError, ValueError):
+            blocks = {*self._run.recorded_blocks()}
+        safe = sum(len(self.layout.rollouts(block)) for block in blocks)
         advice = "Make room, then resume" if error.errno in _FULL else "Resume when it can be written to"
         return RunOutputError(
-            f"cannot write to '{self._run.path}': {error.strerror or error}; {safe} of "
+            f"cannot write to '{self._run.store.name}': {error.strerror or error}; {safe} of "
             f"{self.layout.sizes['rollout']} rollouts are safe. {advice}"
         )
 
 
-def _remove(file: Path) -> None:
-    with suppress(OSError):
-        file.unlink()
-
-
-def _run_all(pool: Executor, function: Callable[[_In], _Out], items: Iterable[_In]) -> list[_Out]:
-    """Call a function for each item and return the results; an error is raised when all calls have ended."""
-    futures = [pool.submit(function, item) for item in items]
-    try:
-        wait(futures)
-    except BaseException:  # a signal
-        for future in futures:
-            future.cancel()
-        wait(futures)
-        raise
-    return [future.result() for future in futures]
+def _is_vacant(path: Place) -> bool:
+    """Return whether a run can be made at a place without a loss."""
+    store = open_store(path)
+    return is_vacant(store.path) if isinstance(store, LocalStore) else not store.exists()

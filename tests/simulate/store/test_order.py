@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -16,21 +17,31 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="need
 
 @pytest.fixture
 def events(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Path]]:
-    """Files and folders brought to the disk, and files renamed, in their order."""
+    """Files and folders brought to the disk, and files that got their names, in their order."""
     noted: list[tuple[str, Path]] = []
-    fsync, replace = os.fsync, os.replace
+    fsync, replace, link = os.fsync, os.replace, os.link
 
     def noted_fsync(handle: int) -> None:
         fsync(handle)
-        noted.append(("sync", Path(os.readlink(f"/proc/self/fd/{handle}"))))
+        noted.append(("sync", _without_owner(Path(os.readlink(f"/proc/self/fd/{handle}")))))
 
     def noted_replace(old: Path, new: Path) -> None:
         replace(old, new)
         noted.append(("rename", new))
 
+    def noted_link(old: Path, new: Path) -> None:
+        link(old, new)
+        noted.append(("link", new))
+
     monkeypatch.setattr(os, "fsync", noted_fsync)
     monkeypatch.setattr(os, "replace", noted_replace)
+    monkeypatch.setattr(os, "link", noted_link)
     return noted
+
+
+def _without_owner(path: Path) -> Path:
+    """Return the path of a partial file without host, process and random number."""
+    return path.with_name(re.sub(r"^(\..+?)-[A-Za-z0-9-]+-\d+-[0-9a-f]{8}\.partial$", r"\1.partial", path.name))
 
 
 def test_a_record_is_begun_only_when_every_chunk_is_on_the_disk(
@@ -41,15 +52,17 @@ def test_a_record_is_begun_only_when_every_chunk_is_on_the_disk(
         events.clear()
         writer.write(1, block_of(of, 1), SECONDS)
     record = path / "blocks" / "record" / "c.1"
-    assert events[-3:] == [("sync", partial_path(record)), ("rename", record), ("sync", record.parent)]
-    done = {}
+    assert events[-3:] == [("sync", partial_path(record)), ("link", record), ("sync", record.parent)]
+    written, done = {}, {}
     for variable in of.variables:
         chunk = path / variable.name / ".".join(["c", "1", *["0"] * (len(variable.dimensions) - 1)])
         steps = [("sync", partial_path(chunk)), ("rename", chunk), ("sync", chunk.parent)]
         assert [event for event in events if event in steps] == steps
-        done[variable.name] = events.index(steps[-1])
-    begun = events.index(("sync", partial_path(path / "status" / "c.1")))
-    assert begun > max(end for name, end in done.items() if name != "status")
+        written[variable.name], done[variable.name] = (events.index(step) for step in (steps[0], steps[-1]))
+    first = min(i for i, (what, _) in enumerate(events) if what == "rename")
+    assert max(written.values()) < first  # what cannot be written whole leaves nothing
+    status = events.index(("rename", path / "status" / "c.1"))
+    assert status > max(end for name, end in done.items() if name != "status")
 
 
 def test_a_new_run_is_on_the_disk_before_it_is_renamed_into_place(

@@ -1,0 +1,234 @@
+"""A run in an object store: whole objects, written in an order that leaves no half of anything, and no locks.
+
+Of several processes that make the same run at the same time the one whose root metadata come first decides; all of
+them write the rest, which follows from these and from the settings.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import timedelta
+from typing import Any, Final
+
+from dh2sim.errors import RunError, RunExistsError, RunOutputError
+from dh2sim.extras import require_extra
+from dh2sim.simulate.dataset_layout import Layout
+from dh2sim.simulate.store.directory import check_replaceable
+from dh2sim.simulate.store.manifest import BLOCKS, COORDINATES, METADATA, read_node
+from dh2sim.simulate.store.metadata import make_metadata
+from dh2sim.simulate.store.storage import run_all
+
+_WHOLE: Final = 2**28
+"""Bytes of objects that are sent in one request; larger ones in several, at whose end they appear."""
+_PATIENCE: Final = timedelta(seconds=60)
+"""For a request that fails and is sent again."""
+_TIMEOUT: Final = timedelta(seconds=120)
+"""For a single request."""
+_MANIFEST: Final = f"{BLOCKS}/{METADATA}"
+"""The object of a new run that is written last."""
+
+
+class ObjectStore:
+    """The objects of a bucket whose names begin with a prefix; see ``Store``."""
+
+    def __init__(self, url: str) -> None:
+        """Use ``s3://BUCKET/PREFIX``, with credentials, region and endpoint of the variables ``AWS_…``.
+
+        Raises:
+            RunError: The URL names no bucket, or no prefix.
+            MissingExtraError: obstore is not installed.
+        """
+        require_extra("s3", "obstore", what="a run in an object store")
+        from obstore.store import S3Store
+
+        bucket, _, prefix = url.partition("://")[2].partition("/")
+        if not bucket or not prefix.strip("/"):
+            raise RunError(f"'{url}' names no run: write s3://BUCKET/NAME, as in s3://rollouts/run.zarr")
+        endpoint = os.environ.get("AWS_ENDPOINT_URL_S3") or os.environ.get("AWS_ENDPOINT_URL")
+        more: dict[str, Any] = {"endpoint": endpoint} if endpoint else {}
+        self.name = url
+        try:
+            self._objects = S3Store(
+                bucket,
+                prefix=prefix.strip("/"),
+                client_options={"allow_http": bool(endpoint and endpoint.startswith("http://")), "timeout": _TIMEOUT},
+                retry_config={"max_retries": 10, "retry_timeout": _PATIENCE},
+                **more,
+            )
+        except Exception as error:
+            raise RunError(f"cannot use '{url}': {_first_line(error)}") from error
+
+    @property
+    def zarr(self) -> Any:
+        """A store of zarr's, read only."""
+        from zarr.storage import ObjectStore as ZarrStore
+
+        return ZarrStore(self._objects, read_only=True)
+
+    def file(self, key: str = "") -> str:
+        """Return the URL of an object of the run."""
+        return f"{self.name.rstrip('/')}/{key}" if key else self.name
+
+    def exists(self) -> bool:
+        """Return whether there is any object of this prefix."""
+        import obstore
+
+        with self._reading():
+            return next((True for some in obstore.list(self._objects, chunk_size=1) if some), False)
+
+    def put(self, files: Mapping[str, tuple[bytes, ...]]) -> None:
+        """Write objects, the last one when all others are there."""
+        import obstore
+
+        def send(key: str) -> None:
+            data = b"".join(files[key])
+            with _writing():
+                obstore.put(self._objects, key, data, use_multipart=len(data) > _WHOLE)
+
+        *others, last = files
+        run_all(send, others)
+        send(last)
+
+    def put_new(self, key: str, data: bytes) -> bool:
+        """Write an object unless there is one, and return whether it was written."""
+        import obstore
+        from obstore.exceptions import AlreadyExistsError
+
+        try:
+            with _writing():
+                obstore.put(self._objects, key, data, mode="create", use_multipart=False)
+        except FileExistsError:
+            return False
+        except OSError as error:
+            if isinstance(error.__cause__, AlreadyExistsError):
+                return False
+            raise
+        return True
+
+    def get(self, key: str, *, most: int, last: int | None = None) -> bytes:
+        """Return an object, or its ``last`` bytes."""
+        import obstore
+
+        with self._reading():
+            found = obstore.get(self._objects, key, options={} if last is None else {"range": {"suffix": last}})
+            if last is None and found.meta["size"] > most:
+                raise OSError(errno.EFBIG, f"is larger than {most} bytes", self.file(key))
+            return bytes(found.bytes())
+
+    def pieces(self, key: str) -> Iterator[bytes]:
+        """Yield an object in pieces."""
+        import obstore
+
+        with self._reading():
+            for piece in obstore.get(self._objects, key).stream():
+                yield bytes(piece)
+
+    def list(self, folder: str) -> dict[str, int]:
+        """Return the names below a prefix with their sizes; none where there is no such prefix."""
+        import obstore
+
+        with self._reading():
+            found = obstore.list_with_delimiter(self._objects, folder or None)
+            return {each["path"].rpartition("/")[2]: each["size"] for each in found["objects"]}
+
+    def delete(self, key: str) -> None:
+        """Remove an object, if it is there."""
+        import obstore
+
+        with _writing():
+            obstore.delete(self._objects, key)
+
+    def clear(self) -> None:
+        """Remove all objects of this prefix, the root metadata last: until then it is known for a run."""
+        import obstore
+
+        with self._reading():
+            keys = [each["path"] for some in obstore.list(self._objects) for each in some]
+        with _writing():
+            obstore.delete(self._objects, [key for key in keys if key != METADATA])
+            obstore.delete(self._objects, METADATA)
+
+    @contextmanager
+    def _reading(self) -> Iterator[None]:
+        """Turn obstore's errors into those of a missing file, or into one for users.
+
+        Raises:
+            FileNotFoundError: There is no such object.
+            RunError: The store cannot be read.
+        """
+        from obstore.exceptions import BaseError, NotFoundError
+
+        try:
+            yield
+        except (NotFoundError, FileNotFoundError) as error:
+            if "NoSuchBucket" in str(error):
+                raise RunError(f"cannot read '{self.name}': there is no such bucket") from error
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT)) from error
+        except BaseError as error:
+            raise RunError(f"cannot read '{self.name}': {_first_line(error)}") from error
+
+
+def create_objects(store: ObjectStore, files: Mapping[str, bytes], *, overwrite: bool) -> None:
+    """Make a new run.
+
+    Args:
+        store: Its place.
+        files: Its contents, by key.
+        overwrite: Whether the objects of a run that is there are removed first.
+
+    Raises:
+        RunExistsError: There is something.
+        RunOutputError: The run cannot be written.
+    """
+    try:
+        if store.exists():
+            check_replaceable(store, overwrite=overwrite)
+            store.clear()
+        if not store.put_new(METADATA, files[METADATA]):
+            raise RunExistsError(f"'{store.name}' was made by another process meanwhile; resume it, or overwrite it")
+        _put_rest(store, files)
+    except OSError as error:
+        raise RunOutputError(f"cannot write to '{store.name}': {error.strerror or error}") from error
+
+
+def complete_objects(store: ObjectStore, layout: Layout) -> None:
+    """Write the rest of a run that another process is making, or has died while it made it.
+
+    Raises:
+        RunOutputError: It cannot be written.
+    """
+    root = read_node(store, METADATA)
+    if root is None or read_node(store, _MANIFEST) is not None or not isinstance(root.get("attributes"), dict):
+        return
+    attributes = {name: value for name, value in root["attributes"].items() if name != COORDINATES}
+    files = make_metadata(replace(layout, attributes=attributes))
+    try:
+        if store.get(METADATA, most=len(files[METADATA])) == files[METADATA]:  # else it has other settings
+            _put_rest(store, files)
+    except OSError as error:
+        raise RunOutputError(f"cannot write to '{store.name}': {error.strerror or error}") from error
+
+
+def _put_rest(store: ObjectStore, files: Mapping[str, bytes]) -> None:
+    run_all(lambda key: store.put_new(key, files[key]), [key for key in files if key not in (METADATA, _MANIFEST)])
+    store.put_new(_MANIFEST, files[_MANIFEST])
+
+
+@contextmanager
+def _writing() -> Iterator[None]:
+    """Turn obstore's errors into an ``OSError``."""
+    from obstore.exceptions import BaseError
+
+    try:
+        yield
+    except BaseError as error:
+        raise OSError(errno.EIO, _first_line(error)) from error
+
+
+def _first_line(error: BaseException) -> str:
+    """Return what obstore says, without its source code's words."""
+    return str(error).partition("\n")[0].rstrip(" .")

@@ -1,0 +1,31 @@
+"""How a place is opened: a folder, or an object store."""
+
+from __future__ import annotations
+
+import re
+from os import fspath
+from pathlib import Path
+from typing import Final
+
+from dh2sim.errors import RunError
+from dh2sim.simulate.store.local import LocalStore
+from dh2sim.simulate.store.objects import ObjectStore
+from dh2sim.simulate.store.storage import Place
+
+_SCHEME: Final = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")
+
+
+def open_store(place: Place) -> LocalStore | ObjectStore:
+    """Return the store at a place, whether there is a run or not.
+
+    Raises:
+        RunError: The place is of a kind that is not known.
+        MissingExtraError: It is an object store, and the library for those is not installed.
+    """
+    text = fspath(place)
+    scheme = _SCHEME.match(text)
+    if scheme is None:
+        return LocalStore(Path(text))
+    if scheme[1].lower() != "s3":
+        raise RunError(f"'{text}' cannot be opened: runs are in folders, or in object stores as s3://BUCKET/NAME")
+    return ObjectStore(text)
