@@ -26,6 +26,7 @@ MODULES = {
     "engines": {"yourdfpy"},
     "toppra": {"toppra"},
     "xacro": {"xacro"},
+    "s3": {"obstore"},
 }
 """What is imported of each extra's libraries."""
 BROUGHT = {
@@ -95,6 +96,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("data", "runs run.zarr --to parquet", "Parquet"),
         ("data", "runs run.zarr --to hdf5", "HDF5"),
         ("data", "validate rpr --dynamics", "--dynamics"),
+        ("s3", "runs s3://bucket/run.zarr", "a run in an object store"),
         ("toppra", "trajectory rpr home zero --profile optimal", "profile 'optimal'"),
     ],
 )
