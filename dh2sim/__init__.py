@@ -57,6 +57,7 @@ _HOMES = {
     "frame_poses": "kinematics.forward",
     "generate_code": "codegen.generate",
     "geometric_jacobian": "kinematics.forward",
+    "grade": "compare.grading",
     "import_robot": "importing.sources",
     "inverse_kinematics": "inverse.solver",
     "load_robot": "robot.read",
@@ -85,6 +86,7 @@ if TYPE_CHECKING:
     from dh2sim.codegen.generate import generate_code as generate_code
     from dh2sim.compare.comparison import Comparison as Comparison
     from dh2sim.compare.comparison import diff as diff
+    from dh2sim.compare.grading import grade as grade
     from dh2sim.draw.diagram.drawing import draw_robot as draw_robot
     from dh2sim.errors import Dh2simError as Dh2simError
     from dh2sim.errors import RobotError as RobotError

@@ -74,14 +74,14 @@ def _print(found: Comparison) -> None:
         return
     print("Different mechanisms.")
     for sentence in found.sentences():
-        _item(sentence)
+        print_item(sentence)
 
 
 def _print_same(same: Equivalence) -> None:
     sentences = list(same.sentences())
     print("The same mechanism." if not sentences else "The same mechanism, but:")
     for sentence in sentences:
-        _item(sentence)
+        print_item(sentence)
     residual = same.residual
     print(
         f"Residual of tool0 at {residual.configurations} configurations: {residual.position:.1e} m, "
@@ -94,7 +94,8 @@ def _print_same(same: Equivalence) -> None:
         print(printable("\n".join(table_lines(rows, left=3))))
 
 
-def _item(sentence: str) -> None:
+def print_item(sentence: str) -> None:
+    """Print a sentence as an item of a list, wrapped at 80 columns."""
     print(
         textwrap.fill(
             f"  - {printable(sentence)}",

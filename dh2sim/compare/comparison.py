@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dh2sim.compare.fitting import Fit, ToolResidual, best_fit, joint_samples, measured
-from dh2sim.compare.geometry import Difference, first_difference
+from dh2sim.compare.geometry import LABELS, Difference, first_difference
 from dh2sim.compare.inputs import PLAINLY, ReadRobot, read_any
 from dh2sim.compare.matching import Correspondence, Obstacle
 from dh2sim.compare.misreadings import Misreading, misreadings
@@ -73,8 +73,18 @@ class Equivalence:
     smallest: float
     """rad and m up to which nothing is said: the tolerance."""
 
-    def sentences(self) -> Iterator[str]:
-        """Yield what differs although the mechanism is the same."""
+    @property
+    def base_differs(self) -> bool:
+        """Whether base_link is elsewhere in B."""
+        return bool(pose_text(self.T_a_base_b_base, self.smallest))
+
+    @property
+    def tool_differs(self) -> bool:
+        """Whether tool0 is elsewhere in B."""
+        return bool(pose_text(self.T_a_tool_b_tool, self.smallest))
+
+    def sentences(self, label: str = LABELS[1]) -> Iterator[str]:
+        """Yield what differs although the mechanism is the same; ``label`` is what B is called."""
         for joint in self.joints:
             does = "turns" if joint.turns else "slides"
             parts = []
@@ -83,9 +93,9 @@ class Equivalence:
             if abs(joint.zero) > self.smallest:
                 parts.append(f"starts at {degrees(joint.zero) if joint.turns else millimetres(joint.zero)}")
             if parts:
-                yield f"{joint.b} of B {' and '.join(parts)}"
+                yield f"{joint.b} of {label} {' and '.join(parts)}"
         if self.order != tuple(range(len(self.order))):
-            yield f"joints of B are in another order: {', '.join(joint.b for joint in self.joints)}"
+            yield f"joints of {label} are in another order: {', '.join(joint.b for joint in self.joints)}"
         if base := pose_text(self.T_a_base_b_base, self.smallest):
             yield f"base differs by {base}"
         if tool := pose_text(self.T_a_tool_b_tool, self.smallest):
@@ -113,6 +123,8 @@ class Comparison:
     """Single misreadings of the table of A that give B; each was tested by making it."""
     notes: tuple[str, ...] = ()
     """What was chosen or left out when the files were read."""
+    labels: tuple[str, str] = LABELS
+    """What A and B are called in sentences."""
 
     @property
     def same(self) -> bool:
@@ -122,7 +134,7 @@ class Comparison:
     def sentences(self) -> list[str]:
         """Return what is different, in words: of the same mechanism, or of two."""
         if self.equivalence is not None:
-            return list(self.equivalence.sentences())
+            return list(self.equivalence.sentences(self.labels[1]))
         found = [] if self.difference is None else [f"first difference: {self.difference.sentence}"]
         if self.same_at is not None:
             found.append(f"they are the same to a tolerance of {_rounded_up(self.same_at)}")
@@ -198,8 +210,8 @@ def diff(
     return compared(read_any(a, options_a), read_any(b, options_b), float(tolerance))
 
 
-def compared(a: ReadRobot, b: ReadRobot, tolerance: float) -> Comparison:
-    """Compare two robots that were read."""
+def compared(a: ReadRobot, b: ReadRobot, tolerance: float, labels: tuple[str, str] = LABELS) -> Comparison:
+    """Compare two robots that were read; ``labels`` are what they are called in sentences."""
     of_a, of_b = axes_of(a.spec), axes_of(b.spec)
     fit = best_fit(of_a, of_b, tolerance)
     notes = (*(f"A: {note}" for note in a.notes), *(f"B: {note}" for note in b.notes))
@@ -216,16 +228,18 @@ def compared(a: ReadRobot, b: ReadRobot, tolerance: float) -> Comparison:
             same_at=None,
             misreadings=(),
             notes=notes,
+            labels=labels,
         )
     return Comparison(
         a=a.spec,
         b=b.spec,
         tolerance=tolerance,
         equivalence=None,
-        difference=first_difference(of_a, of_b, fit, tolerance) if isinstance(fit, Obstacle) else None,
+        difference=first_difference(of_a, of_b, fit, tolerance, labels) if isinstance(fit, Obstacle) else None,
         same_at=_same_at(a.spec, b.spec, of_a, of_b, tolerance),
         misreadings=misreadings(a.spec, b.spec, tolerance),
         notes=notes,
+        labels=labels,
     )
 
 

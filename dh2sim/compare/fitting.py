@@ -19,8 +19,8 @@ from dh2sim.typing import Array
 _CONFIGURATIONS = 64
 _REFINED_ABOVE = 1e-10
 """rad, and m for a reach of up to 1 m: a smaller residual is rounding."""
-_ROUNDS = 4
-_MOST_TRIED = 8
+_ROUNDS = 3
+_MOST_TRIED = 3
 """Correspondences that are measured, the simplest first."""
 _MOST_ORDERS = 120
 """Orders of B's joints that are tried, where neighbours may be exchanged."""
@@ -176,7 +176,7 @@ def _refined(way: Correspondence, chain_b: SerialChain, poses: Array, q: Array, 
         zeros += step[:n]
         T_base = _moved(step[n : n + 6]) @ T_base
         T_tool = T_tool @ _moved(step[n + 6 :])
-        if float(np.abs(step).max()) < 1e-15:
+        if float(np.abs(step).max()) < 1e-9:
             break
     return replace(way, zeros=zeros, T_base=T_base, T_tool=T_tool)
 

@@ -17,6 +17,8 @@ from dh2sim.compare.screws import ScrewAxes
 from dh2sim.compare.words import degrees, millimetres
 from dh2sim.typing import Array
 
+LABELS = ("A", "B")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisGeometry:
@@ -90,70 +92,76 @@ class Difference:
     sentence: str
 
 
-def first_difference(a: ScrewAxes, b: ScrewAxes, obstacle: Obstacle, tolerance: float) -> Difference:
-    """Return the numbers and the words for where matching failed."""
+def first_difference(
+    a: ScrewAxes, b: ScrewAxes, obstacle: Obstacle, tolerance: float, labels: tuple[str, str] = LABELS
+) -> Difference:
+    """Return the numbers and the words for where matching failed; ``labels`` are what A and B are called there."""
     i, k = obstacle.first, obstacle.last
     match obstacle.kind:
         case ObstacleKind.COUNT:
-            text = f"A has {_joints(a.n)}, B has {_joints(b.n)}"
+            text = f"{labels[0]} has {_joints(a.n)}, {labels[1]} has {_joints(b.n)}"
             return Difference(kind=obstacle.kind, joints=(), a=float(a.n), b=float(b.n), sentence=text)
         case ObstacleKind.TYPE:
             does = {True: "turns", False: "slides"}
-            text = f"{a.names[i]} {does[a.turns[i]]} in A, {b.names[i]} {does[b.turns[i]]} in B"
+            text = f"{a.names[i]} {does[a.turns[i]]} in {labels[0]}, {b.names[i]} {does[b.turns[i]]} in {labels[1]}"
             return Difference(kind=obstacle.kind, joints=(a.names[i],), a=None, b=None, sentence=text)
         case ObstacleKind.TWIST:
-            return _twist(a, b, i, k, tolerance)
+            return _twist(a, b, i, k, tolerance, labels)
         case ObstacleKind.DISTANCE:
-            return _distance(a, b, i, k, tolerance)
+            return _distance(a, b, i, k, tolerance, labels)
         case ObstacleKind.OFFSET:
-            return _offset(a, b, i, tolerance)
+            return _offset(a, b, i, tolerance, labels)
 
 
-def _twist(a: ScrewAxes, b: ScrewAxes, i: int, k: int, tolerance: float) -> Difference:
+def _twist(a: ScrewAxes, b: ScrewAxes, i: int, k: int, tolerance: float, labels: tuple[str, str]) -> Difference:
     for last in range(i + 1, k + 1):
         for first in range(i, last):
             x, y = (_angle_between(axes.directions[first], axes.directions[last]) for axes in (a, b))
             if abs(x - y) > tolerance:
                 text = (
-                    f"the axes of {a.names[first]} and {a.names[last]} are {degrees(x)} apart in A, {degrees(y)} in B"
+                    f"the axes of {a.names[first]} and {a.names[last]} are {degrees(x)} apart in {labels[0]}, "
+                    f"{degrees(y)} in {labels[1]}"
                 )
                 return Difference(
                     kind=ObstacleKind.TWIST, joints=(a.names[first], a.names[last]), a=x, b=y, sentence=text
                 )
     names = a.names[i : k + 1]
-    text = f"the axes of {', '.join(names)} are arranged in B as in a mirror image of A"
+    text = f"the axes of {', '.join(names)} are arranged in {labels[1]} as in a mirror image of {labels[0]}"
     return Difference(kind=ObstacleKind.TWIST, joints=names, a=None, b=None, sentence=text)
 
 
-def _distance(a: ScrewAxes, b: ScrewAxes, i: int, k: int, tolerance: float) -> Difference:
+def _distance(a: ScrewAxes, b: ScrewAxes, i: int, k: int, tolerance: float, labels: tuple[str, str]) -> Difference:
     x, y = (_across(axes, i, k) for axes in (a, b))
     names = (a.names[i], a.names[k])
     if abs(x - y) > tolerance:
-        text = f"the axes of {names[0]} and {names[1]} are {millimetres(x)} apart in A, {millimetres(y)} in B"
+        text = (
+            f"the axes of {names[0]} and {names[1]} are {millimetres(x)} apart in {labels[0]}, "
+            f"{millimetres(y)} in {labels[1]}"
+        )
         return Difference(kind=ObstacleKind.DISTANCE, joints=names, a=x, b=y, sentence=text)
     text = (
-        f"the axes of {names[0]} and {names[1]} are {millimetres(x)} apart in both, but twisted the other way in B, "
-        "as in a mirror image"
+        f"the axes of {names[0]} and {names[1]} are {millimetres(x)} apart in both, but twisted the other way in "
+        f"{labels[1]}, as in a mirror image"
     )
     return Difference(kind=ObstacleKind.DISTANCE, joints=names, a=x, b=x, sentence=text)
 
 
-def _offset(a: ScrewAxes, b: ScrewAxes, i: int, tolerance: float) -> Difference:
+def _offset(a: ScrewAxes, b: ScrewAxes, i: int, tolerance: float, labels: tuple[str, str]) -> Difference:
     parallel = max(1e-6, tolerance)
     of_a, of_b = axis_geometry(a, parallel), axis_geometry(b, parallel)
     for joint in range(i + 1):
         x, y = of_a[joint].offset, of_b[joint].offset
         if x is not None and y is not None and abs(x - y) > tolerance:
             text = (
-                f"along the axis of {a.names[joint]}, its two common normals are {millimetres(x)} apart in A, "
-                f"{millimetres(y)} in B"
+                f"along the axis of {a.names[joint]}, its two common normals are {millimetres(x)} apart in "
+                f"{labels[0]}, {millimetres(y)} in {labels[1]}"
             )
             return Difference(kind=ObstacleKind.OFFSET, joints=(a.names[joint],), a=x, b=y, sentence=text)
     x = of_a[i].offset
     text = (
-        f"along the axis of {a.names[i]}, the next axis lies on the other side in B"
+        f"along the axis of {a.names[i]}, the next axis lies on the other side in {labels[1]}"
         if x
-        else f"no turn of {a.names[i]} brings the next axis of A to that of B"
+        else f"no turn of {a.names[i]} brings the next axis of {labels[0]} to that of {labels[1]}"
     )
     return Difference(kind=ObstacleKind.OFFSET, joints=(a.names[i],), a=x, b=of_b[i].offset, sentence=text)
 

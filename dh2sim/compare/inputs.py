@@ -31,7 +31,9 @@ class ReadRobot:
     notes: tuple[str, ...] = ()
 
 
-def read_any(source: SpecLike | str | os.PathLike[str], options: ImportOptions = PLAINLY) -> ReadRobot:
+def read_any(
+    source: SpecLike | str | os.PathLike[str], options: ImportOptions = PLAINLY, *, strangers: bool = False
+) -> ReadRobot:
     """Return a serial robot of whatever describes one.
 
     Args:
@@ -39,6 +41,7 @@ def read_any(source: SpecLike | str | os.PathLike[str], options: ImportOptions =
             MJCF, a Denavit-Hartenberg table or a maker's calibration. '-' reads standard input, which may be any of
             them but an MJCF.
         options: Which part of a file to import, and how; robot files need none.
+        strangers: Whether a robot file is a stranger's, and may name no other files.
 
     Raises:
         Dh2simError: The file is wrong, or its robot has closed loops or branches.
@@ -53,13 +56,17 @@ def read_any(source: SpecLike | str | os.PathLike[str], options: ImportOptions =
     if not data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(_XML_OR_TABLE) and not is_calibration(data):
         folder = Path.cwd() if file == STDIN else path.parent
         if _JOINTS.search(data):
-            return ReadRobot(spec=serial_spec_of(parse_robot(data, file=file, directory=folder)))
+            return ReadRobot(
+                spec=serial_spec_of(parse_robot(data, file=file, directory=folder, mesh_files=not strangers))
+            )
         if _AXES.search(data):
             with errors_of(file):
                 axes = read_axes(data, file=file, directory=folder)
                 imported = import_axes(axes)
             return ReadRobot(spec=imported.spec, notes=imported.notes)
         if path.suffix.lower() in (".yaml", ".yml"):
-            return ReadRobot(spec=serial_spec_of(parse_robot(data, file=file, directory=folder)))
+            return ReadRobot(
+                spec=serial_spec_of(parse_robot(data, file=file, directory=folder, mesh_files=not strangers))
+            )
     imported = import_data(data, file, options)
     return ReadRobot(spec=serial_spec_of(imported.spec), notes=imported.notes)

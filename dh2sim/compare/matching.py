@@ -84,6 +84,8 @@ class _Hypothesis:
     senses: list[float]
     rotations: list[Array]
     """Of the groups of links so far."""
+    gaps: list[float]
+    """What shifts must make up for, m: three numbers for each group between turning joints."""
     shifts: Array
     """Of the axes of turning joints along themselves, and zeros of slides, by joint; m, shape (n,)."""
 
@@ -126,7 +128,7 @@ def correspondences(a: ScrewAxes, b: ScrewAxes, tolerance: float) -> list[Corres
         if of_a is not of_b:
             return Obstacle(kind=ObstacleKind.TYPE, first=i, last=i)
     matcher = _Matcher(a, b, tolerance)
-    hypotheses = [_Hypothesis(senses=[], rotations=[], shifts=np.zeros(a.n))]
+    hypotheses = [_Hypothesis(senses=[], rotations=[], gaps=[], shifts=np.zeros(a.n))]
     for index in range(len(matcher.groups)):
         hypotheses, obstacle = matcher.extended(hypotheses, index)
         if obstacle is not None:
@@ -144,6 +146,9 @@ class _Matcher:
         self.length = self.angle * self.size
         self.parallel = max(_SURE, self.angle)
         self.groups = _groups(a.turns)
+        self.all_parallel = [self._all_parallel(group) for group in self.groups]
+        self.normals = [self._normals(group) for group in self.groups]
+        self.shifting = [self._shifting(index) for index in range(len(self.groups))]
         self.cosines_a = a.directions @ a.directions.T
         self.cosines_b = b.directions @ b.directions.T
 
@@ -157,18 +162,23 @@ class _Matcher:
         for hypothesis in hypotheses:
             for senses in self._senses(hypothesis.senses, group, failed):
                 previous = hypothesis.rotations[-1] if hypothesis.rotations else np.eye(3)
-                R = self._rotation(senses, group, previous)
+                R = self._rotation(senses, index, previous)
                 ends = group.joints[0], group.joints[-1]
                 if self._misdirected(R, senses, group):
                     failed.setdefault(ObstacleKind.TWIST, ends)
-                elif self._misplaced(R, group):
+                elif self._misplaced(R, index):
                     failed.setdefault(ObstacleKind.DISTANCE, ends)
                 else:
                     turned.append(
-                        _Hypothesis(senses=senses, rotations=[*hypothesis.rotations, R], shifts=hypothesis.shifts)
+                        _Hypothesis(
+                            senses=senses,
+                            rotations=[*hypothesis.rotations, R],
+                            gaps=[*hypothesis.gaps, *self._gap(R, group)],
+                            shifts=hypothesis.shifts,
+                        )
                     )
         for hypothesis in turned:
-            shifts = self._shifts(hypothesis)
+            shifts = self._shifts(hypothesis, index)
             if shifts is not None:
                 hypothesis.shifts = shifts
                 placed.append(hypothesis)
@@ -206,15 +216,15 @@ class _Matcher:
             partial = longer[:MOST_HYPOTHESES]
         yield from partial
 
-    def _rotation(self, senses: list[float], group: _Group, previous: Array) -> Array:
+    def _rotation(self, senses: list[float], index: int, previous: Array) -> Array:
         """Return the rotation of a group's links that takes A's directions nearest to B's."""
-        joints = list(group.joints)
+        joints = list(self.groups[index].joints)
         if not joints:
             return previous
         of_a = self.a.directions[joints]
         of_b = self.b.directions[joints] * np.array([senses[i] for i in joints])[:, None]
-        normals = self._normals(group)
-        if self._all_parallel(joints):
+        normals = self.normals[index]
+        if self.all_parallel[index]:
             R = _least_turn(previous @ of_a[0], of_b[0]) @ previous
             if normals is None or max(np.linalg.norm(w) for w in normals) <= self.length:
                 return np.asarray(R)
@@ -224,16 +234,19 @@ class _Matcher:
             of_a = np.vstack([of_a, normals[0] / self.size])
             of_b = np.vstack([of_b, normals[1] / self.size])
         U, _, Vt = np.linalg.svd(of_b.T @ of_a)
-        return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
+        proper = U @ Vt
+        if np.linalg.det(proper) < 0.0:
+            proper = (U * [1.0, 1.0, -1.0]) @ Vt
+        return np.asarray(proper)
 
-    def _all_parallel(self, joints: list[int]) -> bool:
-        first = joints[0]
-        sines = [
-            float(np.linalg.norm(np.cross(axes.directions[first], axes.directions[i])))
-            for axes in (self.a, self.b)
-            for i in joints
-        ]
-        return max(sines) <= self.parallel
+    def _all_parallel(self, group: _Group) -> bool:
+        joints = list(group.joints)
+        for axes in (self.a, self.b):
+            z = axes.directions[joints]
+            gaps = np.minimum(np.abs(z - z[:1]).max(axis=1), np.abs(z + z[:1]).max(axis=1))
+            if float(np.max(gaps, initial=0.0)) > self.parallel:
+                return False
+        return True
 
     def _normals(self, group: _Group) -> tuple[Array, Array] | None:
         """Return what leads from the first axis of a group to its last, across all its directions, in A and B.
@@ -262,32 +275,38 @@ class _Matcher:
         gaps = self.a.directions[joints] @ R.T - signs * self.b.directions[joints]
         return float(np.abs(gaps).max()) > max(self.angle, 1e-9)
 
-    def _misplaced(self, R: Array, group: _Group) -> bool:
-        normals = self._normals(group)
+    def _misplaced(self, R: Array, index: int) -> bool:
+        normals = self.normals[index]
         if normals is None:
             return False
         w_a, w_b = normals
         return float(np.abs(R @ w_a - w_b).max()) > self.length
 
-    def _shifts(self, hypothesis: _Hypothesis) -> Array | None:
+    def _shifting(self, index: int) -> tuple[Array, Array]:
+        """Return what shifts of axes and zeros of slides do to the gaps of the groups so far, and its inverse."""
+        blocks = [np.zeros((0, self.a.n))]
+        for group in self.groups[: index + 1]:
+            if group.start is not None and group.end is not None:
+                block = np.zeros((3, self.a.n))
+                block[:, group.start] = self.b.directions[group.start]
+                block[:, group.joints[1:]] = -self.b.directions[list(group.joints[1:])].T
+                blocks.append(block)
+        matrix = np.vstack(blocks)
+        return matrix, np.asarray(np.linalg.pinv(matrix, rcond=self.parallel))
+
+    def _gap(self, R: Array, group: _Group) -> list[float]:
+        if group.start is None or group.end is None:
+            return []
+        p_a, p_b = (axes.points[group.end] - axes.points[group.start] for axes in (self.a, self.b))
+        gap: list[float] = (p_b - R @ p_a).tolist()
+        return gap
+
+    def _shifts(self, hypothesis: _Hypothesis, index: int) -> Array | None:
         """Return how far each axis is shifted along itself, and zeros of slides; None if no such are good enough."""
-        rows, right = [], []
-        n = self.a.n
-        for group, R in zip(self.groups, hypothesis.rotations, strict=False):
-            if group.start is None or group.end is None:
-                continue
-            block = np.zeros((3, n))
-            block[:, group.start] += self.b.directions[group.start]
-            for i in group.joints[1:]:
-                block[:, i] -= self.b.directions[i]
-            rows.append(block)
-            p_a, p_b = (axes.points[group.end] - axes.points[group.start] for axes in (self.a, self.b))
-            right.append(p_b - R @ p_a)
-        if not rows:
-            return np.zeros(n)
-        matrix, vector = np.vstack(rows), np.concatenate(right)
-        solution = np.linalg.lstsq(matrix, vector, rcond=self.parallel)[0]
-        if float(np.abs(matrix @ solution - vector).max()) > self.length:
+        matrix, inverse = self.shifting[index]
+        gaps = np.array(hypothesis.gaps)
+        solution = inverse @ gaps
+        if float(np.max(np.abs(matrix @ solution - gaps), initial=0.0)) > self.length:
             return None
         return np.asarray(solution)
 
@@ -305,7 +324,7 @@ class _Matcher:
         yield R, False
         if slides:
             yield R, True
-        if len(self.groups) > 1 and self._all_parallel(list(self.groups[0].joints)):
+        if len(self.groups) > 1 and self.all_parallel[0]:
             yield hypothesis.rotations[1], False  # the first joint stays at its zero
             if slides:
                 yield hypothesis.rotations[1], True
@@ -320,7 +339,7 @@ class _Matcher:
         yield R, False
         if slides:
             yield R, True
-        if self._all_parallel(list(group.joints)):
+        if self.all_parallel[-1]:
             same = self.b.T_base_tool[:3, :3] @ self.a.T_base_tool[:3, :3].T  # tool0 stays as it is
             if not self._misdirected(same, hypothesis.senses, group):
                 yield same, False

@@ -23,6 +23,8 @@ from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 
 _MOST_ROWS = 12
 """Of tables in which any two rows are exchanged; in longer ones, neighbours."""
+_EXACT = 1e-9
+"""rad, and m for a reach of up to 1 m: a misreading that is this close explains everything."""
 _UNITS = (("mm", 1000.0), ("cm", 100.0), ("inches", 1.0 / 0.0254))
 _ANGLES = ("alpha", "theta")
 _LENGTHS = ("a", "d")
@@ -88,26 +90,26 @@ def misreadings(a: RobotSpec, b: RobotSpec, tolerance: float) -> tuple[Misreadin
         tolerance: As for comparing them.
 
     Returns:
-        All that fit; a number that is simply another one only where nothing else explains it.
+        All that fit, but those that fit worse than others only because of the tolerance; a number that is simply
+        another one only where nothing else explains it.
     """
-    of_a, of_b = axes_of(a), axes_of(b)
-    into_b, into_a = _Target(of_b, tolerance), _Target(of_a, tolerance)
-    found: dict[tuple[object, ...], Misreading] = {}
+    into_b, into_a = _Target(axes_of(b), tolerance), _Target(axes_of(a), tolerance)
+    found: dict[tuple[object, ...], tuple[float, Misreading]] = {}
 
-    def add(misreading: Misreading) -> None:
-        found.setdefault((misreading.kind, misreading.rows, misreading.columns), misreading)
+    def add(misreading: Misreading, target: _Target, own: _Target, rows: Sequence[Row]) -> None:
+        gap = target.gap(rows)
+        if gap is not None and own.gap(rows) is None:
+            found.setdefault((misreading.kind, misreading.rows, misreading.columns), (gap, misreading))
 
     for edit in _edits(a.rows):
-        if into_b.reached(edit.rows) and not into_a.reached(edit.rows):
-            add(edit.made)
+        add(edit.made, into_b, into_a, edit.rows)
     for edit in _edits(b.rows):
-        if into_a.reached(edit.rows) and not into_b.reached(edit.rows):
-            add(edit.undone)
+        add(edit.undone, into_a, into_b, edit.rows)
     if not found:
         for edit in _values(a.rows, b.rows):
-            if into_b.reached(edit.rows):
-                add(edit.made)
-    return tuple(found.values())
+            add(edit.made, into_b, into_a, edit.rows)
+    least = max(_EXACT, 10.0 * min((gap for gap, _ in found.values()), default=0.0))
+    return tuple(misreading for gap, misreading in found.values() if gap <= least)
 
 
 class _Target:
@@ -117,18 +119,19 @@ class _Target:
         self._axes, self._tolerance = axes, tolerance
         self._print = _fingerprint(axes)
 
-    def reached(self, rows: Sequence[Row]) -> bool:
-        """Whether these rows are the same mechanism, up to base, tool, zeros and senses."""
+    def gap(self, rows: Sequence[Row]) -> float | None:
+        """Return the residual, rad, and m for a reach of up to 1 m, if the rows are the same mechanism; else None."""
         axes = axes_of_rows(rows, identity(), identity())
         if axes.turns != self._axes.turns:
-            return False
+            return None
         size = max(1.0, axes.reach, self._axes.reach)
         slack = 20.0 * self._tolerance + 1e-9
-        ours = _fingerprint(axes)
-        if (np.abs(ours - self._print) > slack * np.array([1.0, size])).any():
-            return False
+        if (np.abs(_fingerprint(axes) - self._print) > slack * np.array([1.0, size])).any():
+            return None
         fit = best_fit(axes, self._axes, self._tolerance)
-        return isinstance(fit, Fit) and fit.good
+        if not (isinstance(fit, Fit) and fit.good):
+            return None
+        return max(fit.residual.rotation, fit.residual.position / size)
 
 
 def _fingerprint(axes: ScrewAxes) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -137,8 +140,10 @@ def _fingerprint(axes: ScrewAxes) -> np.ndarray[tuple[int, int], np.dtype[np.flo
     The second is NaN, which differs from nothing, where one of them slides.
     """
     z, p = axes.directions, axes.points
-    cosines = np.abs((z[:-1] * z[1:]).sum(axis=1))
-    moments = np.abs(((p[1:] - p[:-1]) * np.cross(z[:-1], z[1:])).sum(axis=1))
+    (x1, y1, z1), (x2, y2, z2) = z[:-1].T, z[1:].T
+    cosines = np.abs(x1 * x2 + y1 * y2 + z1 * z2)
+    gx, gy, gz = (p[1:] - p[:-1]).T
+    moments = np.abs(gx * (y1 * z2 - z1 * y2) + gy * (z1 * x2 - x1 * z2) + gz * (x1 * y2 - y1 * x2))
     turns = np.array(axes.turns, dtype=bool)
     return np.stack([cosines, np.where(turns[1:] & turns[:-1], moments, np.nan)], axis=1)
 
@@ -235,16 +240,22 @@ def _with(row: Row, column: str, value: float) -> Row:
 def _cells(rows: tuple[Row, ...], columns: Sequence[str]) -> Iterator[tuple[tuple[int, ...], str, str]]:
     """Yield cells that are not 0 and have a say, and whole columns of them: rows, column, and name in a text."""
     for column in columns:
-        filled = [i for i, row in enumerate(rows) if getattr(row, column) and not _is_free(row, column)]
+        filled = [i for i, row in enumerate(rows) if getattr(row, column) and not _is_free(rows, i, column)]
         for i in filled:
             yield (i,), column, f"{column} of row {i + 1}"
         if len(filled) > 1:
             yield tuple(filled), column, f"all {column}"
 
 
-def _is_free(row: Row, column: str) -> bool:
-    """Whether a number is but the zero of the joint, which every robot may choose."""
-    return (column == "theta" and row.type.turns) or (column == "d" and row.type.moves and not row.type.turns)
+def _is_free(rows: tuple[Row, ...], i: int, column: str) -> bool:
+    """Whether a number is but the zero of the joint, or part of base or tool, which every robot may choose."""
+    row = rows[i]
+    if column == "theta":
+        return row.type.turns
+    if column == "d":
+        return row.type is JointType.PRISMATIC or (row.type.turns and i in (0, len(rows) - 1))
+    at_base = row.convention is Convention.MODIFIED
+    return i == (0 if at_base else len(rows) - 1)
 
 
 def _signs(rows: tuple[Row, ...]) -> Iterator[_Edit]:

@@ -36,6 +36,7 @@ COMMANDS = (
     "import",
     "convert",
     "diff",
+    "grade",
     "frames",
     "calibrate",
     "rollout",

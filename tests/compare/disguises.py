@@ -11,6 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from dh2sim.compare.comparison import Equivalence
+from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import compose, link_part, pose_from_rpy, rpy_from_rotation
 from dh2sim.robot.spec import BaseSpec, Convention, JointType, Pose, RobotSpec, Row, ToolSpec
 
@@ -122,3 +124,14 @@ def other_base_and_tool(spec: RobotSpec, rng: Generator) -> RobotSpec:
     """Put the arm somewhere else, and another tool on it."""
     poses = [Pose(xyz=rng.uniform(-1, 1, 3), rpy=rng.uniform(-3, 3, 3)) for _ in range(2)]
     return replace(spec, base=BaseSpec(pose=poses[0]), tool=ToolSpec.at(poses[1]))
+
+
+def equation_error(a: RobotSpec, b: RobotSpec, same: Equivalence) -> float:
+    """How far FK_B(sense q + zero) is from what the equivalence says, in any entry, at 20 random configurations."""
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-2, 2, (20, len(same.joints)))
+    q_b = np.empty_like(q)
+    for i, joint in enumerate(same.joints):
+        q_b[:, same.order[i]] = joint.sense * q[:, i] + joint.zero
+    right = np.linalg.inv(same.T_a_base_b_base) @ table_tool_pose(a, q) @ same.T_a_tool_b_tool
+    return float(np.abs(table_tool_pose(b, q_b) - right).max())

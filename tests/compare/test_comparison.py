@@ -14,10 +14,10 @@ import dh2sim
 from dh2sim.compare.comparison import diff
 from dh2sim.compare.matching import ObstacleKind
 from dh2sim.errors import Dh2simError, ModelError
-from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.robot.spec import Pose, RobotSpec, ToolSpec
-from tests.compare.disguises import disguised, random_table
+from tests.compare.disguises import disguised, equation_error, random_table
+from tests.compare.misread_tables import misread
 from tests.refusals import refusal
 from tests.sample_robots import ODD_ROBOT, ROBOTS_DIR, robot, row
 
@@ -37,14 +37,7 @@ def test_a_table_written_otherwise_is_the_same_mechanism_and_its_equation_holds(
     b = disguised(a, rng)
     same = diff(a, b).equivalence
     assert same is not None
-    n = len(a.rows)
-    q = rng.uniform(-2, 2, (20, n))
-    q_b = np.empty_like(q)
-    for i, joint in enumerate(same.joints):
-        q_b[:, same.order[i]] = joint.sense * q[:, i] + joint.zero
-    left = table_tool_pose(b, q_b)
-    right = np.linalg.inv(same.T_a_base_b_base) @ table_tool_pose(a, q) @ same.T_a_tool_b_tool
-    np.testing.assert_allclose(left, right, atol=1e-12)
+    assert equation_error(a, b, same) < 1e-12
 
 
 def test_what_differs_although_the_mechanism_is_the_same_is_said() -> None:
@@ -130,3 +123,14 @@ def test_mechanisms_and_wrong_arguments_are_refused_in_words(tmp_path: Path) -> 
     assert "four_bar: has closed loops" in refusal(ModelError, diff, "four_bar", "puma560")
     assert refusal(Dh2simError, diff, "scara", "scara", tolerance=0) == "tolerance must be above 0 and below 1, got 0"
     assert "no file or robot named" in refusal(Dh2simError, diff, "scara", str(tmp_path / "none.yaml"))
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_a_misreading_is_named_or_changes_nothing(seed: int) -> None:
+    made = misread(seed)
+    found = diff(made.right, made.wrong)
+    if found.equivalence is not None:
+        assert equation_error(made.right, made.wrong, found.equivalence) < 1e-3 * max(1.0, made.size)
+        return
+    names = [(misreading.kind, misreading.rows, misreading.columns) for misreading in found.misreadings]
+    assert (made.kind, made.rows, made.columns) in names
