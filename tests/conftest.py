@@ -11,7 +11,9 @@ from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
 # derandomized: the same robots in every run, so that a failure is one of the code and not of the day
-settings.register_profile("full", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "full", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow], max_examples=50
+)
 settings.register_profile("quick", settings.get_profile("full"), max_examples=6)
 settings.register_profile("thorough", settings.get_profile("full"), derandomize=False, max_examples=500)
 

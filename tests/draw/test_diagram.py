@@ -27,6 +27,7 @@ from tests.program import dh2sim, environment
 from tests.sample_robots import NAMES, robot
 from tests.strategies import robots_with_joint_vectors
 
+SEEN = ("puma560", "ssrms", "scara")
 STYLES = ("kinematic", "frames", "stick")
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -63,9 +64,13 @@ def test_the_arm_is_where_the_table_has_it(sample: tuple[RobotSpec, Array]) -> N
             assert mixed or math.isclose(found, length, abs_tol=1e-5 * arm.reach + 10.0 * near), (key, found, length)
 
 
-@pytest.mark.parametrize("style", STYLES)
 @pytest.mark.parametrize(
-    "name", ["puma560", *(pytest.param(name, marks=pytest.mark.slow) for name in NAMES if name != "puma560")]
+    ("name", "style"),
+    [
+        *(("puma560", style) for style in STYLES),
+        *(pytest.param(name, style, marks=pytest.mark.slow) for name in ("ssrms", "scara") for style in STYLES),
+        *(pytest.param(name, "kinematic", marks=pytest.mark.slow) for name in NAMES if name not in SEEN),
+    ],
 )
 def test_labels_are_never_on_each_other(name: str, style: str) -> None:
     boxes = []

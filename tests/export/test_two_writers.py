@@ -32,14 +32,14 @@ def campaign(name: str, count: int) -> dict[str, int]:
     return found
 
 
-@pytest.mark.parametrize("count", [30, pytest.param(300, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [20, pytest.param(150, marks=pytest.mark.slow)])
 def test_a_killed_export_is_finished_by_the_next_look_and_leaves_nothing(count: int) -> None:
     found = campaign("kills", count)
     assert {*found} <= {"mixed at first", "left something"}
     assert found["left something"] > 0, "kills must have hit exports at work"
 
 
-@pytest.mark.parametrize("count", [10, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [10, pytest.param(60, marks=pytest.mark.slow)])
 def test_two_exports_to_one_folder_never_mix(count: int) -> None:
     assert campaign("pairs", count) == {}
 

@@ -14,7 +14,7 @@ from dh2sim.formats.serial_robot import SerialLink, SerialRobot
 from dh2sim.formats.urdf.read import read_urdf
 from tests.formats.urdf.samples import Rng, anywhere, joint, links, nowhere, random_tree, robot
 
-BATCHES, BATCH = 20, 500
+BATCHES, BATCH = 8, 500
 """10 000 files."""
 
 WORDS = [
