@@ -153,6 +153,10 @@ class ControllerError(Dh2simError):
     """A controller is not known, its options or files are wrong, or its code failed."""
 
 
+class MeasureError(Dh2simError):
+    """A measure of designs is not known, or its code failed."""
+
+
 class TrajectoryError(Dh2simError, ValueError):
     """A trajectory cannot be: a path leaves limits, jumps or cannot be followed; or a file of one is wrong."""
 

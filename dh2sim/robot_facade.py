@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.model.slips import Slip
     from dh2sim.simulate.options import RolloutKeywords
+    from dh2sim.sweep.sweep import Sweep, SweepKeywords
     from dh2sim.symbolic.request import SymbolicForm, SymbolicKeywords, What
     from dh2sim.trajectory.plan import TrajectoryKeywords
     from dh2sim.trajectory.trajectory import Trajectory
@@ -716,7 +717,8 @@ class Robot:
             overwrite: Whether to replace the run at ``out``.
             **options: What is simulated and recorded, as for :func:`dh2sim.simulate.rollout`: ``controller`` (its
                 name, or a class of your own), ``seed``, ``duration`` or ``steps``, ``timestep``, ``integrator``,
-                ``start``, ``record``, ``every``, ``randomize``, ``floating_base``.
+                ``start``, ``record``, ``every``, ``randomize``, ``floating_base``; ``vary``, ``designs`` and
+                ``per_design`` for robots that differ.
 
         Returns:
             The dataset, as ``docs/dataset.md`` describes it; read lazily from ``out`` if that is given.
@@ -762,6 +764,30 @@ class Robot:
             read_measurements(data, self, kind=kind, groups=groups) if isinstance(data, str | os.PathLike) else data
         )
         return calibrate(self, measured, **options)
+
+    def sweep(self, *, out: FilePath | None = None, **options: Unpack[SweepKeywords]) -> Sweep:
+        """Measure what each of many designs can do, without simulation.
+
+        Args:
+            out: File to write, .parquet or .csv; the same call continues it. None to keep the table in memory.
+            **options: As for :func:`dh2sim.sweep.sweep.sweep`: ``vary`` or ``designs``, ``count``, ``measure``
+                ('workspace', 'manipulability', 'reach', 'payload', or ``module:function``, which is given a
+                :class:`Robot`), ``samples``, ``voxel``, ``seed``, ``jobs``, ``overwrite``.
+
+        Returns:
+            The :class:`Sweep`: ``measures`` has the spread and the best design of each column, ``columns`` the table.
+
+        Raises:
+            Dh2simError: An option or a design is wrong, a measure fails, or the table cannot be written.
+        """
+        from dh2sim.sweep.sweep import sweep
+
+        return sweep(self.model, out=out, wrap=Robot.of_model, **options)
+
+    @classmethod
+    def of_model(cls, model: RobotModel) -> Self:
+        """Return the robot of a model."""
+        return cls.from_spec(model.spec)
 
     def convert(self, convention: Convention | str) -> Self:
         """Return the same arm with its table in another convention, 'standard' or 'modified', or 'compact'.

@@ -58,6 +58,7 @@ COMMANDS: Final = {
     "frames": Command("importing", "frames", "Assign DH frames to joint axes, step by step."),
     "calibrate": Command("calibrate", "calibrate", "Fit a table to measurements of the real robot."),
     "rollout": Command("rollout", "rollout", "Simulate many rollouts into a dataset."),
+    "sweep": Command("sweep", "sweep", "Measure what each of many designs can do."),
     "render": Command("pictures", "render", "Render a rollout as a video, or a robot as an image."),
     "draw": Command(
         "draw",
@@ -98,6 +99,7 @@ Examples:
   dh2sim diff puma560 puma560_standard
   dh2sim rollout stanford --out run.zarr
   dh2sim runs run.zarr               what a run contains
+  dh2sim sweep stanford --vary d2=0.2 --count 32 -o arms.csv
   dh2sim plot run.zarr               how its joints move
   dh2sim render run.zarr             a video of it
 

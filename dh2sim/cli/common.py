@@ -124,6 +124,23 @@ def refuse_options(what: str, options: Mapping[str, object]) -> None:
             raise typer.BadParameter(f"does not apply to {what}", param_hint=name)
 
 
+def named_values(text: str, option: str, form: str) -> dict[str, str]:
+    """Return the values by name of an option ``name=value,…``; ``form`` says what each is like.
+
+    Raises:
+        BadParameter: The text is not of that form, or has a name twice.
+    """
+    values: dict[str, str] = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        name, equals, value = (part.strip() for part in item.partition("="))
+        if not equals or not name or not value:
+            raise typer.BadParameter(f"'{item}' is not of the form {form}", param_hint=option)
+        if name in values:
+            raise typer.BadParameter(f"'{name}' is given twice", param_hint=option)
+        values[name] = value
+    return values
+
+
 def tolerance_of(value: float) -> float:
     """Return the value of ``--tolerance``.
 

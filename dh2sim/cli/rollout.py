@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import INTERRUPTED, RobotArgument, build_any
+from dh2sim.cli.common import INTERRUPTED, RobotArgument, build_any, named_values
 from dh2sim.cli.output import json_text, make_console, progress_bar, size_text
 from dh2sim.cli.runs import clipped_controls, contacts, loops
 from dh2sim.messages import printable
@@ -179,7 +179,7 @@ def rollout(
         record=record,
         every=every,
         randomize=_shares(randomize),
-        vary=_named(vary, "--vary", "name=how, as in a2=0.05"),
+        vary=named_values(vary, "--vary", "name=how, as in a2=0.05"),
         designs=None if designs is None else str(designs),
         per_design=per_design,
         floating_base=floating_base,
@@ -220,19 +220,6 @@ def rollout(
     return INTERRUPTED if patience.arrived == signal.SIGINT else 128 + int(patience.arrived or 0)
 
 
-def _named(text: str, option: str, form: str) -> dict[str, str]:
-    """Read ``name=value,…``; ``form`` says in words what each is like."""
-    values: dict[str, str] = {}
-    for item in filter(None, (part.strip() for part in text.split(","))):
-        name, equals, value = (part.strip() for part in item.partition("="))
-        if not equals or not name or not value:
-            raise typer.BadParameter(f"'{item}' is not of the form {form}", param_hint=option)
-        if name in values:
-            raise typer.BadParameter(f"'{name}' is given twice", param_hint=option)
-        values[name] = value
-    return values
-
-
 def _share(text: str) -> tuple[int, int] | None:
     """Read ``I/N``."""
     if not text:
@@ -265,7 +252,7 @@ def _shares(text: str) -> dict[str, float]:
     """Read ``name=share,…``."""
     shares: dict[str, float] = {}
     form = "name=share, as in mass=0.1"
-    for name, value in _named(text, "--randomize", form).items():
+    for name, value in named_values(text, "--randomize", form).items():
         try:
             shares[name] = float(value)
         except ValueError:

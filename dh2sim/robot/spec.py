@@ -567,6 +567,12 @@ class RobotSpec:
         for name, value in robot_fields(tree, Units()).items():
             object.__setattr__(self, name, kept(getattr(self, name), value))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let a robot be pickled and copied: read-only mappings cannot be."""
+        given = {each.name: getattr(self, each.name) for each in dataclasses.fields(self)}
+        plain = {name: dict(value) if isinstance(value, Mapping) else value for name, value in given.items()}
+        return robot_of_checked, (plain,)
+
     @property
     def all_rows(self) -> tuple[Row, ...]:
         """The rows of the main chain, then those of the branches."""
@@ -608,6 +614,7 @@ def robot_of_checked(given: Mapping[str, Any]) -> RobotSpec:
     for each in dataclasses.fields(RobotSpec):
         if each.name in given or each.default is not dataclasses.MISSING:
             value = given.get(each.name, each.default)
+            value = MappingProxyType(value) if isinstance(value, dict) else value
         else:
             assert each.default_factory is not dataclasses.MISSING
             value = each.default_factory()

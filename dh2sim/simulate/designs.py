@@ -320,6 +320,13 @@ class Designs:
         column = int(table.places[0, table.columns.index(problem.path)])
         return replace(problem, file=table.name, line=table.lines[0], column=column)
 
+    def settings(self) -> dict[str, Any]:
+        """Return what the designs are made from, JSON values; not how many of them there are."""
+        drawn_names = self.names[len(self.names) - len(self._draws) :]
+        drawn = {name: str(draw) for name, draw in zip(drawn_names, self._draws, strict=True)}
+        found: dict[str, Any] = {"vary": drawn, "seed": self._seed} if self._draws else {}
+        return found if self._table is None else {**found, "designs_sha256": self._table.digest}
+
     def values(self, design: int) -> list[float]:
         """Return the values of a design, in the units of the robot file."""
         given = [] if self._table is None else self._table.values[design].tolist()

@@ -90,7 +90,8 @@ def rollout(
         advance: Called with the number of rollouts that are done since the last call.
         **options: What is simulated and recorded, the fields of ``RolloutOptions``: ``rollouts`` (256), ``steps`` or
             ``duration`` (2 s), ``timestep`` (0.002 s), ``integrator``, ``controller`` ('sine'), ``start`` ('home'),
-            ``seed`` (0), ``record``, ``every`` (1), ``randomize``, ``floating_base``.
+            ``seed`` (0), ``record``, ``every`` (1), ``randomize``, ``floating_base``, ``vary``, ``designs``,
+            ``per_design`` (1).
 
     Returns:
         The dataset, as ``docs/dataset.md`` describes it; read lazily from ``out`` if that is given.

@@ -42,7 +42,7 @@ def user_code(name: str) -> Iterator[None]:
     except Dh2simError:
         raise
     except (Exception, SystemExit) as error:
-        raise ControllerError(f"controller '{name}': {_what(error)}{_where(error)}") from error
+        raise ControllerError(f"controller '{name}': {what_and_where(error)}") from error
 
 
 def guard_methods(name: str, controller: Controller) -> Controller:
@@ -67,6 +67,11 @@ def _guard(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
             return method(*args, **kwargs)
 
     return call
+
+
+def what_and_where(error: BaseException) -> str:
+    """Return what a user's code raised, and in which line of which file."""
+    return f"{_what(error)}{_where(error)}"
 
 
 def _what(error: BaseException) -> str:
@@ -140,7 +145,7 @@ def load_class(module_name: str, class_name: str) -> type | None:
         ControllerError: The module cannot be imported, or does not have the class.
     """
     name = f"{module_name}:{class_name}"
-    with user_code(name), _from_here():
+    with user_code(name), from_here():
         try:
             module = importlib.import_module(module_name)
         except ModuleNotFoundError as error:
@@ -188,7 +193,7 @@ def _is_candidate(value: object, module_name: str) -> bool:
 
 
 @contextmanager
-def _from_here() -> Iterator[None]:
+def from_here() -> Iterator[None]:
     """Search the current directory for modules: first while the context lasts, and last afterwards.
 
     Last, so that code which imports something later finds it, and no file there hides an installed library.

@@ -1,0 +1,148 @@
+"""``dh2sim sweep``: what each of many designs can do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dh2sim.cli.common import RobotArgument, build_all, named_values
+from dh2sim.cli.output import json_text, progress_bar, table_lines
+from dh2sim.messages import printable
+
+if TYPE_CHECKING:
+    from dh2sim.sweep.sweep import Sweep
+
+
+def sweep(
+    robot: RobotArgument,
+    designs: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv", help="File of designs: a column for each number.")
+    ] = None,
+    vary: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME=HOW,…",
+            help="Draw numbers of the robot file: X (a factor from 1 - X to 1 + X), normal:SD, uniform:LOW:HIGH or "
+            "loguniform:LOW:HIGH, in the file's units.",
+        ),
+    ] = "",
+    count: Annotated[
+        int | None, typer.Option(metavar="N", help="Number of designs that --vary draws. [default: 256]")
+    ] = None,
+    measure: Annotated[
+        str,
+        typer.Option(
+            metavar="NAMES",
+            help="What to measure, separated by commas: workspace, manipulability, reach, payload, or "
+            "MODULE:FUNCTION of your own, which is given a Robot.",
+        ),
+    ] = "workspace,manipulability,reach,payload",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE",
+            help="Table to write, .parquet or .csv. The same command continues it.",
+        ),
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(metavar="N", help="Configurations of each design that are looked at.")
+    ] = 2000,
+    voxel: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Edge of the workspace's voxels, m. [default: an eighth of the reach]"),
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random number generator.")] = 0,
+    jobs: Annotated[
+        int, typer.Option(metavar="N", help="Number of processes, 0 for one a processor; changes no result.")
+    ] = 1,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Measure anew what is there.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, alone.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Measure what each of many designs can do, without simulating it.
+
+    A design is the robot with other numbers in its file: parameters, cells such as a2 or theta1, or paths such as
+    joint_2.link.mass. What was measured is kept beside the table, so that the same command continues it after an
+    interruption, and adds to it with a larger --count.
+
+    \b
+    Examples:
+      dh2sim sweep stanford --vary d1=uniform:0.3:0.5,d2=0.2 -o arms.csv
+      dh2sim sweep puma560 --designs designs.csv --measure reach -o arms.csv
+      dh2sim sweep ur5e --vary d4=0.1 --count 32 --measure reach --json
+    """
+    model = build_all([robot])[0]
+    from dh2sim.robot_facade import Robot
+    from dh2sim.sweep.sweep import DEFAULT_COUNT, sweep
+
+    total = DEFAULT_COUNT if count is None else count
+    if designs is not None:
+        from dh2sim.simulate.designs import read_design_table
+
+        total = len(read_design_table(designs))
+    with progress_bar("measuring", "designs", total, quiet=quiet) as advance:
+        found = sweep(
+            model,
+            vary=named_values(vary, "--vary", "name=how, as in a2=0.05"),
+            designs=designs,
+            count=count,
+            measure=measure,
+            samples=samples,
+            voxel=voxel,
+            seed=seed,
+            jobs=jobs,
+            out=out,
+            overwrite=overwrite,
+            advance=advance,
+            wrap=Robot.of_model,
+        )
+    if as_json:
+        print(json_text({**_as_json(found), "out": None if out is None else str(out)}))
+    elif not quiet:
+        print("\n".join(_lines(found)))
+        if out is not None:
+            print(printable(f"\nwritten: {out}"))
+
+
+def _as_json(found: Sweep) -> dict[str, object]:
+    return {
+        "robot": found.robot,
+        "designs": found.count,
+        "measured": found.measured,
+        "parameters": list(found.parameters),
+        "measures": {
+            name: {
+                "unit": spread.unit,
+                "least": spread.least,
+                "mean": spread.mean,
+                "best": {
+                    "design": spread.best.design,
+                    "value": spread.best.value,
+                    "parameters": dict(spread.best.parameters),
+                },
+            }
+            for name, spread in found.measures.items()
+        },
+    }
+
+
+def _lines(found: Sweep) -> list[str]:
+    before = found.count - found.measured
+    kept = f", {before:,} of them before" if before else ""
+    lines = [f"{found.robot}: {found.count:,} designs measured{kept}", ""]
+    table: list[tuple[str, ...]] = [("measure", "least", "mean", "best", "design")]
+    for name, spread in found.measures.items():
+        values = (f"{value:.5g}" for value in (spread.least, spread.mean, spread.best.value))
+        unit = f", {spread.unit}" if spread.unit else ""
+        table.append((f"{name}{unit}", *values, str(spread.best.design)))
+    lines += [line.rstrip() for line in table_lines(table, left=1)]
+    lines.append("")
+    for design in dict.fromkeys(spread.best.design for spread in found.measures.values()):
+        parameters = next(s.best.parameters for s in found.measures.values() if s.best.design == design)
+        pairs = ", ".join(f"{key}={value:.6g}" for key, value in parameters.items())
+        lines.append(f"design {design}: {pairs}")
+    return [printable(line) for line in lines]

@@ -1,0 +1,1 @@
+"""What each of many designs can do: measures of robots without simulation, in a table."""
