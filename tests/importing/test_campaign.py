@@ -7,7 +7,7 @@ import pytest
 from tests.importing.campaign import broken_meshes, files
 
 
-@pytest.mark.parametrize("count", [40, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [40, pytest.param(300, marks=pytest.mark.slow)])
 def test_a_damaged_file_is_imported_and_exported_or_refused_by_name(count: int) -> None:
     found, failures = files(count, seed=count)
     assert failures == []
@@ -15,7 +15,7 @@ def test_a_damaged_file_is_imported_and_exported_or_refused_by_name(count: int) 
     assert sum(found.values()) == count
 
 
-@pytest.mark.parametrize("count", [40, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [40, pytest.param(300, marks=pytest.mark.slow)])
 def test_a_damaged_mesh_is_read_or_refused_by_name(count: int) -> None:
     found, failures = broken_meshes(count, seed=count)
     assert failures == []
