@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from dh2sim.trajectory.plan import TrajectoryKeywords
     from dh2sim.trajectory.trajectory import Trajectory
     from dh2sim.validate.report import RobotReport
-    from dh2sim.view.server import Viewer
+    from dh2sim.view.server import PageServer
     from dh2sim.workspace.workspace import Workspace, WorkspaceKeywords
 
 FilePath: TypeAlias = str | os.PathLike[str]
@@ -855,7 +855,7 @@ class Robot:
 
     def view(
         self, *, host: str = "127.0.0.1", port: int = 8080, browser: bool = True, allow_hosts: Iterable[str] = ()
-    ) -> Viewer:
+    ) -> PageServer[Any]:
         """Show the robot in the browser, and return at once.
 
         Args:
@@ -871,11 +871,17 @@ class Robot:
             Dh2simError: Nobody can listen at this address.
         """
         from dh2sim.view.initial_state import folder_of, open_state
+        from dh2sim.view.mechanism.server import MechanismViewer
         from dh2sim.view.server import Viewer, free_port
 
         file = self.spec.source_file
-        state = open_state(self.spec, None if file is None else folder_of(file.path))
-        viewer = Viewer(state, host=host, port=free_port(host, port), allow_hosts=allow_hosts)
+        free = free_port(host, port)
+        viewer: PageServer[Any]
+        if self.spec.is_mechanism:
+            viewer = MechanismViewer(self.mechanism, host=host, port=free, allow_hosts=allow_hosts)
+        else:
+            state = open_state(self.spec, None if file is None else folder_of(file.path))
+            viewer = Viewer(state, host=host, port=free, allow_hosts=allow_hosts)
         if browser:
             viewer.open_browser()
         return viewer

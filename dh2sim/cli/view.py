@@ -8,7 +8,7 @@ import re
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,8 +17,12 @@ from dh2sim.cli.output import require_free
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from dh2sim.model.robot_model import RobotModel
+    from dh2sim.robot.spec import RobotSpec
     from dh2sim.trajectory.files import SampledTrajectory
+    from dh2sim.view.server import PageServer
     from dh2sim.view.state import ViewState
 
 DEFAULT_PORT = 8080
@@ -81,9 +85,13 @@ def view(
     if export is not None and export.suffix.lower() not in (".html", ".htm"):
         raise typer.BadParameter(f"must be a file that ends in .html, got {str(export)!r}", param_hint="--export")
     require_free(export, force=force)
+    [spec] = load_all([robot])
+    if spec.is_mechanism:
+        names = _host_names(allow_host or [])
+        _view_mechanism(spec, run, rollout, export, host=host, allow_hosts=names, port=port, browser=browser)
+        return
     from dh2sim.view.initial_state import folder_of, open_state
 
-    [spec] = load_all([robot])
     state = open_state(spec, folder_of(robot))
     report_slips([state.model], strict=strict)
     motion = None if run is None else _trajectory(run, state.model)
@@ -109,25 +117,68 @@ def _host_names(names: list[str]) -> list[str]:
     return names
 
 
+def _view_mechanism(
+    spec: RobotSpec,
+    run: Path | None,
+    rollout: int,
+    export: Path | None,
+    *,
+    host: str,
+    allow_hosts: list[str],
+    port: int,
+    browser: bool,
+) -> None:
+    """Show a mechanism, or write a page of it."""
+    from dh2sim.model.mechanism import build_mechanism
+    from dh2sim.trajectory.files import is_trajectory_file
+
+    if run is not None and (export is None or is_trajectory_file(run)):
+        what = "a mechanism's page plays no trajectory file" if is_trajectory_file(run) else "needs --export"
+        raise typer.BadParameter(f"{what}: {spec.name} is a mechanism", param_hint="RUN.zarr|MOTION")
+    model = build_mechanism(spec)
+    if export is None:
+        from dh2sim.view.mechanism.server import MechanismViewer
+
+        def serve(chosen: int) -> MechanismViewer:
+            return MechanismViewer(model, host=host, port=chosen, allow_hosts=allow_hosts)
+
+        _serve_pages(spec.name, serve, host=host, port=port, browser=browser)
+        return
+    from dh2sim.draw.rollout_data import open_rollout
+    from dh2sim.view.mechanism.scene import export_mechanism_page
+
+    export_mechanism_page(model, model.q, export, rollout=None if run is None else open_rollout(run, rollout))
+    print(printable(f"{export}: {spec.name}{'' if run is None else f', rollout {rollout} of {run}'}"))
+
+
 def _serve(
     state: ViewState, run: Path | None, *, host: str, allow_hosts: list[str], port: int, browser: bool
 ) -> None:
     """Serve pages until the program is interrupted."""
+    from dh2sim.view.server import Viewer
+
+    def serve(chosen: int) -> Viewer:
+        return Viewer(state, host=host, port=chosen, run=run, allow_hosts=allow_hosts)
+
+    _serve_pages(state.spec.name, serve, host=host, port=port, browser=browser)
+
+
+def _serve_pages(name: str, serve: Callable[[int], PageServer[Any]], *, host: str, port: int, browser: bool) -> None:
     from dh2sim.view.access import ANY_ADDRESS, is_address
-    from dh2sim.view.server import Viewer, free_port
+    from dh2sim.view.server import free_port
 
     _use_one_arena()
     chosen = free_port(host, port)
     if chosen != port:
         print(f"dh2sim: port {port} is taken; using {chosen}", file=sys.stderr)
-    viewer = Viewer(state, host=host, port=chosen, run=run, allow_hosts=allow_hosts)
+    viewer = serve(chosen)
     try:
         if not viewer.access.only_here:
             address = "any of its addresses" if host in ANY_ADDRESS else host
             print(f"dh2sim: anyone who can reach this machine at {address} can open the page", file=sys.stderr)
-            names = ", ".join(name for name in viewer.access.names if not is_address(name))
+            names = ", ".join(each for each in viewer.access.names if not is_address(each))
             print(f"dh2sim: by an IP address or as {names}; --allow-host adds a name", file=sys.stderr)
-        print(f"{state.spec.name}: {viewer.url}  (stop with Ctrl-C)", flush=True)
+        print(f"{name}: {viewer.url}  (stop with Ctrl-C)", flush=True)
         if browser:
             viewer.open_browser()
         viewer.wait()

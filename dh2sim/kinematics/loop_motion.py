@@ -78,6 +78,28 @@ def mechanism_configuration(robot: SpecLike, q: ArrayLike) -> Array:
     return read_only(_Motion(spec, tree, driven).follow(q0, values))
 
 
+def driven_motion(robot: SpecLike, q: ArrayLike, target: ArrayLike) -> Array:
+    """Return where moving the driven joints straight from one configuration to a target leads.
+
+    Args:
+        robot: The robot.
+        q: Joint vector at which the loops are closed, rad and m, shape (n,).
+        target: Coordinates of the driven joints, in the order of a joint vector, shape (k,).
+
+    Returns:
+        Shape (n,), read-only.
+
+    Raises:
+        SingularPositionError: On the way there is a dead or singular position; the text says where.
+        ConfigurationError: ``q`` has another shape or is not finite.
+    """
+    spec = spec_of(robot)
+    tree, _ = assembly(spec)
+    start = np.array(joint_values(tree, q))
+    motion = _Motion(spec, tree, sorted(actuated_joints(spec)))
+    return read_only(motion.follow(start, np.asarray(target, dtype=np.float64)))
+
+
 def named_configuration(robot: SpecLike, name: str) -> Array:
     """Return a named configuration of a mechanism, with its loops closed.
 

@@ -114,8 +114,8 @@ def page_html(keyframes: Sequence[tuple[float, Scene]], *, title: str, bounds: B
         bounds: What the camera looks at first.
     """
     with recording_server() as server:
-        _look_at(server, bounds)
-        _add_ground(server, bounds)
+        look_at(server, bounds)
+        add_ground(server, bounds)
         painter = Painter(server.scene)
         painter.draw(keyframes[0][1])
         recording = server.get_scene_serializer()
@@ -130,7 +130,8 @@ def page_html(keyframes: Sequence[tuple[float, Scene]], *, title: str, bounds: B
     return page.replace(_TITLE, f"<title>{html.escape(title)}</title>", 1)
 
 
-def _look_at(server: viser.ViserServer, bounds: BoundingSphere) -> None:
+def look_at(server: viser.ViserServer, bounds: BoundingSphere) -> None:
+    """Make the initial camera see all of a scene."""
     distance = _MARGIN * bounds.radius / math.sin(0.5 * _FIELD_OF_VIEW)
     direction = np.array(_DIRECTION) / np.linalg.norm(_DIRECTION)
     camera = server.initial_camera
@@ -140,7 +141,7 @@ def _look_at(server: viser.ViserServer, bounds: BoundingSphere) -> None:
     camera.near, camera.far = 0.01 * distance, 100.0 * distance
 
 
-def _add_ground(server: viser.ViserServer, bounds: BoundingSphere) -> None:
+def add_ground(server: viser.ViserServer, bounds: BoundingSphere) -> None:
     """Add a grid of a round number of metres on the ground, below the middle of the scene."""
     cell = round_length(bounds.radius / 10.0)
     side = 20.0 * cell

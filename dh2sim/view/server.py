@@ -21,7 +21,7 @@ import warnings
 import webbrowser
 from collections.abc import Iterable, Iterator
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
 
 from dh2sim.errors import Dh2simError
 from dh2sim.view.access import ANY_ADDRESS, Access, closer
@@ -96,44 +96,51 @@ def _refuse_to_share(*_arguments: object, **_options: object) -> None:
     """Refuse viser's tunnel to the internet."""
 
 
-class Viewer:
+class ServedPage(Protocol):
+    """What a server knows of a page."""
+
+    def start(self) -> None:
+        """Draw, and begin to work through events."""
+
+    def close(self) -> None:
+        """End after the present task."""
+
+    def join(self, timeout: float) -> None:
+        """Wait until its thread has ended, at most ``timeout`` seconds."""
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether its thread has not ended yet."""
+
+
+P = TypeVar("P", bound=ServedPage)
+
+
+class PageServer(Generic[P]):
     """Serves pages until it is stopped."""
 
-    def __init__(
-        self,
-        state: ViewState,
-        *,
-        host: str = "127.0.0.1",
-        port: int = 0,
-        run: FilePath | None = None,
-        allow_hosts: Iterable[str] = (),
-    ) -> None:
+    def __init__(self, *, host: str, port: int, allow_hosts: Iterable[str]) -> None:
         """Start to serve.
 
         Args:
-            state: Initial state of every page.
-            host: Address to listen at; by default only this machine can reach it.
+            host: Address to listen at.
             port: Port to listen at, 0 for any free one; see ``free_port``.
-            run: A run of the same robot that pages can play.
             allow_hosts: Names of this machine that browsers may use, besides those that it knows of itself.
 
         Raises:
-            RunError: The run cannot be read, or is of a robot with other joints.
             Dh2simError: Requests cannot be checked with this version of viser.
         """
-        self._state = state
         self._host = host
-        self._run = run
-        self._open_replay()  # raises early
-        self._pages: dict[int, Page] = {}
-        self._leaving: list[Page] = []
+        self._pages: dict[int, P] = {}
+        self._leaving: list[P] = []
         """Pages whose browser is gone, and which are not cleared up yet."""
         self._stopping = threading.Event()
         self._lock = threading.Lock()
         self.access: Final = Access(host, allow_hosts)
         self._server = start_server(host, port, self.access)
         self.port: int = self._server.get_port()
-        _configure(self._server, state)
+        _configure(self._server)
+        self.aim(self._server)
         # not a daemon: Python crashes if it ends while a library is being loaded
         threading.Thread(target=_preload, name="preload").start()
         self._server.on_client_connect(self._open)
@@ -146,10 +153,18 @@ class Viewer:
         return f"http://{f'[{name}]' if ':' in name else name}:{self.port}"
 
     @property
-    def pages(self) -> tuple[Page, ...]:
+    def pages(self) -> tuple[P, ...]:
         """The open pages."""
         with self._lock:
             return tuple(self._pages.values())
+
+    def new_page(self, client: viser.ClientHandle) -> P:
+        """Return a page for a browser."""
+        raise NotImplementedError
+
+    def aim(self, server: viser.ViserServer) -> None:
+        """Set where the camera of a page is at first."""
+        raise NotImplementedError
 
     def open_browser(self) -> None:
         """Open the page if there is a screen; without one, Python would start a browser in the terminal."""
@@ -174,18 +189,10 @@ class Viewer:
         stop_server(self._server)
 
     async def _open(self, client: viser.ClientHandle) -> None:
-        page = Page(client, self._state, self._open_replay, closer())
+        page = self.new_page(client)
         with self._lock:
             self._pages[client.client_id] = page
         page.start()
-
-    def _open_replay(self) -> Replay | None:
-        """Open the run; every page has its own, which caches rollouts and is not thread-safe."""
-        if self._run is None:
-            return None
-        from dh2sim.view.motion.replay import open_replay
-
-        return open_replay(self._run, self._state.model)
 
     async def _close(self, client: viser.ClientHandle) -> None:
         with self._lock:
@@ -213,6 +220,53 @@ class Viewer:
                 give_back_memory()
             if done:
                 return
+
+
+class Viewer(PageServer[Page]):
+    """Serves pages of a robot."""
+
+    def __init__(
+        self,
+        state: ViewState,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        run: FilePath | None = None,
+        allow_hosts: Iterable[str] = (),
+    ) -> None:
+        """Start to serve.
+
+        Args:
+            state: Initial state of every page.
+            host: Address to listen at; by default only this machine can reach it.
+            port: Port to listen at, 0 for any free one; see ``free_port``.
+            run: A run of the same robot that pages can play.
+            allow_hosts: Names of this machine that browsers may use, besides those that it knows of itself.
+
+        Raises:
+            RunError: The run cannot be read, or is of a robot with other joints.
+            Dh2simError: Requests cannot be checked with this version of viser.
+        """
+        self._state = state
+        self._run = run
+        self._open_replay()  # raises early
+        super().__init__(host=host, port=port, allow_hosts=allow_hosts)
+
+    def new_page(self, client: viser.ClientHandle) -> Page:
+        """Return a page for a browser."""
+        return Page(client, self._state, self._open_replay, closer())
+
+    def aim(self, server: viser.ViserServer) -> None:
+        """Set where the camera of a page is at first."""
+        aim(server.initial_camera, self._state.model)
+
+    def _open_replay(self) -> Replay | None:
+        """Open the run; every page has its own, which caches rollouts and is not thread-safe."""
+        if self._run is None:
+            return None
+        from dh2sim.view.motion.replay import open_replay
+
+        return open_replay(self._run, self._state.model)
 
 
 def give_back_memory() -> None:
@@ -248,8 +302,8 @@ def _preload() -> None:
     importlib.import_module("dh2sim.engines.mujoco_engine")
 
 
-def _configure(server: viser.ViserServer, state: ViewState) -> None:
-    """Set what all pages have in common: theme, light and initial camera."""
+def _configure(server: viser.ViserServer) -> None:
+    """Set what all pages have in common: theme and light."""
     server.gui.configure_theme(
         control_width="large",
         dark_mode=False,
@@ -261,4 +315,3 @@ def _configure(server: viser.ViserServer, state: ViewState) -> None:
     server.scene.set_up_direction("+z")
     # shadows of links on links are no help, and take two thirds of the time of a browser without a graphics card
     server.scene.configure_default_lights(cast_shadow=False)
-    aim(server.initial_camera, state.model)

@@ -21,7 +21,6 @@ REFUSED = (
     "trajectory four_bar home home -o motion.csv",
     "convert four_bar --to modified -o other.yaml",
     "draw four_bar -o drawing.svg",
-    "view four_bar --export page.html",
 )
 
 

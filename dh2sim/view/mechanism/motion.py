@@ -1,0 +1,129 @@
+"""How a mechanism on a page moves: driven joints by continuation, or everything by MuJoCo in real time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from dh2sim.errors import SingularPositionError
+from dh2sim.formats.mjcf.mechanism import joint_coordinates, to_mechanism_mjcf
+from dh2sim.kinematics.loop_motion import actuated_joints, driven_motion
+from dh2sim.model.mechanism import MechanismModel
+from dh2sim.model.variants import with_actuators, without_meshes
+from dh2sim.mujoco_warnings import mujoco_warnings
+from dh2sim.robot.spec import ActuatorType
+from dh2sim.typing import Array, read_only
+
+MOST_STEPS: Final = 200
+"""Of the simulation at a time; a slow machine falls behind."""
+FASTEST: Final = 1e3
+"""rad/s or m/s: what moves faster is unstable."""
+
+
+class MechanismMotion:
+    """A mechanism's configuration, and what moves it."""
+
+    def __init__(self, model: MechanismModel) -> None:
+        """Start at the assembly."""
+        self.model = model
+        self.driven = sorted(actuated_joints(model.spec))
+        self.q: Array = model.q
+        self.wanted = [float(model.q[k]) for k in self.driven]
+        """Of the driven joints, rad and m."""
+        self._simulation: _Simulation | None = None
+
+    def move(self, values: Mapping[int, float]) -> None:
+        """Move driven joints, counted among them; the passive ones follow.
+
+        Raises:
+            SingularPositionError: A dead or singular position is in the way; nothing has moved then.
+        """
+        wanted = [values.get(place, value) for place, value in enumerate(self.wanted)]
+        if self._simulation is None:
+            self.q = driven_motion(self.model.spec, self.q, wanted)
+        self.wanted = wanted
+
+    def place(self, q: Array) -> None:
+        """Go to a configuration in which the loops are closed."""
+        self.q = read_only(q)
+        self.wanted = [float(q[k]) for k in self.driven]
+        if self._simulation is not None:
+            self._simulation.start(self.q)
+
+    @property
+    def simulates(self) -> bool:
+        """Whether MuJoCo moves it."""
+        return self._simulation is not None
+
+    def simulate(self, on: bool) -> None:
+        """Begin to simulate, with position actuators that hold the driven joints where they are wanted; or end.
+
+        What is simulated is nearly closed; afterwards the driven joints stay where they were wanted last, if they
+        can be brought there.
+        """
+        if on and self._simulation is None:
+            self._simulation = _Simulation(self.model)
+            self._simulation.start(self.q)
+        elif not on and self._simulation is not None:
+            self._simulation = None
+            try:
+                q = driven_motion(self.model.spec, self.model.q, self.wanted)
+            except SingularPositionError:
+                q = self.model.q
+            self.place(q)
+
+    def tick(self) -> float | None:
+        """Advance the simulation to the present; return how far the loops are open, m, or None without one.
+
+        Raises:
+            SingularPositionError: The simulation became unstable; it is at the assembly again.
+        """
+        if self._simulation is None:
+            return None
+        q = self._simulation.advance(self.wanted)
+        if q is None:
+            self.place(self.model.q)
+            raise SingularPositionError("the simulation became unstable, and starts at the assembly again")
+        self.q = q
+        return self._simulation.gap
+
+
+class _Simulation:
+    """MuJoCo on a mechanism, in real time."""
+
+    def __init__(self, model: MechanismModel) -> None:
+        self._robot = without_meshes(with_actuators(model, ActuatorType.POSITION))
+        with mujoco_warnings():
+            self._model = mujoco.MjModel.from_xml_string(to_mechanism_mjcf(self._robot))
+        self._data = mujoco.MjData(self._model)
+        self._places = [int(self._model.joint(joint.name).qposadr[0]) for joint in model.moving_joints]
+        self._now = time.perf_counter()
+
+    def start(self, q: Array) -> None:
+        """Start at rest."""
+        mujoco.mj_resetData(self._model, self._data)
+        for name, value in joint_coordinates(self._robot, q).items():
+            self._data.qpos[self._model.joint(name).qposadr[0]] = value
+        self._now = time.perf_counter()
+
+    def advance(self, wanted: list[float]) -> Array | None:
+        """Simulate the time that went by; return the joint vector, None where it became unstable."""
+        now = time.perf_counter()
+        steps = min(MOST_STEPS, int((now - self._now) / self._model.opt.timestep))
+        self._now = now
+        self._data.ctrl[:] = wanted
+        with mujoco_warnings():
+            for _ in range(steps):
+                mujoco.mj_step(self._model, self._data)
+        fast = not (np.abs(self._data.qvel) < FASTEST).all()  # NaN compares false
+        return None if fast else read_only(self._data.qpos[self._places])
+
+    @property
+    def gap(self) -> float:
+        """The widest gap of the loops, m or rad."""
+        closed = self._data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+        return float(np.abs(self._data.efc_pos[closed]).max(initial=0.0))

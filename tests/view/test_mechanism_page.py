@@ -1,0 +1,109 @@
+"""Pages of mechanisms: what moves them, what is drawn, and in a browser."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from dh2sim.errors import SingularPositionError
+from dh2sim.kinematics.loop_closure import closure_gaps
+from dh2sim.kinematics.table_oracle import table_mechanism_frames
+from dh2sim.model.mechanism import build_mechanism
+from dh2sim.robot.read import load_robot, parse_robot
+from dh2sim.simulate import rollout
+from dh2sim.view.mechanism.motion import MechanismMotion
+from dh2sim.view.mechanism.scene import mechanism_scene
+from dh2sim.view.mechanism.server import MechanismViewer
+from dh2sim.view.scene.items import Placed
+from dh2sim.view.scene.solids import rotation_matrix
+from tests.program import dh2sim
+from tests.view.on_page import field, shown, wait_until
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+
+def test_passive_joints_follow_the_driven_one_and_a_dead_position_stops_it() -> None:
+    motion = MechanismMotion(build_mechanism(load_robot("four_bar")))
+    motion.move({0: 2.0})
+    assert motion.q[0] == 2.0
+    assert max(gap.position for gap in closure_gaps(motion.model.tree, motion.q)) < 1e-11
+    text = Path("robots/mechanisms/four_bar.yaml").read_text(encoding="utf-8").replace("crank: 0.6", "crank: 1.6")
+    stiff = MechanismMotion(build_mechanism(parse_robot(text)))
+    before = stiff.q
+    with pytest.raises(SingularPositionError, match="dead or singular position at joint_1"):
+        stiff.move({0: 3.1})
+    assert stiff.q is before
+
+
+def test_links_and_frames_are_drawn_where_the_table_has_them() -> None:
+    model = build_mechanism(load_robot("slider_crank"))
+    scene = mechanism_scene(model, model.q)
+    table = table_mechanism_frames(model.spec, model.q)
+    for name in ("dh_1", "tool0"):
+        link = next(path.rpartition("/")[0] for path in scene if path.endswith(f"/{name}"))
+        T = _pose(scene[link]) @ _pose(scene[f"{link}/{name}"])
+        assert pytest.approx(table[name], abs=1e-12) == T
+    assert {closure.name for closure in model.tree.closures} == {
+        path.rpartition("closure ")[2] for path in scene if re.search(r"/closure \w+$", path)
+    }
+
+
+def _pose(item: Placed) -> np.ndarray:
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotation_matrix(item.orientation), item.position
+    return T
+
+
+def test_the_simulation_holds_the_loops_and_ends_closed() -> None:
+    motion = MechanismMotion(build_mechanism(load_robot("five_bar")))
+    motion.simulate(True)
+    motion.move({0: motion.wanted[0] + 0.2})
+    gap = 0.0
+    for _ in range(20):
+        gap = max(gap, motion.tick() or 0.0)
+    assert gap < 1e-3 * motion.model.size
+    motion.simulate(False)
+    assert max(each.position for each in closure_gaps(motion.model.tree, motion.q)) < 1e-11
+
+
+def test_a_page_of_a_mechanism_and_of_its_run_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    rollout("four_bar", rollouts=1, steps=20, out="run.zarr")
+    still, moving = (
+        dh2sim("view", "four_bar", "--export", "a.html"),
+        dh2sim("view", "four_bar", "run.zarr", "--export", "b.html"),
+    )
+    assert (still.out, moving.out) == ("a.html: four_bar\n", "b.html: four_bar, rollout 0 of run.zarr\n")
+    assert (tmp_path / "a.html").stat().st_size < (tmp_path / "b.html").stat().st_size
+    refused = dh2sim("view", "four_bar", "run.zarr")
+    assert refused.status == 2
+    assert "needs --export: four_bar is a mechanism" in refused.err
+
+
+def test_sliders_move_the_passive_joints_in_the_browser(browser: Browser) -> None:
+    viewer = MechanismViewer(build_mechanism(load_robot("four_bar")))
+    try:
+        page = browser.new_page()
+        page.goto(viewer.url)
+        page.locator('[data-dh2sim="passive"]').wait_for(timeout=60_000)
+        before = shown(page, "passive")
+        slider = field(page, "joint_1 [°]")
+        slider.fill("90")
+        slider.press("Enter")
+        wait_until(lambda: shown(page, "passive") != before, "the passive joints did not follow")
+        served = viewer.pages[0]
+        T = table_mechanism_frames(served.motion.model.spec, served.motion.q)["tool0"]
+        xyz = re.search(r"xyz \[m\]\s+(\S+) (\S+) (\S+)", shown(page, "readout"))
+        assert xyz is not None
+        assert [float(x) for x in xyz.groups()] == pytest.approx(T[:3, 3], abs=1e-6)
+        page.get_by_label("Simulate with MuJoCo").first.click(force=True)
+        wait_until(lambda: "loops open by" in shown(page, "readout"), "it is not simulated")
+        assert "its file" in shown(page, "not-here")
+        page.close()
+    finally:
+        viewer.stop()
