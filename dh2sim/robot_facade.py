@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
     from dh2sim.calibrate.calibration import CalibrationKeywords
     from dh2sim.calibrate.measurements import Measurements
+    from dh2sim.calibrate.plan import Plan
     from dh2sim.calibrate.result import Calibration
     from dh2sim.codegen.languages import Language
     from dh2sim.compare.comparison import Comparison
@@ -764,6 +765,24 @@ class Robot:
             read_measurements(data, self, kind=kind, groups=groups) if isinstance(data, str | os.PathLike) else data
         )
         return calibrate(self, measured, **options)
+
+    def plan_measurements(self, count: int, *, kind: str = "position", seed: int = 0) -> Plan:
+        """Choose configurations to measure the robot at, inside its limits and without self-contact.
+
+        Args:
+            count: How many.
+            kind: Of the measurements: 'pose', 'position' or 'distance'.
+            seed: Of the random candidates.
+
+        Returns:
+            The plan: ``q`` has the configurations, ``error`` what they tell as compared to ``random_error``.
+
+        Raises:
+            CalibrationError: There are too few to tell the parameters, or the kind cannot be planned.
+        """
+        from dh2sim.calibrate.plan import plan_measurements
+
+        return plan_measurements(self, count, kind=kind, seed=seed)
 
     def sweep(self, *, out: FilePath | None = None, **options: Unpack[SweepKeywords]) -> Sweep:
         """Measure what each of many designs can do, without simulation.

@@ -7,7 +7,9 @@ from dataclasses import asdict
 from typing import Any
 
 from dh2sim.calibrate.held_out import Errors, HeldOut
-from dh2sim.calibrate.result import Calibration
+from dh2sim.calibrate.measurements import Kind
+from dh2sim.calibrate.result import Calibration, Told
+from dh2sim.messages import counted
 
 
 def calibration_data(found: Calibration) -> dict[str, Any]:
@@ -89,6 +91,38 @@ def calibration_data(found: Calibration) -> dict[str, Any]:
         ],
         "notes": list(found.notes),
     }
+
+
+def summary(found: Calibration) -> list[tuple[str, str]]:
+    """Return the facts that a report begins with, a word and a text each; the first says what was measured."""
+    fit, measured = found.fit, found.measured
+    rows = {Kind.SOCKET: "row"}.get(measured.kind, measured.kind.value)
+    what = f"calibrated with {counted(len(measured), rows)}"
+    if measured.socket is not None:
+        what += f" in {counted(len(set(measured.socket_names())), 'socket')}"
+    if measured.groups is not None and measured.group_name not in ("socket", ""):
+        what += f", {counted(len(set(measured.groups)), measured.group_name)}"
+    facts = [
+        ("", what),
+        ("told", f"{found.identifiable} parameters of the robot, {found.possible} at most by this kind"),
+    ]
+    own = sum(each.told is Told.FITTED for each in found.parameters)
+    if len(fit.basis.kept) > own:
+        facts.append(
+            ("", f"and {len(fit.basis.kept) - own} of {'stations' if measured.socket is None else 'sockets'}")
+        )
+    facts.append(("condition", f"{fit.basis.condition:.3g}, in {counted(fit.iterations, 'step')}"))
+    if fit.sigma.length_known:
+        spread = f"expected 1 ± {found.chi2_spread:.3f} ({fit.dof} dof)"
+        facts.append(("chi2 per dof", f"{fit.chi2_per_dof:.3f}, {spread}"))
+    noise = f"{1e3 * fit.sigma.length:.4g} mm"
+    if measured.rotation is not None:
+        noise += f", {1e3 * fit.sigma.angle:.4g} mrad"
+    given = "as given" if fit.sigma.length_known else f"estimated ({fit.dof} dof)"
+    facts.append(("noise", f"{noise} a component, {given}"))
+    moved = f"moved by {1e3 * found.moved.length:.3g} mm inside the limits"
+    facts.append(("the tool", f"{moved}, known to {1e3 * found.predicted.length:.2g} mm"))
+    return facts
 
 
 def _number(value: float) -> float | None:

@@ -18,7 +18,7 @@ from dh2sim.errors import Dh2simError, MeasurementFileError, Problem
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import counted, did_you_mean, listed, member, shown
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import AngleUnit, LengthUnit, RobotSpec
 from dh2sim.typing import Array, read_only
 
 MAX_BYTES: Final = 100_000_000
@@ -462,3 +462,24 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def configurations_text(spec: RobotSpec, q: Array) -> str:
+    """Return joint vectors as a CSV with the columns that measurements need, in the robot file's units.
+
+    Args:
+        spec: The robot.
+        q: rad and m, shape (N, n).
+    """
+    units, rows = spec.units, spec.moving_rows
+    names = [f"{row.name} [{units.angle if row.type.turns else units.length}]" for row in rows]
+    scale = [units.coordinate(1.0, turns=row.type.turns) for row in rows]
+    digits = [
+        (5 if units.angle is AngleUnit.RAD else 3) if row.type.turns else (3 if units.length is LengthUnit.MM else 5)
+        for row in rows
+    ]
+    lines = [",".join(names)]
+    for vector in q.tolist():
+        cells = zip(vector, scale, digits, strict=True)
+        lines.append(",".join(f"{value / factor:.{places}f}" for value, factor, places in cells))
+    return "\n".join([*lines, ""])

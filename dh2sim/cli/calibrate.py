@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, load_all
+from dh2sim.cli.common import RobotArgument, load_all, refuse_options
 from dh2sim.cli.output import json_text, require_free, table_lines
 from dh2sim.messages import counted, listed, printable, shown
 
@@ -87,8 +87,21 @@ def calibrate(
     rows: Annotated[
         int | None, typer.Option("--rows", metavar="N", help="Rows to take from the run. [default: 100]")
     ] = None,
+    plan: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            help="Choose N configurations to measure, inside limits and without self-contact. [kind: position]",
+        ),
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FILE", help="Write the calibrated robot file.")
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE", help="Write the calibrated robot file; with --plan, configurations as CSV."
+        ),
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a report as HTML, one file with all plots.")
     ] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random number generator.")] = 0,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
@@ -107,9 +120,22 @@ def calibrate(
       dh2sim calibrate ur5e poses.csv --noise 0.05mm,0.1mrad
       dh2sim calibrate puma560 points.csv --unknown base,tool,theta --robust --json
       dh2sim calibrate stanford --from-run run.zarr --noise 5e-5 -o calibrated.yaml
+      dh2sim calibrate ur5e poses.csv -o my_ur5e.yaml --report report.html
+      dh2sim calibrate ur5e --plan 30 -o configurations.csv
     """
     require_free(out, force=force)
+    require_free(report, force=force)
     [spec] = load_all([robot])
+    if plan is not None:
+        refuse_options(
+            "--plan",
+            {
+                "DATA": data, "--from-run": from_run, "--unknown": unknown, "--prior": prior, "--robust": robust,
+                "--groups": groups, "--rows": rows, "--report": report,
+            },
+        )  # fmt: skip
+        _plan(spec, plan, kind, noise, out, seed, as_json=as_json, quiet=quiet)
+        return
     if (data is None) == (from_run is None):
         raise typer.BadParameter(
             "give a file of measurements, or a run with --from-run"
@@ -126,16 +152,91 @@ def calibrate(
     measured = _measured(spec, data, from_run, kind, groups, sigma, rows, seed)
     names = None if unknown is None else [word.strip() for word in unknown.split(",") if word.strip()]
     found = calibrated(spec, measured, unknown=names, prior=_prior(prior), robust=robust, noise=sigma, seed=seed)
-    if out is not None:
-        _write_robot(found, out)
+    _write(found, out, report)
     if as_json:
         from dh2sim.calibrate.data import calibration_data
 
         print(json_text(calibration_data(found)))
     elif not quiet:
         print("\n".join(_lines(found)))
-        if out is not None:
-            print(printable(f"\nwritten: {out}"))
+        written = [str(file) for file in (out, report) if file is not None]
+        if written:
+            print(printable(f"\nwritten: {', '.join(written)}"))
+
+
+def _plan(
+    spec: RobotSpec,
+    count: int,
+    kind: str | None,
+    noise: str | None,
+    out: Path | None,
+    seed: int,
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    from dh2sim.calibrate.measurements import Kind
+    from dh2sim.calibrate.plan import plan_measurements
+
+    if count < 1:
+        raise typer.BadParameter(f"must be at least 1, got {count}", param_hint="--plan")
+    sigma = _noise(noise)
+    found = plan_measurements(
+        spec, count, kind=_kind(kind) or Kind.POSITION, noise=1e-4 if sigma is None else sigma, seed=seed
+    )
+    names = [row.name for row in spec.moving_rows]
+    if out is not None:
+        from dh2sim.calibrate.data_file import configurations_text
+        from dh2sim.files import atomic_file
+
+        with atomic_file(out) as draft:
+            draft.write_text(configurations_text(spec, found.q), encoding="utf-8")
+    if as_json:
+        content = {
+            "robot": spec.name,
+            "kind": found.kind.value,
+            "joints": names,
+            "q": found.q.tolist(),
+            "identifiable": found.parameters,
+            "noise": found.noise,
+            "predicted": found.error * found.noise,
+            "predicted_random": found.random_error * found.noise,
+            "ratio": found.error / found.random_error,
+            "touching": found.touching,
+            "note": found.note,
+        }
+        print(json_text(content))
+        return
+    if quiet:
+        return
+    from dh2sim.calibrate.data_file import configurations_text
+
+    lines = [f"{spec.name}: {counted(count, 'configuration')} to measure {found.kind}s at", ""]
+    share = found.error / found.random_error
+    facts = [
+        ("told", f"{found.parameters} parameters of the robot"),
+        ("the tool", f"known to {found.error:.2f} of the noise, rms inside the limits"),
+        (
+            "at random",
+            f"to {found.random_error:.2f} of it, by the median of as many: the plan has {share:.2f} of that",
+        ),
+        ("self-contact", f"{counted(found.touching, 'candidate')} left out"),
+    ]
+    lines += [f"{left:<12}  {right}" for left, right in facts]
+    if out is None:
+        head, *rows = [line.split(",") for line in configurations_text(spec, found.q).splitlines()]
+        table = [["", *head], *([str(k), *row] for k, row in enumerate(rows, start=1))]
+        whole = table_lines(table, left=0)
+        if len(whole[1]) > WIDTH:  # joints by number, as the file may have them too
+            units = [name.rpartition(" ")[2] for name in head]
+            table[0] = ["", *(f"q{k} {unit}" for k, unit in enumerate(units, start=1))]
+            whole = table_lines(table, left=0)
+        lines += ["", *whole]
+    if found.note:
+        lines += ["", *textwrap.wrap(f"Note: {found.note}", WIDTH, subsequent_indent="      ")]
+    if out is not None:
+        lines += ["", f"written: {out}"]
+    print(printable("\n".join(lines)))
 
 
 def _measured(
@@ -225,35 +326,37 @@ def _prior(text: str | None) -> dict[str, float] | None:
     return found
 
 
-def _write_robot(found: Calibration, out: Path) -> None:
-    from dh2sim.calibrate.robot_text import calibrated_text
-    from dh2sim.files import atomic_file
+def _write(found: Calibration, out: Path | None, report: Path | None) -> None:
+    """Write the robot file and the report; both are made before either is written."""
+    texts: list[tuple[Path, str]] = []
+    if out is not None:
+        from dh2sim.calibrate.robot_text import calibrated_text
 
-    text = calibrated_text(found, header=_header(found), folder=out.absolute().parent)
-    with atomic_file(out) as draft:
-        draft.write_text(text, encoding="utf-8")
+        texts.append((out, calibrated_text(found, header=_header(found), folder=out.absolute().parent)))
+    if report is not None:
+        from dh2sim.calibrate.html_report import html_report
+
+        texts.append((report, html_report(found)))
+    if texts:
+        from dh2sim.files import atomic_file
+
+        for file, text in texts:
+            with atomic_file(file) as draft:
+                draft.write_text(text, encoding="utf-8")
 
 
 def _header(found: Calibration) -> list[str]:
     measured = found.measured
     source = f" of {os.path.basename(measured.file)}" if measured.file else ""
-    line = f"Note: calibrated with {_what(measured)}{source}: {_error(found.errors, measured.kind)} off"
+    from dh2sim.calibrate.data import summary
+
+    line = f"Note: {summary(found)[0][1]}{source}: {_error(found.errors, measured.kind)} off"
     if found.held_out is not None and found.held_out.fitted is not None:
         line += f", {_error(found.held_out.fitted, measured.kind)} where it had not been measured"
     return [f"{line}; {_error(found.errors_before, measured.kind)} before."]
 
 
 # ---------------------------------------------------------------------------- the report
-
-
-def _what(measured: Measurements) -> str:
-    rows = {"pose": "pose", "position": "position", "distance": "distance"}.get(measured.kind, "row")
-    text = counted(len(measured), rows)
-    if measured.socket is not None:
-        text += f" in {counted(len(set(measured.socket_names())), 'socket')}"
-    if measured.groups is not None and measured.group_name != "socket":
-        text += f", {counted(len(set(measured.groups)), measured.group_name)}"
-    return text
 
 
 def _error(errors: Errors, kind: str) -> str:
@@ -263,28 +366,10 @@ def _error(errors: Errors, kind: str) -> str:
 
 def _lines(found: Calibration) -> list[str]:
     """Return what is printed, at most 80 columns wide as far as names allow."""
-    fit, measured = found.fit, found.measured
-    lines = [f"{found.robot.name}: calibrated with {_what(measured)}", ""]
-    robot = sum(parameter.told.value == "fitted" for parameter in found.parameters)
-    rows = [("told", f"{found.identifiable} parameters of the robot, {found.possible} at most by this kind")]
-    nuisance = len(fit.basis.kept) - robot
-    if nuisance:
-        rows.append(("", f"and {nuisance} of {'stations' if measured.socket is None else 'sockets'}"))
-    rows.append(("condition", f"{fit.basis.condition:.3g}, in {counted(fit.iterations, 'step')}"))
-    known = fit.sigma.length_known
-    if known:
-        rows.append(("chi2 per dof", f"{fit.chi2_per_dof:.3f}, expected 1 ± {found.chi2_spread:.3f} ({fit.dof} dof)"))
-    noise = f"{1e3 * fit.sigma.length:.4g} mm"
-    if measured.rotation is not None:
-        noise += f", {1e3 * fit.sigma.angle:.4g} mrad"
-    rows.append(("noise", f"{noise} a component, {'as given' if known else f'estimated ({fit.dof} dof)'}"))
-    rows.append(
-        (
-            "the tool",
-            f"moved by {1e3 * found.moved.length:.3g} mm inside the limits, known to "
-            f"{1e3 * found.predicted.length:.2g} mm",
-        )
-    )
+    from dh2sim.calibrate.data import summary
+
+    (_, what), *rows = summary(found)
+    lines = [f"{found.robot.name}: {what}", ""]
     width = max(len(left) for left, _ in rows)
     lines += [f"{left:<{width}}  {right}" for left, right in rows]
     lines += ["", *_error_lines(found)]

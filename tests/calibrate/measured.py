@@ -78,6 +78,6 @@ def measured(
     return measurements(nominal, q, distances=distances, stations=station.tolist(), groups=[*range(len(q))])
 
 
-def numbers(values: Array) -> Array:
-    """Read-only."""
+def numbers(*values: float) -> Array:
+    """A read-only array."""
     return read_only(values)

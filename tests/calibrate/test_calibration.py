@@ -14,7 +14,7 @@ from dh2sim.calibrate.result import Calibration, Told
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import Pose, RobotSpec
-from tests.calibrate.measured import SIGMA, measured, off, random_q
+from tests.calibrate.measured import SIGMA, measured, numbers, off, random_q
 from tests.refusals import refusal
 from tests.sample_robots import ODD_ROBOT, robot
 
@@ -74,11 +74,11 @@ def test_what_folds_into_what_is_named() -> None:
 def test_a_tracker_may_stand_anywhere_and_the_tool_be_any() -> None:
     nominal = robot("ur5e")
     true = off(nominal, 1e-3, 1)
-    far = Pose(xyz=[2.1, -3.3, 0.7], rpy=[0.4, -1.2, 2.9])
+    far = Pose(xyz=numbers(2.1, -3.3, 0.7), rpy=numbers(0.4, -1.2, 2.9))
     true = replace(
         true,
         base=replace(true.base, pose=far),
-        tool=replace(true.tool, xyz=[0.03, -0.08, 0.21], rpy=[2.0, 0.5, -1.0]),
+        tool=replace(true.tool, xyz=numbers(0.03, -0.08, 0.21), rpy=numbers(2.0, 0.5, -1.0)),
     )
     q = random_q(nominal, 40, 2)
     for kind in ("pose", "position"):
@@ -119,7 +119,7 @@ def test_several_stations_have_poses_of_their_own_and_base_link_stays() -> None:
 def sockets(count: int = 30, places: int = 3) -> tuple[RobotSpec, dict[str, list[object]], np.ndarray]:
     """Joint vectors of a planar-free arm with its ball in sockets 60 mm apart, found by Newton on the oracle."""
     nominal = robot("franka_panda")
-    true = off(replace(nominal, tool=replace(nominal.tool, xyz=[0.02, 0.05, 0.2])), 1e-3, 4)
+    true = off(replace(nominal, tool=replace(nominal.tool, xyz=numbers(0.02, 0.05, 0.2))), 1e-3, 4)
     rng = np.random.default_rng(5)
     q0 = random_q(nominal, places, 6) * 0.6
     rows: list[np.ndarray] = []

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -90,3 +92,49 @@ def test_wrong_arguments_are_told(arguments: list[str], message: str, points: Pa
     assert run.status == 2
     assert message in run.err
     assert run.out == ""
+
+
+def test_a_report_is_one_page_that_needs_nothing_else(points: Path, tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    run = dh2sim("calibrate", "stanford", points, "--report", page, "--quiet")
+    assert (run.status, run.out, run.err) == (0, "", "")
+    text = page.read_text(encoding="utf-8")
+    assert "<script" not in text
+    assert "http" not in text
+    assert text.count("<svg") == text.count("</svg>") == 6
+    for svg in re.findall(r"<svg.*?</svg>", text, flags=re.DOTALL):
+        ElementTree.fromstring(svg)
+    assert "held out by placement: predicted" in text
+    assert "nan" not in text
+
+
+def test_configurations_to_measure_are_written_as_the_columns_of_a_file(tmp_path: Path) -> None:
+    out = tmp_path / "plan.csv"
+    run = dh2sim("calibrate", "scara", "--plan", "10", "-o", out)
+    assert (run.status, run.err) == (0, "")
+    head, *rows = out.read_text().splitlines()
+    assert head == "joint_1 [deg],joint_2 [deg],joint_3 [m],joint_4 [deg]"
+    assert len(rows) == 10
+    data = json.loads(dh2sim("calibrate", "scara", "--plan", "10", "--json").out)
+    assert data["ratio"] < 0.65
+    assert np.abs(np.degrees(data["q"])[:, 0] - [float(row.split(",")[0]) for row in rows]).max() < 1e-3
+    printed = dh2sim("calibrate", "planar_2r", "--plan", "12", "--kind", "pose").out.splitlines()
+    assert max(map(len, printed)) <= 80
+    assert "does not apply to --plan" in dh2sim("calibrate", "scara", "data.csv", "--plan", "10").err
+
+
+@pytest.mark.slow
+def test_recordings_of_a_run_stand_in_for_a_tracker(tmp_path: Path) -> None:
+    true = tmp_path / "true.yaml"
+    text = robot("scara").source_file
+    assert text is not None
+    true.write_text(text.text.replace("a1: 0.325", "a1: 0.3262").replace("a2: 0.275", "a2: 0.2741"))
+    run, out = tmp_path / "run.zarr", tmp_path / "found.yaml"
+    assert dh2sim("rollout", true, "--rollouts", "12", "--steps", "400", "--every", "50", "--out", run).status == 0
+    done = dh2sim("calibrate", "scara", "--from-run", run, "--noise", "5e-5", "-o", out)
+    assert (done.status, done.err) == (0, "")
+    q = random_q(robot("scara"), 50, 1)
+    gap = table_tool_pose(load_robot(out), q) - table_tool_pose(load_robot(true), q)
+    assert np.abs(gap[:, :3, 3]).max() < 6e-4
+    assert dh2sim("export", out, "--out", tmp_path / "build").status == 0
+    assert dh2sim("validate", out, "--samples", "20").status == 0
