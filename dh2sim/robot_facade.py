@@ -405,12 +405,18 @@ class Robot:
             **options: ``out`` and ``threads``, as for :meth:`fk`.
 
         Returns:
-            Shape (..., 6, n): rows 0-2 linear, rows 3-5 angular.
+            Shape (..., 6, n): rows 0-2 linear, rows 3-5 angular. Of a mechanism (6, k) at one configuration: the
+            columns are its driven joints, and the passive ones follow.
 
         Raises:
             ConfigurationError: ``q`` has the wrong shape, or something in it is not finite; or an option is wrong.
             UnknownFrameError: The frame is unknown.
+            SingularPositionError: The driven joints of a mechanism do not determine the passive ones there.
         """
+        if self.spec.is_mechanism:
+            from dh2sim.kinematics.loop_motion import mechanism_jacobian
+
+            return mechanism_jacobian(self.spec, q, frame)
         from dh2sim.kinematics.forward import geometric_jacobian
 
         return geometric_jacobian(self.chain, self._vectors(q), frame=frame, **options)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -174,7 +175,8 @@ def jacobian(
 
     Its rows are the velocity of the frame's origin and the angular velocity of the frame, its columns the joints.
     At a singular configuration the joint motions that do not move the frame and the velocities that the frame
-    cannot have are printed. A robot with more than six joints has self-motions everywhere.
+    cannot have are printed. A robot with more than six joints has self-motions everywhere. Of a mechanism the columns
+    are its driven joints, and the passive ones follow.
 
     \b
     Examples:
@@ -186,13 +188,19 @@ def jacobian(
 
     from dh2sim.kinematics.chain import build_chain
     from dh2sim.kinematics.forward import geometric_jacobian
+    from dh2sim.kinematics.loop_motion import actuated_joints, mechanism_jacobian
     from dh2sim.kinematics.singularity import lost_directions, manipulability, rank, singular_values, still_motions
 
     [spec] = load_all([robot])
     options = "--frame, --degrees, --radians, --json, --help"
     vector = read_joint_vector(spec, q, degrees=degrees, radians=radians, command="jacobian", options=options)
     with np.errstate(all="ignore"):
-        J = geometric_jacobian(build_chain(spec), vector.q, frame=frame)
+        if spec.is_mechanism:
+            J = mechanism_jacobian(spec, vector.q, frame)
+            moving = spec.moving_rows
+            columns = replace(vector, rows=tuple(moving[k] for k in sorted(actuated_joints(spec))))
+        else:
+            J, columns = geometric_jacobian(build_chain(spec), vector.q, frame=frame), vector
     _require_finite(spec, J, f"the Jacobian of {frame}")
     values = singular_values(J)
     still, lost = still_motions(J), lost_directions(J)
@@ -202,7 +210,7 @@ def jacobian(
                 "robot": spec.name,
                 "frame": frame,
                 "q": list(vector.q),
-                "joints": [row.name for row in vector.rows],
+                "joints": [row.name for row in columns.rows],
                 "jacobian": J.tolist(),
                 "singular_values": values.tolist(),
                 "manipulability": float(manipulability(J)),
@@ -212,10 +220,10 @@ def jacobian(
             }
         )
         return
-    names = [row.name for row in vector.rows]
+    names = [row.name for row in columns.rows]
     print(f"{spec.name}: Jacobian of {frame} in base_link")
     _print_q(vector)
-    _print_jacobian(J, vector)
+    _print_jacobian(J, columns)
     print(f"singular values  {' '.join(f'{value:.6g}' for value in values) or 'none'}")
     print(f"manipulability   {float(manipulability(J)):.6g}  (product of the singular values)")
     most = min(J.shape)
@@ -223,7 +231,7 @@ def jacobian(
     print(f"rank             {rank(J)} of {most}{': singular' if singular else ''}")
     if len(still):
         title = f"joint motions that leave {frame} still" if singular else "self-motions"
-        print(f"{title}, {_rates(vector)}:")
+        print(f"{title}, {_rates(columns)}:")
         for motion in still:
             print(f"  {_combination(motion, names)}")
     if singular:

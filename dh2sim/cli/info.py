@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, StrictOption, build_all
+from dh2sim.cli.common import RobotArgument, StrictOption, build_any
 from dh2sim.cli.output import json_text, table_lines
 from dh2sim.messages import printable
 
@@ -34,6 +34,8 @@ def info(
 ) -> None:
     """Print a robot's table as in a textbook, its frames at home, mass and reach, and what is estimated.
 
+    Of a mechanism: its joints, driven and passive, the closures of its loops, and its mobility.
+
     \b
     Examples:
       dh2sim info stanford
@@ -41,7 +43,19 @@ def info(
       dh2sim info my_arm.yaml --srdf
       dh2sim info my_arm.yaml --strict     # fail at likely slips
     """
-    [model] = build_all([robot], strict=strict)
+    from dh2sim.model.robot_model import RobotModel
+
+    [model] = build_any([robot], strict=strict)
+    if not isinstance(model, RobotModel):
+        from dh2sim.cli.info_mechanism import mechanism_dict, print_mechanism
+
+        if srdf:
+            raise typer.BadParameter(f"does not apply: {model.name} is a mechanism", param_hint="--srdf")
+        if as_json:
+            print(json_text(mechanism_dict(model)))
+        else:
+            print_mechanism(model)
+        return
     if as_json:
         print(json_text(as_dict(model)))
     else:

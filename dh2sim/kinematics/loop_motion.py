@@ -25,7 +25,7 @@ from dh2sim.kinematics.loop_closure import (
     is_closed,
     mechanism_size,
 )
-from dh2sim.kinematics.tree import KinematicTree, body_poses, joint_values, placed
+from dh2sim.kinematics.tree import Frame, KinematicTree, body_poses, joint_values, placed
 from dh2sim.messages import did_you_mean, listed, shown
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
@@ -149,6 +149,43 @@ def mechanism_pose(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0") ->
     return np.array(placed(body_poses(tree, vector), found))
 
 
+def mechanism_jacobian(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0") -> Array:
+    """Return the twist of a frame for a unit velocity of each driven joint, the passive ones following.
+
+    Args:
+        robot: The robot.
+        q: As for ``mechanism_pose``.
+        frame: Such as tool0, dh_1 or rocker/dh_1.
+
+    Returns:
+        Shape (6, k), in base_link, the driven joints in the order of a joint vector: rows 0-2 the velocity of the
+        frame's origin, m/s, rows 3-5 its angular velocity, rad/s.
+
+    Raises:
+        SingularPositionError: The driven joints do not determine the velocities of the passive ones there, or the
+            loops do not let them move independently.
+        UnknownFrameError: There is no such frame.
+        Dh2simError: As for ``mechanism_configuration``.
+    """
+    spec = spec_of(robot)
+    tree, _ = assembly(spec)
+    body, T_body_frame = tree.frame(frame)
+    vector = named_configuration(spec, q) if isinstance(q, str) else mechanism_configuration(spec, q)
+    poses = body_poses(tree, vector)
+    origin = placed(poses, Frame(body, T_body_frame))[:3, 3]
+    J = np.zeros((6, tree.n))
+    for k in tree.path(body):
+        joint, column = tree.joints[k], tree.coordinates[k]
+        if column < 0:
+            continue
+        z = joint.sign * poses[k][:3, 2]
+        if joint.type.turns:
+            J[:3, column], J[3:, column] = np.cross(z, origin - poses[k][:3, 3]), z
+        else:
+            J[:3, column] = z
+    return read_only(J @ _Motion(spec, tree, sorted(actuated_joints(spec))).followed(vector))
+
+
 class _Motion:
     """A mechanism that its driven joints move."""
 
@@ -216,7 +253,21 @@ class _Motion:
         moved = float(np.abs(guess).max(initial=0.0)) + 1e-9
         return new if is_closed(self._tree, new) and float(off.max(initial=0.0)) <= 0.3 * moved + 1e-6 else None
 
-    def _check(self, q: Array) -> None:
+    def followed(self, q: Array) -> Array:
+        """Return the velocities of all joints for a unit velocity of each driven one, shape (n, driven).
+
+        Raises:
+            SingularPositionError: They are not determined.
+        """
+        self._check(q, where="there")
+        J = self._jacobian(q)
+        rates = np.linalg.lstsq(J[:, self._passive], -J[:, self._driven], rcond=_RANK)[0]
+        S = np.zeros((self._tree.n, len(self._driven)))
+        S[self._driven, range(len(self._driven))] = 1.0
+        S[self._passive] = self._scale[self._passive, None] * rates / self._scale[self._driven]
+        return S
+
+    def _check(self, q: Array, where: str = "at the assembly") -> None:
         """Refuse driven joints that do not determine the others, or that the loops do not leave free.
 
         Raises:
@@ -228,7 +279,7 @@ class _Motion:
         names = listed(self._tree.moving_joints[k].name for k in self._driven)
         if passive < len(self._passive):
             raise SingularPositionError(
-                f"{self._spec.name}: {names} driven, {free} freedoms at the assembly: "
+                f"{self._spec.name}: {names} driven, {free} freedoms {where}: "
                 f"{len(self._passive) - passive} of them stay open, so that the passive joints are not determined"
             )
         if free < len(self._driven):

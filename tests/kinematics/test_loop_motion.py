@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 
 from dh2sim import Robot
 from dh2sim.errors import ConfigurationError, SingularPositionError
-from dh2sim.kinematics.loop_motion import mechanism_configuration, mechanism_pose
+from dh2sim.kinematics.loop_motion import (
+    actuated_joints,
+    driven_motion,
+    mechanism_configuration,
+    mechanism_jacobian,
+    mechanism_pose,
+)
 from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import RobotSpec
 from tests.refusals import refusal
@@ -148,3 +154,31 @@ def test_driven_joints_that_do_not_determine_the_others_are_refused() -> None:
     tight = SLIDER.replace("actuated: [joint_1]", "actuated: [joint_1, joint_2]")
     message = refusal(SingularPositionError, mechanism_configuration, parse_robot(tight), [1.0, 2.0])
     assert "cannot be moved independently" in message
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "bennett", "delta", "stewart"])
+def test_the_jacobian_is_the_change_of_the_pose_with_the_driven_joints(name: str) -> None:
+    robot = Robot.load(name)
+    tree, q0 = robot.mechanism.tree, robot.mechanism.q
+    driven = sorted(actuated_joints(robot))
+    start, h = np.array([q0[k] for k in driven]) + 0.05, 1e-5
+    J = mechanism_jacobian(robot, driven_motion(robot, q0, start), "tool0")
+    assert J.shape == (6, len(driven))
+    for k in range(len(driven)):
+        step = h * np.eye(len(driven))[k]
+        (T1, T2) = (mechanism_pose(robot, driven_motion(robot, q0, start + side * step)) for side in (-1, 1))
+        W = (T2[:3, :3] - T1[:3, :3]) / (2 * h) @ (0.5 * (T1 + T2)[:3, :3]).T
+        rate = [*(T2 - T1)[:3, 3] / (2 * h), W[2, 1], W[0, 2], W[1, 0]]
+        assert J[:, k] == pytest.approx(rate, abs=1e-7 * max(1.0, np.abs(J).max()))
+    assert tree.n > len(driven)
+
+
+def test_the_jacobian_of_a_crank_is_that_of_the_textbook() -> None:
+    crank, rod, angle = 0.5, 1.5, 0.7
+    J = Robot.load("slider_crank").jacobian([angle], "slide/dh_1")
+    lengths = Robot.load("slider_crank").spec
+    assert lengths.rows[0].a == pytest.approx(crank)
+    assert lengths.rows[1].a == pytest.approx(rod)
+    slope = crank * math.sin(angle) / math.sqrt(rod**2 - (crank * math.sin(angle)) ** 2)
+    x_rate = -crank * math.sin(angle) - crank * math.cos(angle) * slope
+    assert J[:3, 0] == pytest.approx([x_rate, 0, 0], abs=1e-10)
