@@ -55,6 +55,7 @@ COMMANDS: Final = {
     "convert": Command("importing", "convert", "Write a table in the other convention."),
     "diff": Command("diff", "diff", "Say whether two robots are the same mechanism."),
     "grade": Command("grade", "grade", "Grade students' tables against a solution."),
+    "exercise": Command("exercise", "exercise", "Make a random arm whose table is asked for."),
     "frames": Command("importing", "frames", "Assign DH frames to joint axes, step by step."),
     "calibrate": Command("calibrate", "calibrate", "Fit a table to measurements of the real robot."),
     "rollout": Command("rollout", "rollout", "Simulate many rollouts into a dataset."),

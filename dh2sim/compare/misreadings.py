@@ -13,10 +13,8 @@ from enum import StrEnum
 from itertools import combinations
 from typing import Any
 
-import numpy as np
-
 from dh2sim.compare.fitting import Fit, best_fit
-from dh2sim.compare.screws import ScrewAxes, axes_of, axes_of_rows
+from dh2sim.compare.screws import ScrewAxes, axes_of, axes_of_rows, joint_lines
 from dh2sim.compare.words import degrees, millimetres
 from dh2sim.kinematics.transforms import identity
 from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
@@ -25,6 +23,10 @@ _MOST_ROWS = 12
 """Of tables in which any two rows are exchanged; in longer ones, neighbours."""
 _EXACT = 1e-9
 """rad, and m for a reach of up to 1 m: a misreading that is this close explains everything."""
+_ASKEW = 0.1
+"""Squared sine of axes whose common normal is well determined."""
+_LEVER = 30.0
+"""By which errors of directions move the foot of such a normal at most."""
 _UNITS = (("mm", 1000.0), ("cm", 100.0), ("inches", 1.0 / 0.0254))
 _ANGLES = ("alpha", "theta")
 _LENGTHS = ("a", "d")
@@ -117,35 +119,53 @@ class _Target:
 
     def __init__(self, axes: ScrewAxes, tolerance: float) -> None:
         self._axes, self._tolerance = axes, tolerance
-        self._print = _fingerprint(axes)
+        self._pairs = _pairs(axes.turns, axes.points.tolist(), axes.directions.tolist())
 
     def gap(self, rows: Sequence[Row]) -> float | None:
         """Return the residual, rad, and m for a reach of up to 1 m, if the rows are the same mechanism; else None."""
-        axes = axes_of_rows(rows, identity(), identity())
-        if axes.turns != self._axes.turns:
+        turns, points, directions, _ = joint_lines(rows, identity())
+        if turns != self._axes.turns:
             return None
-        size = max(1.0, axes.reach, self._axes.reach)
         slack = 20.0 * self._tolerance + 1e-9
-        if (np.abs(_fingerprint(axes) - self._print) > slack * np.array([1.0, size])).any():
-            return None
+        far = slack * max(1.0, self._axes.reach, sum(abs(row.a) + abs(row.d) for row in rows))
+        for ours, theirs in zip(_pairs(turns, points, directions), self._pairs, strict=True):
+            if abs(ours[0] - theirs[0]) > slack or abs(ours[1] - theirs[1]) > far:
+                return None
+            if abs(ours[2] - theirs[2]) > _LEVER * far:  # NaN where there is none
+                return None
+        axes = axes_of_rows(rows, identity(), identity())
         fit = best_fit(axes, self._axes, self._tolerance)
         if not (isinstance(fit, Fit) and fit.good):
             return None
-        return max(fit.residual.rotation, fit.residual.position / size)
+        return max(fit.residual.rotation, fit.residual.position / max(1.0, axes.reach, self._axes.reach))
 
 
-def _fingerprint(axes: ScrewAxes) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Return quick invariants of neighbouring axes, shape (n - 1, 2): |cosine|, and the moment |gap · z x z'|, m.
+def _pairs(
+    turns: Sequence[bool], points: Sequence[Sequence[float]], directions: Sequence[Sequence[float]]
+) -> list[tuple[float, float, float]]:
+    """Return quick invariants of neighbouring axes, for each pair.
 
-    The second is NaN, which differs from nothing, where one of them slides.
+    They are |cosine|; the moment |gap · z x z'|, m, 0 where one slides; and how far along the first of the two its
+    common normals with both neighbours are apart, m, NaN unless all three turn and are far from parallel.
     """
-    z, p = axes.directions, axes.points
-    (x1, y1, z1), (x2, y2, z2) = z[:-1].T, z[1:].T
-    cosines = np.abs(x1 * x2 + y1 * y2 + z1 * z2)
-    gx, gy, gz = (p[1:] - p[:-1]).T
-    moments = np.abs(gx * (y1 * z2 - z1 * y2) + gy * (z1 * x2 - x1 * z2) + gz * (x1 * y2 - y1 * x2))
-    turns = np.array(axes.turns, dtype=bool)
-    return np.stack([cosines, np.where(turns[1:] & turns[:-1], moments, np.nan)], axis=1)
+    pairs = []
+    before = math.nan
+    for i in range(len(turns) - 1):
+        (x1, y1, z1), (x2, y2, z2) = directions[i], directions[i + 1]
+        cosine = x1 * x2 + y1 * y2 + z1 * z2
+        moment = offset = behind = math.nan
+        if turns[i] and turns[i + 1]:
+            (px, py, pz), (qx, qy, qz) = points[i], points[i + 1]
+            gx, gy, gz = qx - px, qy - py, qz - pz
+            moment = abs(gx * (y1 * z2 - z1 * y2) + gy * (z1 * x2 - x1 * z2) + gz * (x1 * y2 - y1 * x2))
+            squared = 1.0 - cosine * cosine
+            if squared > _ASKEW:
+                along, across = gx * x1 + gy * y1 + gz * z1, gx * x2 + gy * y2 + gz * z2
+                offset = abs((along - cosine * across) / squared - before)
+                behind = (cosine * along - across) / squared
+        pairs.append((abs(cosine), moment if moment == moment else 0.0, offset))
+        before = behind
+    return pairs
 
 
 # ---------------------------------------------------------------------------- all misreadings of a table

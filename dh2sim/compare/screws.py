@@ -7,13 +7,13 @@ MJCF are ways of writing them down. Axes of prismatic joints have a direction, a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.robot.spec import Convention, RobotSpec, Row
+from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 from dh2sim.typing import Array
 
 
@@ -48,7 +48,7 @@ def axes_of(spec: RobotSpec) -> ScrewAxes:
     )
 
 
-def axes_of_rows(rows: Iterable[Row], T_base_dh0: Array, T_dhn_tool: Array) -> ScrewAxes:
+def axes_of_rows(rows: Sequence[Row], T_base_dh0: Array, T_dhn_tool: Array) -> ScrewAxes:
     """Return the axes that the rows of a table describe.
 
     Args:
@@ -56,33 +56,45 @@ def axes_of_rows(rows: Iterable[Row], T_base_dh0: Array, T_dhn_tool: Array) -> S
         T_base_dh0: Pose of DH frame 0 in base_link, shape (4, 4).
         T_dhn_tool: Pose of tool0 in the last DH frame, shape (4, 4).
     """
-    frame = _MovingFrame(T_base_dh0)
-    names, turns, points, directions = [], [], [], []
-    for row in rows:
-        if row.convention is Convention.MODIFIED:
-            frame.link(row.a, row.alpha)
-        if row.type.moves:
-            names.append(row.name)
-            turns.append(row.type.turns)
-            points.append(frame.p)
-            directions.append([-value for value in frame.z] if row.flip else frame.z)
-        frame.joint(row.theta, row.d)
-        if row.convention is not Convention.MODIFIED:
-            frame.link(row.a, row.alpha)
-        if row.beta:
-            frame.second_twist(row.beta)
-    T_base_tool = frame.pose() @ T_dhn_tool
+    names = tuple(row.name for row in rows if row.type.moves)
+    turns, points, directions, T = joint_lines(rows, T_base_dh0)
+    T_base_tool = T @ T_dhn_tool
     z = np.array(directions).reshape(-1, 3)
     p = np.array(points).reshape(-1, 3)
     p = p - (p * z).sum(axis=1)[:, None] * z
     return ScrewAxes(
-        names=tuple(names),
-        turns=tuple(turns),
+        names=names,
+        turns=turns,
         points=p,
         directions=z,
         T_base_tool=T_base_tool,
         reach=_string_length(turns, p.tolist(), z.tolist(), T_base_tool[:3, 3].tolist()),
     )
+
+
+def joint_lines(
+    rows: Sequence[Row], T_base_dh0: Array
+) -> tuple[tuple[bool, ...], list[list[float]], list[list[float]], Array]:
+    """Return of a table which joints turn, a point and the direction of each axis, and the pose of the last DH frame.
+
+    In plain numbers, as hundreds of tables are looked at for a misreading.
+    """
+    frame = _MovingFrame(T_base_dh0)
+    turns, points, directions = [], [], []
+    for row in rows:
+        modified = row.convention is Convention.MODIFIED
+        if modified:
+            frame.link(row.a, row.alpha)
+        if row.type is not JointType.FIXED:
+            turns.append(row.type is not JointType.PRISMATIC)
+            points.append(frame.p)
+            directions.append([-value for value in frame.z] if row.flip else frame.z)
+        frame.joint(row.theta, row.d)
+        if not modified:
+            frame.link(row.a, row.alpha)
+        if row.beta:
+            frame.second_twist(row.beta)
+    return tuple(turns), points, directions, frame.pose()
 
 
 class _MovingFrame:
@@ -120,7 +132,7 @@ def _mixed(f: float, u: list[float], g: float, v: list[float]) -> list[float]:
 
 
 def _string_length(
-    turns: list[bool], points: list[list[float]], directions: list[list[float]], tool: list[float]
+    turns: Sequence[bool], points: list[list[float]], directions: list[list[float]], tool: list[float]
 ) -> float:
     """Sum of the steps from each point to its foot on the next axis, beginning at the first axis's own point."""
     place, length = None, 0.0

@@ -37,6 +37,7 @@ COMMANDS = (
     "convert",
     "diff",
     "grade",
+    "exercise",
     "frames",
     "calibrate",
     "rollout",
@@ -251,7 +252,7 @@ def test_shells_complete_commands_options_robots_and_robot_files(tmp_path: Path)
     (tmp_path / "stall.stl").touch()
     (tmp_path / "stock").mkdir()
     (tmp_path / "stock" / "arm.yml").touch()
-    assert _completions("dh2sim ex", tmp_path) == ["export"]
+    assert _completions("dh2sim exp", tmp_path) == ["export"]
     assert _completions("dh2sim fk --ra", tmp_path) == ["--radians"]
     robots = ["stanford", "stanford_shoulder_origin", "staubli_tx2_60"]
     assert _completions("dh2sim fk sta", tmp_path) == [*robots, "stall.yaml"]
