@@ -46,7 +46,7 @@ def outcome(kind: type[TyperCommand], words: list[str]) -> object:
     error = io.StringIO()
     with redirect_stderr(error), pytest.raises(SystemExit) as end:
         app(words, prog_name="program")
-    return end.value.code, error.getvalue(), [(type(value), value) for value in seen]
+    return end.value.code, error.getvalue(), [(type(value), repr(value)) for value in seen]  # NaN differs from itself
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +16,7 @@ from dh2sim.errors import OutputError, RunDamagedError
 from dh2sim.files import atomic_files
 from dh2sim.simulate.store.local import LocalStore
 from dh2sim.simulate.store.places import open_store
+from dh2sim.simulate.store.manifest import StoredArray
 from dh2sim.simulate.store.reader import StoredRun, damaged_run, open_dataset, open_run, reading
 from dh2sim.simulate.store.storage import Place
 
@@ -45,7 +46,7 @@ class RunBlocks:
                 with reading(self.stored.store.name):
                     part = part.load()
             else:
-                part = _blank(part)
+                part = _blank(part, self.stored.manifest.variables)
             yield range(rollouts.start, rollouts.stop), part
 
 
@@ -63,11 +64,11 @@ def open_blocks(path: Place) -> RunBlocks:
     return RunBlocks(dataset=dataset, stored=open_run(path))
 
 
-def _blank(part: xr.Dataset) -> xr.Dataset:
+def _blank(part: xr.Dataset, variables: Mapping[str, StoredArray]) -> xr.Dataset:
     """Return a part of a run as it is before it is simulated."""
     return part.assign(
         {
-            name: (variable.dims, np.full(variable.shape, variable.encoding["fill_value"], dtype=variable.dtype))
+            name: (variable.dims, np.full(variable.shape, variables[str(name)].fill, dtype=variable.dtype))
             for name, variable in part.data_vars.items()
         }
     )

@@ -69,6 +69,8 @@ class StoredArray:
     dimensions: tuple[str, ...]
     shape: tuple[int, ...]
     chunk: tuple[int, ...]
+    fill: float | int | str
+    """Value where nothing was recorded."""
     attributes: Mapping[str, Any]
 
     @property
@@ -366,6 +368,7 @@ def _stored_array(node: Mapping[str, Any]) -> StoredArray:
         dimensions=tuple(node["dimension_names"]),
         shape=tuple(node["shape"]),
         chunk=tuple(node["chunk_grid"]["configuration"]["chunk_shape"]),
+        fill=math.nan if node["fill_value"] == "NaN" else node["fill_value"],
         attributes=node["attributes"],
     )
 
