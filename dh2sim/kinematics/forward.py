@@ -29,6 +29,7 @@ from dh2sim.kinematics.batches import (
 from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vector, joint_vectors
 from dh2sim.kinematics.straight_line import JACOBIAN, POSE, Kind, of_one
 from dh2sim.kinematics.transforms import compose, identity, joint_part
+from dh2sim.kinematics.trig import sin_cos
 from dh2sim.messages import did_you_mean, shown
 from dh2sim.typing import Array
 
@@ -125,6 +126,53 @@ def _reference_joint_poses(chain: KinematicChain, q: tuple[float, ...]) -> tuple
             pose = compose(pose, joint_part(moved, 0.0) if joint.type.turns else joint_part(0.0, moved))
         poses.append(pose)
     return tuple(poses)
+
+
+def reference_joint_frames(chain: KinematicChain, q: Array) -> Array:
+    """Return what :func:`reference_joint_poses` does, with the same bits, for several configurations.
+
+    Computed element by element, which rounds as Python's own arithmetic does.
+
+    Args:
+        chain: The robot.
+        q: Joint vectors, rad and m, shape (N, n).
+
+    Returns:
+        Shape (number of rows, N, 4, 4).
+    """
+    columns = iter(q.T)
+    poses = np.zeros((len(chain.joints), len(q), 4, 4))
+    poses[:, :, 3, 3] = 1.0
+    before = np.broadcast_to(np.eye(4)[:3], (len(q), 3, 4))
+    for joint, pose in zip(chain.joints, poses, strict=True):
+        before = _composed(before, joint.T_parent_joint[None, :3])
+        if joint.type.moves:
+            before = _composed(before, _moved(joint.type.turns, (joint.sign * next(columns)).tolist()))
+        pose[:, :3] = before
+    return poses
+
+
+def _moved(turns: bool, amounts: list[float]) -> Array:
+    """Return the upper rows of rotations about z, or of motions along it, shape (N, 3, 4)."""
+    parts = np.zeros((len(amounts), 3, 4))
+    parts[:, 2, 2] = 1.0
+    sines, cosines = np.array([sin_cos(amount) for amount in amounts]).T if turns else (0.0, 1.0)
+    parts[:, 0, 0] = parts[:, 1, 1] = cosines
+    parts[:, 1, 0], parts[:, 0, 1] = sines, -sines
+    if not turns:
+        parts[:, 2, 3] = amounts
+    parts += 0.0  # no zero is negative
+    return parts
+
+
+def _composed(T_a_b: Array, T_b_c: Array) -> Array:
+    """Return the upper rows of products of poses, of which the upper rows are given, shape (N, 3, 4)."""
+    product: Array = (
+        T_a_b[:, :, 0:1] * T_b_c[:, 0:1] + T_a_b[:, :, 1:2] * T_b_c[:, 1:2] + T_a_b[:, :, 2:3] * T_b_c[:, 2:3]
+    )
+    product[:, :, 3] += T_a_b[:, :, 3]
+    product += 0.0  # no zero is negative
+    return product
 
 
 def joint_frames(chain: KinematicChain, columns: Array) -> Iterator[BlockFrame]:

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dh2sim.kinematics.chain import KinematicChain
-from dh2sim.kinematics.forward import reference_joint_poses
-from dh2sim.kinematics.transforms import move_point
+from dh2sim.kinematics.forward import reference_joint_frames, reference_joint_poses
 from dh2sim.model.mass import MassProperties, in_frame, shift_inertia
 from dh2sim.model.shapes import neat
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, JointType
@@ -23,39 +22,42 @@ from dh2sim.typing import Array
 
 def gravity_loads(
     chain: KinematicChain, bodies: Sequence[MassProperties | None], q: Array, gravity: Array
-) -> tuple[float, ...]:
-    """Return the generalised force that each joint must exert to hold the robot still.
+) -> list[tuple[float, ...]]:
+    """Return the generalised forces that each joint must exert to hold the robot still.
 
     Args:
         chain: The chain, n rows of which m move.
         bodies: Mass properties of the n links in their joint frames; None for a massless one.
-        q: Joint vector, rad or m, shape (m,).
+        q: Joint vectors, rad or m, shape (N, m).
         gravity: m/s² in base_link, shape (3,).
 
     Returns:
-        m values, N·m or N: minus the power of the weights per unit of joint velocity (principle of virtual work).
+        m values for each joint vector, N·m or N: minus the power of the weights per unit of joint velocity (principle
+        of virtual work).
     """
-    poses = reference_joint_poses(chain, q)
     moving = [i for i, joint in enumerate(chain.joints) if joint.type.moves]
-    placed = [
-        (i, body.mass, move_point(pose, body.com))
-        for i, (pose, body) in enumerate(zip(poses, bodies, strict=True))
-        if body is not None
-    ]
+    placed = [(i, body) for i, body in enumerate(bodies) if body is not None]
     if not placed or not moving:
-        return (0.0,) * len(moving)
+        return [(0.0,) * len(moving) for _ in q]
     # by joint and body; element by element, which rounds as plain arithmetic does
-    com, mass = np.array([com for _, _, com in placed]), np.array([mass for _, mass, _ in placed])
+    one = len(q) == 1
+    poses = np.array(reference_joint_poses(chain, q[0]))[:, None] if one else reference_joint_frames(chain, q)
+    rows, mass = [i for i, _ in placed], np.array([body.mass for _, body in placed])
+    x, y, z = (np.array([body.com[k] for _, body in placed])[:, None, None] for k in range(3))
+    upper = poses[rows, :, :3]
+    coms = upper[..., 0] * x + upper[..., 1] * y + upper[..., 2] * z + upper[..., 3]
     turns = np.array([[chain.joints[i].type.turns] for i in moving])
-    sign, frames = np.array([[chain.joints[i].sign] for i in moving]), np.array([poses[i] for i in moving])
-    x, y, z = (sign * frames[:, k, 2, None] for k in range(3))
-    u, v, w = (com[:, k] - frames[:, k, 3, None] for k in range(3))
-    moved = [np.where(turns, *pair) for pair in ((y * w - z * v, x), (z * u - x * w, y), (x * v - y * u, z))]
+    sign, frames = np.array([[chain.joints[i].sign] for i in moving]), poses[moving]
     weight = [mass * float(g) for g in gravity]
-    terms = -(weight[0] * moved[0] + weight[1] * moved[1] + weight[2] * moved[2])
-    rows = [i for i, _, _ in placed]
     first = [bisect_left(rows, i) for i in moving]
-    return tuple(math.fsum(row[start:].tolist()) + 0.0 for row, start in zip(terms, first, strict=True))
+    loads = []
+    for state in range(len(q)):
+        x, y, z = (sign * frames[:, state, k, 2, None] for k in range(3))
+        u, v, w = (coms[:, state, k] - frames[:, state, k, 3, None] for k in range(3))
+        moved = [np.where(turns, *pair) for pair in ((y * w - z * v, x), (z * u - x * w, y), (x * v - y * u, z))]
+        terms = -(weight[0] * moved[0] + weight[1] * moved[1] + weight[2] * moved[2])
+        loads.append(tuple(math.fsum(row[start:].tolist()) + 0.0 for row, start in zip(terms, first, strict=True)))
+    return loads
 
 
 def seen_inertias(chain: KinematicChain, bodies: Sequence[MassProperties | None], q: Array) -> tuple[float, ...]:

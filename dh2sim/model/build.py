@@ -21,6 +21,7 @@ from dh2sim.model.mass import TOOL_DENSITY, MassProperties, ball, ball_radius, l
 from dh2sim.model.meshes import load_mesh
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel, carrying
 from dh2sim.model.shapes import Shape, given_shape, placed
+from dh2sim.robot.read import place_in
 from dh2sim.robot.spec import LinkSpec, RobotSpec, Row
 from dh2sim.typing import Array, read_only
 
@@ -147,8 +148,12 @@ def _check_carried(spec: RobotSpec, bodies: Sequence[MassProperties | None]) -> 
     """
     last = max((i for i, row in enumerate(spec.rows) if row.type.moves), default=None)
     if last is not None and not any(bodies[last:]):
+        place, source = spec.name, spec.source_file
+        if source is not None:
+            line, column = place_in(source, ("joints", last, "link", "mass"))
+            place = f"{source.path}:{line}:{column}: joints[{last}].link.mass"
         name = spec.rows[last].name
-        raise ModelError(f"{spec.name}: {name} moves nothing that has mass; give its link a mass, or the tool")
+        raise ModelError(f"{place}: {name} moves nothing that has mass; give its link a mass, or the tool")
 
 
 def _payload(spec: RobotSpec, chain: KinematicChain, moving_mass: float) -> MassProperties | None:

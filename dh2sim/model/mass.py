@@ -141,12 +141,14 @@ def made_possible(inertia: Array) -> Array:
     it takes.
     """
     trace = float(inertia[0, 0]) + float(inertia[1, 1]) + float(inertia[2, 2])
+    least = 0.1 * ROUNDING[1] * trace  # readers' own rounding is some thousand times less
     for share in ROUNDING:
         extra = share * trace
-        moments = [
-            [(0.5 * (trace + extra) if i == j else 0.0) - float(inertia[i, j]) for j in range(3)] for i in range(3)
-        ]
-        if min(_pivots(moments)) > 0.1 * ROUNDING[1] * trace:
+        half = (
+            0.5 * (trace + extra) - least
+        )  # all eigenvalues of what follows are positive: pivots alone do not say so
+        moments = [[(half if i == j else 0.0) - float(inertia[i, j]) for j in range(3)] for i in range(3)]
+        if min(_pivots(moments)) > 0.0:
             return read_only(
                 [[float(inertia[i, j]) + (extra if i == j else 0.0) for j in range(3)] for i in range(3)]
             )

@@ -8,7 +8,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from dh2sim.kinematics.chain import Joint, KinematicChain
+import numpy as np
+
+from dh2sim.kinematics.chain import Joint, KinematicChain, joint_vector
 from dh2sim.kinematics.transforms import identity
 from dh2sim.model.actuators import ActuatorModel, Duty, gravity_loads
 from dh2sim.model.collision_exclusions import ExcludedPair
@@ -198,19 +200,29 @@ class RobotModel:
 
     def gravity_loads(self, q: Array) -> tuple[float, ...]:
         """Return the generalised forces, N·m or N, that hold the robot still at ``q`` (rad or m, shape (m,))."""
-        return gravity_loads(self.chain, self.bodies, q, self.spec.gravity)
+        return gravity_loads(self.chain, self.bodies, joint_vector(self.chain, q)[None], self.spec.gravity)[0]
 
     def holding_controls(self, q: Array) -> list[float]:
-        """Return the controls, one an actuator, with which the robot is at rest at ``q`` (rad or m, shape (m,)).
+        """Return the controls, one an actuator, with which the robot is at rest at ``q`` (rad or m, shape (m,))."""
+        [controls] = self.holding_controls_of([q])
+        return controls
+
+    def holding_controls_of(self, configurations: Sequence[Array]) -> list[list[float]]:
+        """Return the controls, one an actuator, with which the robot is at rest in each configuration.
 
         A position actuator is asked for a little more than the joint's position, so that its pull balances gravity.
         Clipped to the control's range.
         """
+        vectors = np.array([joint_vector(self.chain, q) for q in configurations])
+        loads = gravity_loads(self.chain, self.bodies, vectors, self.spec.gravity)
+        return [self._holding(q, load) for q, load in zip(vectors.tolist(), loads, strict=True)]
+
+    def _holding(self, q: Sequence[float], loads: Sequence[float]) -> list[float]:
         controls = []
-        for joint, position, load in zip(self.moving_joints, q, self.gravity_loads(q), strict=True):
+        for joint, position, load in zip(self.moving_joints, q, loads, strict=True):
             match joint.actuator.type:
                 case ActuatorType.POSITION:
-                    control = float(position) + (load / joint.actuator.kp if joint.actuator.kp else 0.0)
+                    control = position + (load / joint.actuator.kp if joint.actuator.kp else 0.0)
                 case ActuatorType.VELOCITY:
                     control = 0.0
                 case ActuatorType.MOTOR:

@@ -18,8 +18,8 @@ from dh2sim.messages import Loc, loc_of, path_of
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.limits import NO_LENGTH
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.robot.read import place_in
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec, Row
-from dh2sim.robot.yaml_tree import Report, compose
 
 TURN = 2 * math.pi
 MOST_TURNS = 4
@@ -88,12 +88,10 @@ def _placed(slips: list[Slip], spec: RobotSpec) -> tuple[Slip, ...]:
     source = spec.source_file
     if source is None or not slips:
         return tuple(slips)
-    root = compose(source.text, Report(source.path))
     placed = []
     for slip in slips:
-        loc = loc_of(slip.path)
-        node = next(node for k in range(len(loc), -1, -1) if (node := root.at(*loc[:k])) is not None)
-        placed.append(replace(slip, file=source.path, line=node.line, column=node.column))
+        line, column = place_in(source, loc_of(slip.path))
+        placed.append(replace(slip, file=source.path, line=line, column=column))
     return tuple(sorted(placed))
 
 

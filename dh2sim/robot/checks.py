@@ -144,10 +144,11 @@ def check_joint_vector(
         expected = f"expected {len(moving)} numbers, one for each {each} ({listed(called)})"
         scope.report(loc, f"{expected}, found a list of {len(values)}")
         return
+    scopes = {kind: replace(scope, joint_type=kind) for kind in {placed.row["type"] for placed in moving}}
     for place, (value, placed, joint) in enumerate(zip(values, moving, called, strict=True)):
         if value is WRONG:
             continue
-        if problem := COORDINATE.size_problem(value, replace(scope, joint_type=placed.row["type"])):
+        if problem := COORDINATE.size_problem(value, scopes[placed.row["type"]]):
             scope.report((*loc, place), f"{problem}, found {shown(value)}")
         elif limits := _outside(value, placed.row):
             lower, upper = limits

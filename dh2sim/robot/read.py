@@ -170,6 +170,18 @@ def plain_node(node: Node) -> object:
             return scalar
 
 
+def place_in(source: SourceFile, loc: Loc) -> tuple[int, int]:
+    """Return the line and the column of a value in the file of a robot, or of the nearest part around it.
+
+    Args:
+        source: Its ``source_file``.
+        loc: The value's place in the robot.
+    """
+    root = compose(source.text, Report(source.path))
+    node = next(node for k in range(len(loc), -1, -1) if (node := root.at(*loc[:k])) is not None)
+    return node.line, node.column
+
+
 def _locate(tree: Tree, places: Places) -> None:
     """Note where the file names meshes and the assembly, of which more is found out later."""
     owners: list[tuple[Loc, Tree]] = [((key,), tree.get(key, {})) for key in ("base", "tool")]

@@ -34,7 +34,7 @@ def errors(built: RobotModel, count: int) -> tuple[float, float]:
         data.qpos[:] = q
         mujoco.mj_forward(mj, data)
         mujoco.mj_fullM(mj, data, full)
-        found = np.array(gravity_loads(built.chain, bodies, q, built.spec.gravity))
+        found = np.array(gravity_loads(built.chain, bodies, q[None], built.spec.gravity)[0])
         loads.append(np.array([found, data.qfrc_bias]))
         seen = np.array(seen_inertias(built.chain, bodies, q))
         inertias.append(np.array([seen, np.diag(full) - mj.dof_armature]))
@@ -73,8 +73,8 @@ def test_a_hanging_arm_is_held_by_nothing_and_a_level_one_by_its_weight() -> Non
     arm = Row(name="arm", type=REVOLUTE, convention=STANDARD, a=0.5)
     built = build_model(RobotSpec(name="lever", rows=(up, arm)))
     bodies = [link.inertial for link in built.links]
-    level = gravity_loads(built.chain, bodies, read_only([0, 0]), built.spec.gravity)
-    hanging = gravity_loads(built.chain, bodies, read_only([0, -np.pi / 2]), built.spec.gravity)
+    level = gravity_loads(built.chain, bodies, read_only([[0, 0]]), built.spec.gravity)[0]
+    hanging = gravity_loads(built.chain, bodies, read_only([[0, -np.pi / 2]]), built.spec.gravity)[0]
     body = bodies[1]
     assert body is not None
     assert level == pytest.approx((0.0, body.mass * 9.81 * float(body.com[0])), abs=1e-12)
@@ -85,14 +85,14 @@ def test_joints_of_massless_links_are_held_by_nothing() -> None:
     built = model("stanford")
     nothing = [None] * len(built.links)
     q = in_limits(built, 1, seed=0)[0]
-    assert gravity_loads(built.chain, nothing, q, built.spec.gravity) == (0.0,) * 6
+    assert gravity_loads(built.chain, nothing, q[None], built.spec.gravity)[0] == (0.0,) * 6
     assert seen_inertias(built.chain, nothing, q) == (0.0,) * 6
 
 
 def assert_strong_enough(built: RobotModel, count: int) -> None:
     bodies = [link.inertial for link in built.links]
     for q in in_limits(built, count, seed=8):
-        loads = gravity_loads(built.chain, bodies, q, built.spec.gravity)
+        loads = gravity_loads(built.chain, bodies, q[None], built.spec.gravity)[0]
         for joint, load in zip(built.moving_joints, loads, strict=True):
             if "effort" in joint.assumed:
                 assert 2 * abs(load) <= joint.effort * (1 + 1e-9)

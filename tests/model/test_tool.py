@@ -13,6 +13,8 @@ from dh2sim import Fixed, LinkSpec, Pose, Prismatic, Revolute, Robot, ShapeSpec,
 from dh2sim.errors import ModelError, RobotError
 from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
+from dh2sim.model.build import build_model
+from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import Convention, RobotSpec, ShapeType
 from dh2sim.typing import Array, read_only
 from tests.model.samples import body_inertia
@@ -170,3 +172,12 @@ def test_what_is_fixed_to_a_massless_last_link_may_be_found_to_weigh_nothing() -
     robot = Robot([Revolute(a=0.3), Revolute(link=LinkSpec(mass=0.0)), Fixed()])
     with pytest.raises(ModelError, match="robot: joint_2 moves nothing that has mass"):
         _ = robot.model
+
+
+def test_where_nothing_weighs_anything_is_said_of_the_file() -> None:
+    rows = "joints:\n- {type: revolute, a: 0.3}\n- type: revolute\n  link: {mass: 0}\n- {type: fixed}\n"
+    spec = parse_robot(f"name: r\nconvention: standard\n{rows}", file="r.yaml")
+    with pytest.raises(
+        ModelError, match=r"^r\.yaml:6:16: joints\[1\]\.link\.mass: joint_2 moves nothing that has mass"
+    ):
+        build_model(spec)

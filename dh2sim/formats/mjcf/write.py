@@ -62,8 +62,9 @@ def add_keyframes(mujoco: ET.Element, model: RobotModel, *, floating_base: bool 
     if not model.spec.configurations or not model.moving_joints:
         return
     keyframe = child(mujoco, "keyframe")
-    for name, q in model.spec.configurations.items():
-        controls = model.holding_controls(q)
+    configurations = model.spec.configurations
+    held = model.holding_controls_of(list(configurations.values()))
+    for (name, q), controls in zip(configurations.items(), held, strict=True):
         key = child(keyframe, "key", name=name, qpos=numbers([0, 0, 0, 1, 0, 0, 0, *q] if floating_base else q))
         if controls:
             key.set("ctrl", numbers(controls))

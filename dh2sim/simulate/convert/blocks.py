@@ -15,8 +15,8 @@ import numpy as np
 from dh2sim.errors import OutputError, RunDamagedError
 from dh2sim.files import atomic_files
 from dh2sim.simulate.store.local import LocalStore
-from dh2sim.simulate.store.places import open_store
 from dh2sim.simulate.store.manifest import StoredArray
+from dh2sim.simulate.store.places import open_store
 from dh2sim.simulate.store.reader import StoredRun, damaged_run, open_dataset, open_run, reading
 from dh2sim.simulate.store.storage import Place
 
