@@ -40,6 +40,10 @@ class RobotError(Dh2simError, ValueError):
         self.problems = tuple(problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
+    def __reduce__(self) -> tuple[type[Self], tuple[object, ...]]:
+        """Return how it is made again in another process."""
+        return type(self), (self.problems,)
+
 
 class RobotFileError(RobotError):
     """A robot file is wrong; ``problems`` are in the order of the file."""
@@ -79,6 +83,10 @@ class NotFiniteError(Dh2simError, ValueError):
             f"{where}: {value} is not a finite number, and is not written. This is a defect of dh2sim: please report "
             "it with the robot file"
         )
+
+    def __reduce__(self) -> tuple[type[Self], tuple[object, ...]]:
+        """Return how it is made again in another process."""
+        return type(self), (self.where, self.value)
 
     def inside(self, part: str) -> Self:
         """Return the same error with a place that begins with the part that it is in."""
@@ -149,6 +157,10 @@ class RunOutputError(OutputError):
     """A run could not be written; blocks that were committed before are safe."""
 
 
+class ExecutorError(Dh2simError):
+    """An executor, or workers of it, failed; blocks that were committed before are safe."""
+
+
 class ControllerError(Dh2simError):
     """A controller is not known, its options or files are wrong, or its code failed."""
 
@@ -179,3 +191,7 @@ class SettingsError(Dh2simError, ValueError):
         """Keep the problems; the text has a line for each."""
         self.problems = tuple(problems)
         super().__init__("\n".join(f"{name} {message}" if name else message for name, message in self.problems))
+
+    def __reduce__(self) -> tuple[type[Self], tuple[object, ...]]:
+        """Return how it is made again in another process."""
+        return type(self), (self.problems,)

@@ -27,6 +27,7 @@ MODULES = {
     "toppra": {"toppra"},
     "xacro": {"xacro"},
     "s3": {"obstore"},
+    "cluster": {"distributed"},
 }
 """What is imported of each extra's libraries."""
 BROUGHT = {
@@ -97,6 +98,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("data", "runs run.zarr --to hdf5", "HDF5"),
         ("data", "validate rpr --dynamics", "--dynamics"),
         ("s3", "runs s3://bucket/run.zarr", "a run in an object store"),
+        ("cluster", "rollout rpr --out new.zarr --executor dask://localhost:1", "an executor of Dask"),
         ("toppra", "trajectory rpr home zero --profile optimal", "profile 'optimal'"),
     ],
 )

@@ -107,6 +107,14 @@ def rollout(
         int | None, typer.Option(metavar="N", help="Successive rollouts that have one design. [default: 1]")
     ] = None,
     floating_base: Annotated[bool, typer.Option("--floating-base", help="Let base_link move freely.")] = False,
+    executor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHERE",
+            help="Simulate blocks in other processes: local, local:N for N of them, or dask://HOST:PORT for the "
+            "workers of a Dask scheduler, which must see the same folder. Each has --threads threads, 1 by default.",
+        ),
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted run, or start it.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing run.")] = False,
     share: Annotated[
@@ -165,7 +173,7 @@ def rollout(
     from dh2sim.simulate.description import describe
     from dh2sim.simulate.options import RolloutOptions
     from dh2sim.simulate.prepare import prepare
-    from dh2sim.simulate.run import check_share, choose_blocks, fill, open_run, with_block_size
+    from dh2sim.simulate.run import check_share, choose_blocks, fill, open_run, with_block_size, workers_of
 
     options = RolloutOptions(
         rollouts=rollouts,  # type: ignore[arg-type]  # None is as if it were not given
@@ -187,7 +195,10 @@ def rollout(
     part, named, sharing = _share(share), _blocks(blocks), bool(share or blocks)
     check_share(part, alone=named is None)
     job = with_block_size(prepare(model, options, command=shlex.join(["dh2sim", *sys.argv[1:]])), block_size)
-    with open_run(job, out, resume=resume, overwrite=overwrite, join=sharing) as writer:
+    with (
+        workers_of(executor) as workers,
+        open_run(job, out, resume=resume, overwrite=overwrite, join=sharing) as writer,
+    ):
         count = writer.layout.blocks
         chosen = choose_blocks(count, share=part, blocks=None if named is None else range(count)[named])
         total = sum(len(writer.layout.rollouts(block)) for block in chosen)
@@ -197,6 +208,7 @@ def rollout(
                 job,
                 blocks=chosen,
                 threads=threads,
+                workers=workers,
                 advance=advance,
                 stopping=lambda: patience.arrived is not None,
             )

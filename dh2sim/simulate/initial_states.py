@@ -46,6 +46,8 @@ class InitialStates:
     """SHA-256 of ``given``; empty for home and zero, which are the robot's."""
     named: bool = False
     """Whether it is a named configuration."""
+    first: int = 0
+    """The rollout that the first state is of, where there is one for each."""
 
     def states(
         self, plant: Plant, options: RolloutOptions, rollouts: Sequence[int], own: Array | None = None
@@ -67,12 +69,20 @@ class InitialStates:
         if self.given is None:
             qpos[:, plant.positions] = _random(plant, options.seed, rollouts)
             return qpos, qvel
-        chosen = np.zeros(1, dtype=int) if len(self.given) == 1 else np.asarray(rollouts)
+        chosen = np.zeros(1, dtype=int) if len(self.given) == 1 else np.asarray(rollouts) - self.first
         if self.closed is not None:
             qpos[:], qvel[:] = (of[chosen] for of in self.closed)
         else:
             qpos[:, plant.positions], qvel[:, plant.velocities] = self.given[chosen, 0], self.given[chosen, 1]
         return qpos, qvel
+
+    def of(self, rollouts: range) -> InitialStates:
+        """Return no more of them than what some rollouts need."""
+        if self.given is None or len(self.given) == 1:
+            return self
+        part = slice(rollouts.start - self.first, rollouts.stop - self.first)
+        closed = None if self.closed is None else (self.closed[0][part], self.closed[1][part])
+        return replace(self, given=self.given[part], closed=closed, first=rollouts.start)
 
     def on_loops(self, plant: Plant, robot: MechanismModel) -> InitialStates:
         """Return the states with MuJoCo's positions and velocities of all joints, those inside closures too.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import math
 import operator
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -31,6 +32,14 @@ DEFAULT_DURATION: Final = 2.0
 MOST_STEPS: Final = 10**12
 """Years of computing."""
 MOST_ROLLOUTS: Final = 10**7
+
+
+def _frozen(values: dict[str, Any]) -> MappingProxyType[str, Any]:
+    return MappingProxyType(values)
+
+
+# options and jobs are sent to other processes, and Python's read-only mapping cannot be pickled by itself
+copyreg.pickle(MappingProxyType, lambda values: (_frozen, (dict(values),)))
 
 
 class RolloutKeywords(TypedDict, total=False):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Unpack
@@ -25,6 +26,7 @@ from dh2sim.simulate.prepare import prepare
 
 if TYPE_CHECKING:
     import xarray as xr
+    from distributed import Client
 
     from dh2sim.simulate.store.storage import Place
     from dh2sim.simulate.store.writer import RunWriter
@@ -70,6 +72,7 @@ def rollout(
     share: tuple[int, int] | None = None,
     blocks: Sequence[int] | None = None,
     block_size: int | None = None,
+    executor: Executor | Client | str | None = None,
     advance: Advance | None = None,
     **options: Unpack[RolloutKeywords],
 ) -> xr.Dataset:
@@ -87,6 +90,9 @@ def rollout(
         blocks: The same for these blocks, from 0.
         block_size: Rollouts in a block, which is written as a whole; by default some seconds' work, at most 64 MB.
             A run that exists keeps its own.
+        executor: Simulates the blocks instead of this process: an executor of ``concurrent.futures``, a client of
+            Dask, 'local', 'local:N' or 'dask://HOST:PORT'. Its workers must see ``out``; without it they send back
+            what they simulated. ``threads`` is the number in each task then, 0 for one.
         advance: Called with the number of rollouts that are done since the last call.
         **options: What is simulated and recorded, the fields of ``RolloutOptions``: ``rollouts`` (256), ``steps`` or
             ``duration`` (2 s), ``timestep`` (0.002 s), ``integrator``, ``controller`` ('sine'), ``start`` ('home'),
@@ -102,7 +108,8 @@ def rollout(
         RunExistsError: There is something at ``out``, and neither ``resume`` nor ``overwrite`` is given.
         RunDiffersError: The run to be resumed has other options.
         OutputError: The run cannot be written; what was written before is safe.
-        MissingExtraError: xarray is not installed.
+        ExecutorError: The executor fails, or its workers do.
+        MissingExtraError: xarray is not installed, or what a place or an executor needs.
     """
     require_extra("data", "xarray", what="a run as an xarray dataset")
     checked = RolloutOptions(**options)
@@ -111,7 +118,7 @@ def rollout(
         if share is not None or blocks is not None:
             raise SettingsError([("share" if blocks is None else "blocks", "must be given together with out")])
         try:
-            arrays = simulate_block(job, range(job.options.rollouts), threads=threads, advance=advance)
+            arrays = _in_memory(job, threads=threads, executor=executor, advance=advance)
         except MemoryError as error:
             raise SettingsError(
                 [("", "the run does not fit into memory; give 'out' to write it block by block")]
@@ -121,10 +128,41 @@ def rollout(
 
     check_share(share, alone=blocks is None)
     part = share is not None or blocks is not None
-    with open_run(job, out, resume=resume, overwrite=overwrite, join=part) as writer:
+    with (
+        workers_of(executor) as workers,
+        open_run(job, out, resume=resume, overwrite=overwrite, join=part) as writer,
+    ):
         chosen = choose_blocks(writer.layout.blocks, share=share, blocks=blocks)
-        fill(writer, job, blocks=chosen, threads=threads, advance=advance)
+        fill(writer, job, blocks=chosen, threads=threads, workers=workers, advance=advance)
     return open_dataset(out)
+
+
+def workers_of(executor: Executor | Client | str | None) -> AbstractContextManager[Executor | None]:
+    """Return a context with what simulates blocks in place of this process; with None if nothing is to.
+
+    Raises, when it is entered:
+        SettingsError: It is none of what ``rollout`` takes.
+        ExecutorError: It cannot be reached.
+        MissingExtraError: Dask is not installed.
+    """
+    if executor is None:
+        return nullcontext()
+    from dh2sim.simulate.cluster import opened
+
+    return opened(executor)
+
+
+def _in_memory(job: Job, *, threads: int, executor: Executor | Client | str | None, advance: Advance | None) -> Block:
+    with workers_of(executor) as workers:
+        if workers is None:
+            return simulate_block(job, range(job.options.rollouts), threads=threads, advance=advance)
+        from dh2sim.simulate.cluster import simulate_on
+
+        return simulate_on(workers, job, threads=threads, done=advance or _no_report)
+
+
+def _no_report(_rollouts: int) -> None:
+    pass
 
 
 def _model_of(robot: ModelLike | MechanismModel | str | PathLike[str]) -> RobotModel | MechanismModel:
@@ -226,6 +264,7 @@ def fill(
     *,
     blocks: Sequence[int] | None = None,
     threads: int = 0,
+    workers: Executor | None = None,
     advance: Advance | None = None,
     stopping: Callable[[], bool] = lambda: False,
 ) -> Progress:
@@ -236,19 +275,31 @@ def fill(
         job: The run.
         blocks: Those to look at; None: all.
         threads: Number of threads, 0 for one a processor.
+        workers: Simulate and commit the blocks in place of this process; see ``rollout``.
         advance: Called with the number of rollouts that are done; those of an earlier run count at once.
         stopping: Called before every block; the run stops there if it returns True.
 
     Raises:
         ControllerError: The controller fails.
         OutputError: A block cannot be written; those before it are safe.
+        ExecutorError: The executor fails, or its workers do; what was committed is safe.
     """
-    report = advance or (lambda _: None)
+    report = advance or _no_report
     chosen = range(writer.layout.blocks) if blocks is None else blocks
     pending = writer.pending(chosen)
     report(sum(len(writer.layout.rollouts(block)) for block in {*chosen} - {*pending}))
     done, finished = 0, True
     start = time.perf_counter()
+    if workers is not None:
+        from dh2sim.simulate.cluster import fill_on
+
+        def committed(block: int) -> None:
+            nonlocal done
+            done += len(writer.layout.rollouts(block))
+            report(len(writer.layout.rollouts(block)))
+
+        finished = fill_on(workers, writer, job, blocks=pending, threads=threads, done=committed, stopping=stopping)
+        return Progress(finished=finished, rollouts=done, seconds=time.perf_counter() - start)
     with ThreadPoolExecutor(max_workers=1) as pool:
         written: Future[None] | None = None
         for block in pending:

@@ -77,7 +77,7 @@ class Recording:
             raise ControllerError(
                 f"{self.file} does not contain all of rollout {rollout}: it stopped early, or the run is not finished"
             )
-        return replace(self, rollouts=None, read=lambda _: data)
+        return replace(self, rollouts=None, read=functools.partial(_the_same, data))
 
     def columns(self, wanted: Sequence[str], what: str, *, joints: Sequence[str]) -> list[int]:
         """Return which column belongs to each of the robot's joints or actuators.
@@ -110,6 +110,10 @@ class Recording:
             problems.append("the columns are joints: say as=reference")
         start = f"{self.file} does not fit the robot, whose {what} are {listed(wanted)}"
         raise ControllerError("\n  ".join([f"{start}:", *problems]))
+
+
+def _the_same(data: Array, _rollouts: range) -> Array:
+    return data
 
 
 def _quoted(names: Sequence[str]) -> str:
@@ -267,7 +271,7 @@ def _read_csv(path: Path, file: str, kind: str) -> Recording:
         length=len(table),
         times=times,
         rollouts=None,
-        read=lambda _: data,
+        read=functools.partial(_the_same, data),
         digest=hashlib.sha256(raw).hexdigest(),
     )
 
@@ -340,7 +344,7 @@ def _read_npz(path: Path, file: str, kind: str) -> Recording:
         length=len(read.time),
         times=read.time,
         rollouts=None,
-        read=lambda _: data,
+        read=functools.partial(_the_same, data),
         digest=read.digest,
     )
 

@@ -107,12 +107,15 @@ class StoredRun:
         Raises:
             RunDamagedError: A file or folder is missing or differs.
         """
-        folders: dict[str, dict[str, int]] = {}
-        for name in (*self.manifest.coordinates, *self.manifest.variables, BLOCKS, f"{BLOCKS}/{RECORD}"):
+        arrays = (*self.manifest.coordinates, *self.manifest.variables, BLOCKS, f"{BLOCKS}/{RECORD}")
+
+        def files_of(name: str) -> dict[str, int]:
             try:
-                folders[name] = self.store.list(name)
+                return self.store.list(name)
             except OSError as error:
                 raise damaged_metadata(self.store.file(f"{name}/{METADATA}")) from error
+
+        folders = dict(zip(arrays, run_all(files_of, arrays, threads=_READERS), strict=True))
         for name, coordinate in self.manifest.coordinates.items():
             file = coordinate.chunk_name(0)
             if not coordinate.empty and not _has_size(folders[name].get(file, -1), coordinate):

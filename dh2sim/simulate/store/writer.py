@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -144,6 +145,17 @@ class RunWriter:
             if lock is not None:
                 lock.release()
             raise
+
+    @property
+    def digest(self) -> str:
+        """Of the run's manifest; another run has another one."""
+        return self._run.manifest.digest
+
+    @property
+    def place(self) -> str:
+        """Where the run is, from whatever folder one looks."""
+        store = self._run.store
+        return os.path.abspath(store.path) if isinstance(store, LocalStore) else store.name
 
     def pending(self, blocks: Iterable[int] | None = None) -> tuple[int, ...]:
         """Return the blocks, of all or of some, that are not committed, or were found damaged by ``resume``."""
