@@ -1,0 +1,163 @@
+"""Runs in an object store, a real server on this machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from dh2sim.errors import RunDiffersError, RunError, RunExistsError
+from dh2sim.simulate.description import describe
+from dh2sim.simulate.store.codec import encode_text
+from dh2sim.simulate.store.metadata import make_metadata
+from dh2sim.simulate.store.objects import ObjectStore
+from dh2sim.simulate.store.reader import damaged_blocks, open_dataset
+from dh2sim.simulate.store.writer import RunWriter
+from tests.program import contents, dh2sim
+from tests.simulate.store.runs import SECONDS, block_of, finish, layout, make
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(find_spec("obstore") is None, reason="needs the extra 's3'"),
+    pytest.mark.skipif(find_spec("moto") is None, reason="needs moto[server]"),
+    pytest.mark.filterwarnings("ignore"),  # of the server's libraries
+]
+
+OF = layout(rollouts=8, block=2)
+RUN = "s3://rollouts/tests/run.zarr"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[str]:
+    from moto.server import ThreadedMotoServer
+
+    started = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    started.start()
+    host, port = started.get_host_and_port()
+    yield f"http://{host}:{port}"
+    started.stop()
+
+
+@pytest.fixture(autouse=True)
+def _bucket(server: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty bucket."""
+    import boto3
+
+    for name, value in (("ACCESS_KEY_ID", "test"), ("SECRET_ACCESS_KEY", "test"), ("REGION", "us-east-1")):
+        monkeypatch.setenv(f"AWS_{name}", value)
+    monkeypatch.setenv("AWS_ENDPOINT_URL", server)
+    client = boto3.client("s3", endpoint_url=server, region_name="us-east-1")
+    if "rollouts" in [bucket["Name"] for bucket in client.list_buckets()["Buckets"]]:
+        for each in client.list_objects_v2(Bucket="rollouts").get("Contents", []):
+            client.delete_object(Bucket="rollouts", Key=each["Key"])
+    else:
+        client.create_bucket(Bucket="rollouts")
+
+
+def objects(url: str = RUN) -> dict[str, bytes]:
+    """What is in the store, by key."""
+    import obstore
+
+    store = ObjectStore(url)._objects
+    return {
+        each["path"]: bytes(obstore.get(store, each["path"]).bytes()) for some in obstore.list(store) for each in some
+    }
+
+
+def test_two_workers_on_one_block_make_the_run_of_one_process_byte_for_byte(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with RunWriter.join(RUN, OF) as first, RunWriter.join(RUN, OF) as second:
+        monkeypatch.setattr(second, "pending", lambda blocks: blocks)  # it looked before the other one committed
+        for writer, block in ((first, 0), (second, 0), (second, 3), (first, 3), (first, 1), (second, 2)):
+            writer.write(block, block_of(OF, block), SECONDS)
+    assert objects() == contents(make(tmp_path / "one.zarr", OF))
+    assert damaged_blocks(RUN) == []
+
+
+def test_xarray_opens_it_directly() -> None:
+    import xarray as xr
+    from obstore.store import S3Store
+    from zarr.storage import ObjectStore as ZarrStore
+
+    with RunWriter.create(RUN, OF) as writer:
+        finish(writer)
+    bucket = S3Store("rollouts", prefix="tests/run.zarr", client_options={"allow_http": True})
+    run = xr.open_zarr(ZarrStore(bucket, read_only=True))
+    assert run.equals(open_dataset(RUN))
+    assert run.status.to_numpy().tolist() == open_dataset(RUN).status.to_numpy().tolist()
+
+
+def test_it_is_described_verified_and_damage_is_mended() -> None:
+    with RunWriter.join(RUN, OF) as writer:
+        writer.write(1, block_of(OF, 1), SECONDS)
+        writer.write(2, block_of(OF, 2), SECONDS)
+    assert describe(RUN).blocks_missing == (0, 3)
+    store, sound = ObjectStore(RUN), objects()
+    chunk = sound["qpos/c.1.0.0"]
+    store.put({"qpos/c.1.0.0": (chunk[:-9] + bytes(9),)})
+    store.put({"blocks/record/c.2": (encode_text("{}"),)})
+    assert damaged_blocks(RUN) == [1, 2]
+    shown = dh2sim("runs", RUN, "--verify")
+    assert (shown.status, shown.err) == (
+        1,
+        f"dh2sim: '{RUN}': blocks 1 to 2 are damaged; resume it to compute them again\n",
+    )
+    with RunWriter.resume(RUN, OF) as writer:
+        assert finish(writer) == (0, 1, 2, 3)
+    assert {name: objects()[name] for name in sound} == sound
+    assert describe(RUN).complete
+
+
+def test_a_run_that_was_half_made_is_completed_by_who_joins_it() -> None:
+    store, files = ObjectStore(RUN), make_metadata(OF)
+    assert store.put_new("zarr.json", files["zarr.json"])
+    with pytest.raises(RunError, match="is missing or damaged"):
+        open_dataset(RUN)
+    later = layout(rollouts=8, block=2, created="2027-01-01T00:00:00+00:00", command="dh2sim rollout --share 2/2")
+    RunWriter.join(RUN, later).close()
+    assert objects() == files
+
+
+def test_only_a_run_is_replaced_and_only_if_asked_to() -> None:
+    with RunWriter.create(RUN, OF) as writer:
+        finish(writer)
+    before = objects()
+    with pytest.raises(RunExistsError, match="already exists; resume it, overwrite it"):
+        RunWriter.create(RUN, OF)
+    with pytest.raises(RunDiffersError, match="seed was 0 and is now 1"):
+        RunWriter.join(RUN, layout(rollouts=8, block=2, settings={"seed": 1}))
+    with RunWriter.join(RUN, OF) as old:
+        old._committed.clear()
+        assert objects() == before
+        RunWriter.create(RUN, layout(rollouts=8, block=4), overwrite=True).close()
+        with pytest.raises(RunDiffersError, match="was replaced or removed while it was written to"):
+            old.write(0, block_of(OF, 0), SECONDS)
+    assert objects() == make_metadata(layout(rollouts=8, block=4))
+    ObjectStore("s3://rollouts/tests/other").put({"thesis.txt": (b"years of work",)})
+    with pytest.raises(RunExistsError, match="is not a run of dh2sim"):
+        RunWriter.create("s3://rollouts/tests/other", OF, overwrite=True)
+
+
+def test_the_command_writes_it_and_reads_it() -> None:
+    made = dh2sim("rollout", "planar_2r", "--rollouts", "6", "--steps", "4", "--block-size", "2", "--out", RUN)
+    assert (made.status, made.err) == (0, "")
+    assert dh2sim("runs", RUN).out.startswith(f"{RUN}  complete\n")
+    assert dh2sim("runs", RUN, "--verify").status == 0
+
+
+@pytest.mark.parametrize(
+    ("place", "reported"),
+    [
+        ("s3://rollouts/none.zarr", "there is no 's3://rollouts/none.zarr'"),
+        ("s3://no-such-bucket/run.zarr", "cannot read 's3://no-such-bucket/run.zarr': there is no such bucket"),
+        ("s3://rollouts", "'s3://rollouts' names no run: write s3://BUCKET/NAME, as in s3://rollouts/run.zarr"),
+        ("ftp://host/run.zarr", "'ftp://host/run.zarr' cannot be opened: runs are in folders, or in object stores"),
+    ],
+)
+def test_where_there_is_no_run_the_place_is_named(place: str, reported: str) -> None:
+    shown = dh2sim("runs", place)
+    assert (shown.status, shown.out) == (2, "")
+    assert shown.err.startswith(f"dh2sim: {reported}")
