@@ -258,8 +258,9 @@ def _columns(
                 report.raise_any()
             message = "the column has no name"
             if cell.text:
-                message = f"unknown column {shown(name)}.{did_you_mean(name, known)} Columns: "
-                message += f"{listed(row.name for row in rows)}; {_COLUMNS}"
+                message = f"unknown column {shown(name)}.{did_you_mean(name, known)}"
+                if not any("unknown column" in problem.message for problem in report.problems):
+                    message += f" Columns: {listed(row.name for row in rows)}; {_COLUMNS}"
             report(line, cell.column, "", message)
             continue
         if column.name in found:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from dh2sim.robot.yaml_tree import Node, Report, compose
 from dh2sim.typing import Array
 
 _NUMBERS: Final = ("a", "alpha", "beta", "d", "theta")
+_KEYS: Final = ("convention", *_NUMBERS)
 
 
 def calibrated_text(calibration: Calibration, *, header: Sequence[str] = (), folder: Path | None = None) -> str:
@@ -75,7 +76,7 @@ def _edited(text: str, robot: RobotSpec, original: RobotSpec) -> str:
     if not can_be_edited(text):
         raise ValueError("the file has anchors")
     writer = UnitWriter(units=original.units)
-    cells: dict[tuple[int | str | None, str], str | None] = {}
+    cells: _Cells = {}
     for index, (new, old) in enumerate(zip(robot.rows, original.rows, strict=True)):
         if new.convention is not old.convention:
             if new.convention is not Convention.HAYATI:
@@ -89,7 +90,29 @@ def _edited(text: str, robot: RobotSpec, original: RobotSpec) -> str:
     text = _with_points(text, robot, original, writer)
     text = _with_pose(text, "base", robot.base.pose, original.base.pose, writer)
     text = _with_pose(text, "tool", robot.tool.pose, original.tool.pose, writer)
-    return with_cells(text, cells) if cells else text
+    text = with_cells(text, {cell: value for cell, value in cells.items() if _is_written(text, cell)})
+    return _with_new_cells(text, cells)
+
+
+_Cells: TypeAlias = dict[tuple[int, str], str]
+
+
+def _is_written(text: str, cell: tuple[int, str]) -> bool:
+    return compose(text, Report("")).at("joints", *cell) is not None
+
+
+def _with_new_cells(text: str, cells: _Cells) -> str:
+    """Write numbers into rows that say nothing of them, behind the row's type."""
+    root = compose(text, Report(""))
+    for index in sorted({row for row, _ in cells}, reverse=True):
+        row, kind = root.at("joints", index), root.entry("joints", index, "type")
+        if row is None or kind is None:
+            raise ValueError("a row has no type")
+        between = ", " if row.flow else f"\n{' ' * (row.column - 1)}"
+        new = [f"{key}: {cells[index, key]}" for key in _KEYS if (index, key) in cells and row.at(key) is None]
+        at = kind.value.end
+        text = text[:at] + "".join(f"{between}{each}" for each in new) + text[at:]
+    return text
 
 
 def _with_points(text: str, robot: RobotSpec, original: RobotSpec, writer: UnitWriter) -> str:
@@ -118,6 +141,7 @@ def _with_pose(text: str, key: str, new: Pose, old: Pose, writer: UnitWriter) ->
         numbers = [write(value) for value in wanted.tolist()]
         root = compose(text, Report(""))
         node = root.at(key, part)
+        xyz = root.at(key, "xyz")
         if node is not None and isinstance(node.value, list):
             for each, number in reversed(list(zip(node.value, numbers, strict=True))):
                 text = text[: each.start] + number + text[each.end :]
@@ -131,6 +155,10 @@ def _with_pose(text: str, key: str, new: Pose, old: Pose, writer: UnitWriter) ->
             if entry is None or root.flow:
                 raise ValueError("no line of its own for joints")
             text = text[: entry.start] + f"{key}: {{{line}}}\n" + text[entry.start :]
+        elif part == "rpy" and xyz is not None and isinstance(xyz.value, list) and xyz.flow:
+            end = text.index("]", xyz.value[-1].end) + 1
+            between = ", " if whole.flow else f"\n{' ' * (whole.column - 1)}"
+            text = text[:end] + between + line + text[end:]
         elif whole.flow:
             start = text.index("{", whole.start) + 1
             rest = ", " if re.match(r"\s*\}", text[start:]) is None else ""
