@@ -21,6 +21,7 @@ from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.tree import DYNAMICS as URDF_DYNAMICS
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.kinematics.loop_closure import constraint_jacobian
+from dh2sim.kinematics.parallelograms import find_couplings
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_mechanism_frames, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
@@ -138,8 +139,9 @@ def losses(model: RobotModel | MechanismModel, formats: Collection[Format]) -> l
 
 def _lost_in_urdf(model: RobotModel | MechanismModel) -> Iterator[Loss]:
     spec, urdf = model.spec, Format.URDF
-    if spec.closures:
-        yield Loss(what=Lost.CLOSURES, format=urdf, where=tuple(closure.name for closure in spec.closures))
+    kept = find_couplings(spec).closures if spec.closures else ()  # by joints that mimic others
+    if lost := tuple(closure.name for closure in spec.closures if closure.name not in kept):
+        yield Loss(what=Lost.CLOSURES, format=urdf, where=lost)
     if any(_drives(row.actuator) for row in spec.moving_rows):
         yield Loss(what=Lost.ACTUATORS, format=urdf)
     for key in (field.name for field in fields(Dynamics) if field.name not in URDF_DYNAMICS):

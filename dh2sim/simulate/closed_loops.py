@@ -76,9 +76,10 @@ class ClosedLoops:
         self._others = np.setdiff1d(np.arange(model.nv), driven)
         self._turns = model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
         self._scale = np.where(self._turns, 1.0, size)
-        sites = np.stack([model.eq_obj1id, model.eq_obj2id], axis=1)
+        between = model.eq_objtype == mujoco.mjtObj.mjOBJ_SITE  # couplings of joints follow from the others
+        sites = np.stack([model.eq_obj1id, model.eq_obj2id], axis=1)[between]
         self._sites: NDArray[np.intp] = np.asarray(sites, dtype=np.intp).reshape(-1, 2)
-        self._welded = np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_WELD)
+        self._welded = np.flatnonzero(model.eq_type[between] == mujoco.mjtEq.mjEQ_WELD)
         self._ancestors = _ancestors(model)
         self._carries = self.carries(model.site_bodyid[self._sites])  # (equalities, 2, nv)
         self._before = self.carries(model.jnt_bodyid) & ~np.eye(model.nv, dtype=bool)  # joints that carry a joint

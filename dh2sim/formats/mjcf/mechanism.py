@@ -24,6 +24,7 @@ from dh2sim.formats.mjcf.write import (
     class_name,
 )
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
+from dh2sim.kinematics.parallelograms import find_couplings
 from dh2sim.kinematics.transforms import compose, identity, invert, joint_part
 from dh2sim.kinematics.tree import BASE, Closure, body_poses
 from dh2sim.kinematics.tree import placed as frame_pose
@@ -80,6 +81,7 @@ def to_mechanism_mjcf(model: MechanismModel, options: MjcfOptions = EXPORTED) ->
         poses = body_poses(model.tree, model.q)
         for closure in model.tree.closures:
             _close(equality, bodies, model, closure, poses, (2 * options.timestep, DAMPING_RATIO))
+        _couple(equality, model, (2 * options.timestep, DAMPING_RATIO))
     add_actuators(mujoco, model)
     add_sensors(mujoco, model)
     _add_gap_sensors(mujoco)
@@ -163,6 +165,19 @@ def _close(
         _constraint(equality, "connect", f"{name}{suffix}", f"{name}_a{suffix}", f"{name}_b{suffix}", solref)
 
 
+def _couple(equality: ET.Element, model: MechanismModel, solref: tuple[float, float]) -> None:
+    """Let joints that loops couple exactly, as parallelograms do, move as one: they cannot fold over then.
+
+    MuJoCo measures their coordinates from the references, which are those of the assembly.
+    """
+    names = [joint.name for joint in model.moving_joints]
+    for k, (root, sign, _) in find_couplings(model.spec).joints.items():
+        coupled = {"joint1": names[k], "joint2": names[root], "polycoef": numbers([0, sign, 0, 0, 0])}
+        child(
+            equality, "joint", name=f"{names[k]}_coupled", **coupled, solref=numbers(solref), solimp=numbers(SOLIMP)
+        )
+
+
 def _helper_start(kind: ClosureType, T_a_b: Array) -> Array:
     """Return the pose in frame a of the body in between, in the assembly: at b, its joints about or along z of a."""
     if kind is not ClosureType.UNIVERSAL:
@@ -184,6 +199,8 @@ def _add_gap_sensors(mujoco: ET.Element) -> None:
     sensors = mujoco.find("sensor")
     assert sensors is not None
     for constraint in mujoco.iterfind("equality/*"):
+        if constraint.tag == "joint":
+            continue
         ends = {"objtype": "site", "objname": "site1", "reftype": "site", "refname": "site2"}
         between = {key: constraint.get(value, value) for key, value in ends.items()}
         child(sensors, "framepos", name=f"{constraint.get('name')}{GAP}", **between)

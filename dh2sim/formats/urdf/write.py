@@ -10,6 +10,7 @@ from typing import cast
 
 from dh2sim.formats.urdf.tree import DYNAMICS
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
+from dh2sim.kinematics.parallelograms import find_couplings
 from dh2sim.kinematics.transforms import compose, identity, invert, pose_from_rpy, rpy_from_rotation
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.mass import LIGHTEST, MassProperties
@@ -63,8 +64,18 @@ def to_urdf(model: ModelLike | MechanismModel, *, dh_frames: bool = True) -> str
     _frame(robot, "flange", parent, compose(model.joints[-1].T_joint_dh, T_DHN_FLANGE))
     _frame(robot, "tool0", "flange", compose(T_FLANGE_DHN, model.chain.T_dhn_tool0))
     whole = mechanism or model
+    if mechanism is not None:
+        _mimic(robot, mechanism)
     header = [*provenance(whole), *(entry.sentence for entry in whole.assumptions)]
     return '<?xml version="1.0" encoding="utf-8"?>\n' + document(robot, header)
+
+
+def _mimic(robot: ET.Element, model: MechanismModel) -> None:
+    """Let joints that loops couple exactly mimic each other."""
+    names = [joint.name for joint in model.moving_joints]
+    elements = {element.get("name"): element for element in robot.iterfind("joint")}
+    for k, (root, sign, offset) in find_couplings(model.spec).joints.items():
+        child(elements[names[k]], "mimic", joint=names[root], multiplier=number(sign), offset=number(offset))
 
 
 def _row(
