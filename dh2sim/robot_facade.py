@@ -376,7 +376,7 @@ class Robot:
                 assembly.
             frame: tool0, base_link, dh_0 … dh_n or link_1 … link_n; rocker/dh_1 … of a branch.
             **options: ``out=`` takes the result; ``rows=3`` leaves out 0 0 0 1; ``threads=`` for large batches, 0 for
-                all processors.
+                all processors; ``backend="numba"`` for compiled code.
 
         Returns:
             Shape (..., 4, 4).
@@ -402,7 +402,7 @@ class Robot:
         Args:
             q: Joint vectors, rad and m, shape (..., n); or the name of a configuration.
             frame: tool0, base_link, dh_0 … dh_n or link_1 … link_n.
-            **options: ``out`` and ``threads``, as for :meth:`fk`.
+            **options: ``out``, ``threads`` and ``backend``, as for :meth:`fk`.
 
         Returns:
             Shape (..., 6, n): rows 0-2 linear, rows 3-5 angular. Of a mechanism (6, k) at one configuration: the

@@ -28,6 +28,7 @@ MODULES = {
     "xacro": {"xacro"},
     "s3": {"obstore"},
     "cluster": {"distributed"},
+    "fast": {"numba"},
 }
 """What is imported of each extra's libraries."""
 BROUGHT = {
@@ -119,6 +120,7 @@ def test_a_command_without_its_extra_says_how_to_install_it(
         ("import dh2sim.view.server", "view"),
         ("from dh2sim.simulate import rollout; rollout('rpr', rollouts=1, steps=2)", "data"),
         ("from dh2sim.simulate import open_dataset; open_dataset('run.zarr')", "data"),
+        ("from dh2sim import Robot; Robot.load('rpr').fk([[0, 0, 0]], backend='numba')", "fast"),
     ],
 )
 def test_the_library_without_an_extra_says_how_to_install_it(folder: Path, code: str, extra: str) -> None:

@@ -44,7 +44,7 @@ class CodeCache:
         self.pose: dict[str, Callable[[object], Array | None]] = {}
         """Take one joint vector."""
         self.jacobian: dict[str, Callable[[object], Array | None]] = {}
-        self.compiled: dict[object, Callable[[Array, Array], None]] = {}
+        self.compiled: dict[object, Callable[[Array, Array], bool] | None] = {}
         """Take a batch; of the numba backend."""
         self._calls: Counter[object] = Counter()
 

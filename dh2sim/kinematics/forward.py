@@ -27,6 +27,7 @@ from dh2sim.kinematics.batches import (
     require_shape,
 )
 from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vector, joint_vectors
+from dh2sim.kinematics.numba_kernels import numba_kernel
 from dh2sim.kinematics.straight_line import JACOBIAN, POSE, Kind, of_one
 from dh2sim.kinematics.transforms import compose, identity, joint_part
 from dh2sim.kinematics.trig import sin_cos
@@ -40,7 +41,7 @@ def forward_kinematics(chain: ChainLike, q: ArrayLike, **options: Unpack[BatchOp
     Args:
         chain: The robot, in any form.
         q: Joint vectors, rad and m, shape (..., n).
-        **options: ``out``, ``rows``, ``threads``: see :class:`BatchOptions`.
+        **options: ``out``, ``rows``, ``threads``, ``backend``: see :class:`BatchOptions`.
 
     Returns:
         Shape (..., 4, 4).
@@ -229,7 +230,7 @@ def frame_pose(chain: ChainLike, frame: str, q: ArrayLike, **options: Unpack[Bat
         chain: The robot, in any form.
         frame: One of ``frame_names``; link_i is at joint i, dh_i is the table's frame i.
         q: Joint vectors, rad and m, shape (..., n).
-        **options: ``out``, ``rows``, ``threads``: see :class:`BatchOptions`.
+        **options: ``out``, ``rows``, ``threads``, ``backend``: see :class:`BatchOptions`.
 
     Returns:
         Shape (..., 4, 4).
@@ -274,7 +275,7 @@ def geometric_jacobian(
         chain: The robot, in any form.
         q: Joint vectors, rad and m, shape (..., n).
         frame: One of ``frame_names``.
-        **options: ``out``, ``threads``: see :class:`BatchOptions`.
+        **options: ``out``, ``threads``, ``backend``: see :class:`BatchOptions`.
 
     Returns:
         Shape (..., 6, n): rows 0-2 velocity of the frame's origin, m/s; rows 3-5 angular velocity, rad/s; both
@@ -315,7 +316,7 @@ def _computed(
     options: BatchOptions | JacobianOptions,
 ) -> Array:
     """Compute a pose or a Jacobian of a frame for joint vectors, one or a batch."""
-    out, rows, threads = checked_options(kind, options)
+    out, rows, threads, compiled = checked_options(kind, options)
     vectors, batch = joint_vectors(robot, q)
     if not batch:
         result = of_one(kind, robot, *place, vectors[0])[:rows]
@@ -324,7 +325,8 @@ def _computed(
         require_shape(out, result.shape)[...] = result
         return out
     shape = (rows, kind.columns or robot.n)
-    return in_blocks(vectors, batch, shape, fill, out, threads)
+    kernel = numba_kernel(kind, robot, *place, rows) if compiled else None
+    return in_blocks(vectors, batch, shape, fill, out, threads, kernel)
 
 
 def frame_place(chain: KinematicChain, frame: str) -> tuple[int, Array]:
