@@ -22,6 +22,7 @@ ERRORS: dict[str, dict[str, float]] = {
     "calibrate_robot": {r"calibrated: off by (\S+) mm": 0.3, r"by at most (\S+) m\n": 1e-14},
     "control_with_generated_code": {r"to within (\S+) rad": 1e-3},
     "convert_convention": {r"tool0: at most (\S+) apart": 1e-14},
+    "design_sweep": {r"its own table by at most (\S+) m": 1e-12},
     "export_to_mujoco": {r"by the table: (\S+) m apart": 1e-14},
     "import_urdf": {r"axis: at most (\S+) m apart": 1e-12},
     "inverse_kinematics": {

@@ -229,7 +229,7 @@ class _Document:
             loc = ("joints", joints.index(str(loc[0])), *loc[1:])
         if not loc or loc[0] not in ROBOT.keys or loc[0] in _NOT_DESIGNED:
             known = [*self._parameters, *(f"{cell}{i}" for i in range(1, rows + 1) for cell in CELLS)]
-            examples = [*self._parameters, *(f"{cell}1" for cell in CELLS[:4])]
+            examples = dict.fromkeys([*self._parameters, *(f"{cell}1" for cell in CELLS[:4])])
             raise _UnknownNameError(
                 f"is not the name of a number of {self._spec.name}.{did_you_mean(name, known)} Names: "
                 f"{listed(examples)} and so on, or a path such as {joints[0]}.link.mass"

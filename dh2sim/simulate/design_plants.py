@@ -28,7 +28,7 @@ _SIZES: Final = tuple(
     sorted(
         name
         for name in dir(mujoco.MjModel)
-        if name[0] == "n" and "_" not in name and name not in ("names", "nbuffer", "narena")
+        if name[0] == "n" and "_" not in name and name not in ("names", "numeric", "nbuffer", "narena")
     )
 )
 """Numbers of what a model has."""
@@ -86,6 +86,8 @@ class DesignPlants:
     """Successive rollouts that have one design."""
     start: str
     """Name of a configuration that rollouts start in, or anything else."""
+    as_fields: bool = False
+    """Whether the models of a batch become fields of one model, which are randomized then."""
 
     def of(self, rollouts: Sequence[int], made: dict[int, DesignPlant]) -> list[DesignPlant]:
         """Return the design of each of some rollouts.
@@ -133,7 +135,7 @@ class DesignPlants:
             plant=plant,
             start=configurations.get(self.start, plant.home),
             rows=read_only([[row.a, row.alpha, row.d, row.theta, row.beta] for row in spec.rows]),
-            layout=_layout(plant.model),
+            layout=_layout(plant.model, as_fields=self.as_fields),
         )
 
 
@@ -165,10 +167,10 @@ def compare_with_table(plant: Plant, robot: RobotModel) -> None:
         )
 
 
-def _layout(model: mujoco.MjModel) -> object:
+def _layout(model: mujoco.MjModel, *, as_fields: bool) -> object:
     sizes = tuple(getattr(model, name) for name in _SIZES)
     heavy = (model.body_mass > 0.0).tobytes()
-    return sizes, heavy, model.exclude_signature.tobytes(), *(getattr(model, name).tobytes() for name in _TREES)
+    return sizes, heavy, *(getattr(model, name).tobytes() for name in _TREES if as_fields)
 
 
 def groups(designs: Iterable[DesignPlant]) -> Iterator[list[int]]:

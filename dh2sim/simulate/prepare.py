@@ -87,6 +87,7 @@ def prepare(model: RobotModel | MechanismModel, options: RolloutOptions, *, comm
             recipe=replace(recipe, mjcf=replace(recipe.mjcf, keyframes=False)),
             per_design=options.per_design,
             start=initial.name,
+            as_fields=bool(options.randomize),
         )
     scene = to_scene(recipe.shown(model))
     attributes = _attributes(model, options, plant, digests, mjcf=mjcf, scene=scene, command=command)
