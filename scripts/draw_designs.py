@@ -1,4 +1,4 @@
-"""Draw ``docs/images/designs.png``: what two numbers of the Stanford arm do to its workspace and its payload."""
+"""Draw ``docs/images/designs.png``: what the lengths of a UR5e's links do to its workspace and its payload."""
 
 from __future__ import annotations
 
@@ -9,17 +9,15 @@ import matplotlib.pyplot as plt
 from dh2sim import Robot
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "images" / "designs.png"
-VARY = {"d2": 0.2, "joint_3.limits.position[1]": "uniform:0.6:1.3"}
+VARY = {"a2": 0.3, "a3": 0.3}
 
 
 def main() -> None:
-    found = Robot.load("stanford").sweep(vary=VARY, count=500, measure="workspace,payload")
+    found = Robot.load("ur5e").sweep(vary=VARY, count=500, measure="workspace,payload")
     columns = found.columns
     figure, axes = plt.subplots(figsize=(7.0, 4.0), dpi=120, layout="constrained")
-    drawn = axes.scatter(
-        columns["workspace"], columns["payload"], c=columns["joint_3.limits.position[1]"], s=14, cmap="viridis"
-    )
-    figure.colorbar(drawn, label="upper limit of the boom, m")
+    drawn = axes.scatter(columns["workspace"], columns["payload"], c=abs(columns["a2"]), s=14, cmap="viridis")
+    figure.colorbar(drawn, label="length of the upper arm |a2|, m")
     axes.set_xlabel("workspace, m³")
     axes.set_ylabel("payload in every configuration, kg")
     axes.grid(alpha=0.3)

@@ -193,7 +193,7 @@ def test_a_wrong_file_of_designs_is_named_with_its_place(
         ({"vary": {"joint_1.link.mass": 0.1}}, "is not given in the robot file"),
         (
             {"vary": {"b1": 0.1}},
-            "b1: is not the name of a number of planar_2r. Names: a1, a2, alpha1, d1, theta1 and so on",
+            "b1: is not the name of a number of planar_2r. Names: a1, a2, alpha1, d1, theta1",
         ),
         ({"per_design": 2}, "per_design must be given together with vary or designs"),
         ({"designs": {"a1": [1, 2]}, "rollouts": 3}, "rollouts must be a multiple of the 2 designs, got 3"),
