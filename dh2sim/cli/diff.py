@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 import textwrap
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, complete_robot, tolerance_of
+from dh2sim.cli.common import DONE, FELL_SHORT, choice, complete_robot, other_format, tolerance_of
+from dh2sim.cli.importing import errors_with_options
 from dh2sim.cli.output import json_text, table_lines
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.compare.comparison import Comparison, Equivalence
+    from dh2sim.importing.sources import ImportOptions
 
 WIDTH = 80
 
@@ -34,12 +35,30 @@ def diff(
         float,
         typer.Option(metavar="T", help="Largest difference of tool0: rad, and m for a reach of up to 1 m."),
     ] = 1e-6,
+    base: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LINK", help="Base link of a URDF or an MJCF; given twice, that of A and that of B."),
+    ] = None,
+    tip: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LINK|SITE", help="Tip of a URDF or an MJCF; given twice, that of A and that of B."),
+    ] = None,
+    convention: Annotated[
+        str | None, typer.Option(metavar="standard|modified", help="Convention of a table that does not say it.")
+    ] = None,
+    angle: Annotated[
+        str | None, typer.Option(metavar="deg|rad", help="Unit of angles of a table that does not say it.")
+    ] = None,
+    length: Annotated[
+        str | None, typer.Option(metavar="m|mm|cm|in", help="Unit of lengths of a table that does not say it.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
 ) -> int:
     """Compare two robots: are they the same mechanism?
 
     Kinematics are the same up to base, tool, zeros and senses of the joints, and names; what of these differs is
-    told. Otherwise: where the mechanisms first differ, and which single misreading of the table explains it.
+    told, and limits, masses and gains that both give differently. Otherwise: where the mechanisms first differ, and
+    which single misreading of the table explains it.
 
     Exit status: 0 the same mechanism, 1 different, 2 bad input.
 
@@ -51,7 +70,11 @@ def diff(
     """
     from dh2sim.compare.comparison import diff as compare
 
-    found = compare(a, b, tolerance=tolerance_of(tolerance))
+    allowed = tolerance_of(tolerance)
+    words = (convention, angle, length)
+    options_a, options_b = (_options(file, which, (base, tip), words) for which, file in enumerate((a, b)))
+    with errors_with_options():
+        found = compare(a, b, tolerance=allowed, options_a=options_a, options_b=options_b)
     if as_json:
         print(json_text(found.to_dict()))
     else:
@@ -59,18 +82,41 @@ def diff(
     return DONE if found.same else FELL_SHORT
 
 
+def _options(
+    file: str, which: int, links: tuple[list[str] | None, list[str] | None], words: tuple[str | None, ...]
+) -> ImportOptions:
+    """Return how one of the two files is to be read: links are of models, words of tables.
+
+    Raises:
+        BadParameter: A link is given three times, or a word is not allowed.
+    """
+    from dh2sim.importing.sources import ImportOptions
+    from dh2sim.robot.spec import CONVENTIONS, AngleUnit, Convention, LengthUnit
+
+    for name, given in zip(("--base", "--tip"), links, strict=True):
+        if given is not None and len(given) > 2:
+            raise typer.BadParameter("give it once for both robots, or twice", param_hint=name)
+    base, tip = (None if not given else given[min(which, len(given) - 1)] for given in links)
+    convention, angle, length = words
+    read = (
+        choice(convention, Convention, "--convention", without=(Convention.HAYATI,), other_names=CONVENTIONS),
+        choice(angle, AngleUnit, "--angle"),
+        choice(length, LengthUnit, "--length"),
+    )
+    kind = other_format(file)
+    if kind in ("a URDF", "an MJCF"):
+        return ImportOptions(base=base, tip=tip)
+    return ImportOptions(convention=read[0], angle=read[1], length=read[2])
+
+
 def _print(found: Comparison) -> None:
     for label, spec in (("A", found.a), ("B", found.b)):
         joints = "".join("R" if row.type.turns else "P" for row in spec.moving_rows)
         print(printable(f"{label}  {spec.name}: {len(joints)} joints, {joints}"))
-    for note in found.notes:
-        print(
-            textwrap.fill(f"dh2sim: note: {printable(note)}", WIDTH, subsequent_indent="  ", break_on_hyphens=False),
-            file=sys.stderr,
-        )
     print()
     if found.equivalence is not None:
         _print_same(found.equivalence)
+        _print_quantities(found)
         return
     print("Different mechanisms.")
     for sentence in found.sentences():
@@ -92,6 +138,16 @@ def _print_same(same: Equivalence) -> None:
         rows = [["A", "B", "q of B"]]
         rows += [[joint.a, joint.b, joint.formula(same.smallest)] for joint in same.joints]
         print(printable("\n".join(table_lines(rows, left=3))))
+
+
+def _print_quantities(found: Comparison) -> None:
+    """Print limits, masses and gains that differ; texts that are too long for 80 columns go on the next line."""
+    if not found.quantities:
+        return
+    print("\nOf what both give, these differ (B as A counts):")
+    for quantity in found.quantities:
+        between = f"{quantity.a} in A, {quantity.b} in B" if quantity.a else f"in B {quantity.b}"
+        print_item(f"{quantity.joint}: {quantity.quantity} {between}")
 
 
 def print_item(sentence: str) -> None:

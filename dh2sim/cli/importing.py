@@ -6,7 +6,8 @@ import ast
 import re
 import shlex
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -139,15 +140,8 @@ def import_robot(
     )
     folder = Path.cwd() if out is None else out.resolve().parent
     data = sys.stdin.buffer.read() if file == STDIN else read_file(Path(file))
-    try:
+    with errors_with_options():
         imported = import_data(data, file, options, folder=folder)
-    except ImportedFileError as error:
-        raise ImportedFileError(
-            replace(problem, message=_with_options(problem.message)) for problem in error.problems
-        ) from error
-    except Dh2simError as error:
-        error.args = (_with_options(str(error)),)
-        raise
     notes = [*(_with_options(note) for note in imported.notes), *_other_masses(imported)]
     if as_json:
         hand_over_json(imported.text, out, imported.spec, notes, _residual(imported))
@@ -212,6 +206,20 @@ def _argument(text: str) -> tuple[str, str]:
 
 _XACRO = re.compile(r"arguments=\{'([^']*)': \.\.\.\}")
 _ARGUMENT = re.compile(r"\b(tip|nominal|convention|angle|length|root|table)=('[^']*'|\"[^\"]*\"|\d+)")
+
+
+@contextmanager
+def errors_with_options() -> Iterator[None]:
+    """Raise errors of an import with options in place of the library's arguments."""
+    try:
+        yield
+    except ImportedFileError as error:
+        raise ImportedFileError(
+            replace(problem, message=_with_options(problem.message)) for problem in error.problems
+        ) from error
+    except Dh2simError as error:
+        error.args = (_with_options(str(error)),)
+        raise
 
 
 def _with_options(message: str) -> str:

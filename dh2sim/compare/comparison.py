@@ -12,8 +12,9 @@ import numpy as np
 from dh2sim.compare.fitting import Fit, ToolResidual, best_fit, joint_samples, measured
 from dh2sim.compare.geometry import LABELS, Difference, first_difference
 from dh2sim.compare.inputs import PLAINLY, ReadRobot, read_any
-from dh2sim.compare.matching import Correspondence, Obstacle
+from dh2sim.compare.matching import Correspondence, Obstacle, ObstacleKind
 from dh2sim.compare.misreadings import Misreading, misreadings
+from dh2sim.compare.quantities import JointPair, QuantityDifference, quantity_differences
 from dh2sim.compare.screws import ScrewAxes, axes_of
 from dh2sim.compare.words import degrees, millimetres, pose_text
 from dh2sim.errors import Dh2simError
@@ -125,6 +126,8 @@ class Comparison:
     """What was chosen or left out when the files were read."""
     labels: tuple[str, str] = LABELS
     """What A and B are called in sentences."""
+    quantities: tuple[QuantityDifference, ...] = ()
+    """Limits, masses, inertias, gains that both give, and give differently; of the same mechanism."""
 
     @property
     def same(self) -> bool:
@@ -174,6 +177,10 @@ class Comparison:
                 {"kind": m.kind.value, "rows": list(m.rows), "columns": list(m.columns), "sentence": m.sentence}
                 for m in self.misreadings
             ]
+        made["quantities"] = [
+            {"joint": found.joint, "quantity": found.quantity, "a": found.a, "b": found.b}
+            for found in self.quantities
+        ]
         made["sentences"] = self.sentences()
         made["notes"] = list(self.notes)
         return made
@@ -225,6 +232,7 @@ def compared(a: ReadRobot, b: ReadRobot, tolerance: float, labels: tuple[str, st
             tolerance=tolerance,
             equivalence=equivalence,
             difference=None,
+            quantities=_quantities(a.spec, b.spec, equivalence, tolerance),
             same_at=None,
             misreadings=(),
             notes=notes,
@@ -235,12 +243,30 @@ def compared(a: ReadRobot, b: ReadRobot, tolerance: float, labels: tuple[str, st
         b=b.spec,
         tolerance=tolerance,
         equivalence=None,
-        difference=first_difference(of_a, of_b, fit, tolerance, labels) if isinstance(fit, Obstacle) else None,
+        difference=(
+            first_difference(of_a, of_b, fit, tolerance, labels) if isinstance(fit, Obstacle) else _sum(fit.residual)
+        ),
         same_at=_same_at(a.spec, b.spec, of_a, of_b, tolerance),
         misreadings=misreadings(a.spec, b.spec, tolerance),
         notes=notes,
         labels=labels,
     )
+
+
+def _sum(residual: ToolResidual) -> Difference:
+    text = (
+        f"number by number they nearly agree, but tool0 is up to {millimetres(residual.position)} and "
+        f"{degrees(residual.rotation)} off"
+    )
+    return Difference(kind=ObstacleKind.SUM, joints=(), a=None, b=None, sentence=text)
+
+
+def _quantities(a: RobotSpec, b: RobotSpec, same: Equivalence, tolerance: float) -> tuple[QuantityDifference, ...]:
+    pairs = [
+        JointPair(a=i, b=k, sense=float(joint.sense), zero=joint.zero, T_b_a=T)
+        for i, (k, joint, T) in enumerate(zip(same.order, same.joints, same.links[1:], strict=True))
+    ]
+    return quantity_differences(a, b, pairs, tolerance)
 
 
 def _equivalence(

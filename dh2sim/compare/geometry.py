@@ -111,6 +111,8 @@ def first_difference(
             return _distance(a, b, i, k, tolerance, labels)
         case ObstacleKind.OFFSET:
             return _offset(a, b, i, tolerance, labels)
+        case ObstacleKind.SUM:
+            raise ValueError("matching ends at a joint, not at a sum")
 
 
 def _twist(a: ScrewAxes, b: ScrewAxes, i: int, k: int, tolerance: float, labels: tuple[str, str]) -> Difference:

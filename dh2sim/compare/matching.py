@@ -66,6 +66,8 @@ class ObstacleKind(StrEnum):
     """How far two axes are apart, or on which side."""
     OFFSET = "offset"
     """How far two common normals are apart along the axis between them, or on which side."""
+    SUM = "sum"
+    """No single number is far off, but all together are."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -134,3 +134,18 @@ def test_a_misreading_is_named_or_changes_nothing(seed: int) -> None:
         return
     names = [(misreading.kind, misreading.rows, misreading.columns) for misreading in found.misreadings]
     assert (made.kind, made.rows, made.columns) in names
+
+
+def test_limits_masses_and_gains_are_compared_as_a_counts() -> None:
+    a = robot("ur5e")
+    same = diff(a, replace(a, base=replace(a.base, pose=Pose(xyz=np.array([0.1, 0.2, 0.3])))))
+    assert same.quantities == ()
+    first = a.rows[1]
+    lower, upper = first.limits.position or (0.0, 0.0)
+    heavier = replace(first.link, mass=1.0 + (first.link.mass or 0.0))
+    changed = edited(a, 1, link=heavier, flip=True, limits=replace(first.limits, position=(-upper, -lower + 0.1)))
+    found = [(q.joint, q.quantity, q.b) for q in diff(a, changed).quantities]
+    assert [(name, quantity) for name, quantity, _ in found] == [
+        (first.name, "position limits"),
+        (first.name, "mass"),
+    ]
