@@ -106,12 +106,17 @@ def _body(carrier: Carrier, chains: Mapping[str, list[Tree]], starts: Mapping[st
     return (branch, carried) if carried else _body(starts[branch], chains, starts) if branch else _BASE
 
 
+_INSIDE = ("_slide", "_hinge")
+"""Ends of the names of joints that an MJCF has inside of closures."""
+
+
 def _check_closures(robot: Tree, bodies: Mapping[str, Carrier], scope: Scope) -> None:
     """Closures have names of their own, and lie between frames that move against each other."""
     closures = trees(robot, "closures")
     if len(closures) > MOST_CLOSURES:
         scope.report(("closures",), f"the list has {len(closures)} entries; at most {MOST_CLOSURES} are allowed")
     first: dict[str, int] = {}
+    joints = {row.name for row in placed_rows(robot) if row.name is not WRONG}
     for index, closure in enumerate(closures):
         loc: Loc = ("closures", index)
         name = closure.get("name", default_closure_name(index))
@@ -119,6 +124,13 @@ def _check_closures(robot: Tree, bodies: Mapping[str, Carrier], scope: Scope) ->
             place: Loc = ("closures", first[name])
             line = scope.report.line((*place, "name"), place)
             message = f"duplicate closure name {shown(name)}; {path_of(place)}{line} has it already"
+            scope.report((*loc, "name") if "name" in closure else loc, message)
+        taken = (
+            [] if name is WRONG else [each for each in (name, *(f"{name}{end}" for end in _INSIDE)) if each in joints]
+        )
+        if taken:
+            own = "" if taken[0] == name else f"; {taken[0]} is the name of a joint inside the closure"
+            message = f"{shown(name)} clashes with the joint {shown(taken[0])}{own}"
             scope.report((*loc, "name") if "name" in closure else loc, message)
         between = closure.get("between", WRONG)
         if between is WRONG:
