@@ -198,18 +198,19 @@ def pose_and_jacobian(arm: Arm, q: Array) -> tuple[Array, Array]:
     return frame, J
 
 
-def joint_rank(arm: Arm, moving: Flags, ranges: Array) -> int:
+def joint_rank(arm: Arm, moving: Flags, ranges: Array, zero: float = 1e-9) -> int:
     """Return how many of an arm's directions its joints move it in, at a general configuration.
 
     Args:
         arm: The arm.
         moving: Which joints move, bool, shape (n,).
         ranges: Of the coordinates, in the arm's units, shape (n, 2).
+        zero: Share of the largest singular value up to which others are zero.
     """
     q = np.random.default_rng(1).uniform(ranges[:, 0], ranges[:, 1], (8, arm.n))
     J = pose_and_jacobian(arm, q)[1][:, :, moving]
     values = np.linalg.svd(J, compute_uv=False)
-    return int((values > 1e-9 * values[:, :1]).sum(axis=1).max(initial=0))
+    return int((values > zero * values[:, :1]).sum(axis=1).max(initial=0))
 
 
 def pose_error(frame: Array, T: Array) -> Array:

@@ -40,7 +40,13 @@ from dh2sim.typing import Array, read_only
 VERIFIED: Final = 1e-10
 """Residual up to which a configuration is a solution."""
 UNSURE: Final = "The pose is nearly singular and no elimination is well-conditioned there: solutions may be missing."
+ROUNDED: Final = (
+    "But for rounding of the table the joints move tool0 in one direction less, as with an alpha of 3.141593 where "
+    "pi is meant: every pose is nearly singular, and solutions may be missing."
+)
 ODD: Final = "Solutions come in pairs, but an odd number was found: at least one is missing."
+_ROUNDED: Final = 1e-6
+"""Share of the largest singular value that angles written to seven digits leave of zero."""
 _EQUAL: Final = 1e-6
 """Distance of configurations below which they are the same."""
 _GOAL_JOINTS: Final[Mapping[str | None, int]] = {None: 0, "roll": 1, "rotation": 3}
@@ -150,6 +156,8 @@ class InverseSolver:
                 results[i] = replace(results[i], complete=False, notes=(*results[i].notes, ODD))
             for i in found.unsure:
                 results[i] = replace(results[i], complete=False, notes=(*results[i].notes, UNSURE))
+            if self._is_rounded(free, tuple(sorted(locked))):
+                results = [replace(one, complete=False, notes=(*one.notes, ROUNDED)) for one in results]
             for k, paths in families.items():
                 count = int((found.pose == k).sum())
                 results[k] = self._with_families(results[k], count, arm, paths, poses[k], near, free, limits=limits)
@@ -412,6 +420,15 @@ class InverseSolver:
             rank = joint_rank(arm, moving, self._trial_ranges(arm))
             self._built["surplus", free, locked] = int(moving.sum()) - rank
         return int(self._built["surplus", free, locked])
+
+    def _is_rounded(self, free: Free | None, locked: tuple[int, ...]) -> bool:
+        """Return whether joints are independent by what rounding of the table makes of right angles."""
+        if ("rounded", free, locked) not in self._built:
+            arm, moving = self._arm(free), self._moving(free, locked)
+            self._built["rounded", free, locked] = joint_rank(arm, moving, self._trial_ranges(arm), _ROUNDED) < int(
+                moving.sum()
+            )
+        return bool(self._built["rounded", free, locked])
 
     def _method(self, free: Free | None, locked: tuple[int, ...]) -> Method:
         if (free, locked) not in self._built:
