@@ -103,7 +103,7 @@ def test_drawn_configurations_of_random_arms_are_found(spec: RobotSpec) -> None:
 
 @pytest.mark.slow
 @given(arms())
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_drawn_configurations_of_many_random_arms_are_found(spec: RobotSpec) -> None:
     check_random(spec)
 
