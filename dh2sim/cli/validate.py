@@ -93,6 +93,9 @@ def validate(
     if source is None and (base is not None or tip is not None):
         option = "--base" if tip is None else "--tip"
         raise typer.BadParameter("only with --source", param_hint=option)
+    from dh2sim.engines.yourdfpy_engine import start_yourdfpy
+
+    start_yourdfpy()
     models = build_any(robots, strict=strict)
     if folder is not None:
         _require_folders(robots, models, folder)

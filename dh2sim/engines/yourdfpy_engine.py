@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+import importlib.util
+import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Final
 
 import numpy as np
 
-from dh2sim.engines.engine import present_frames, require_joints
 from dh2sim.errors import EngineCapacityError, EngineError
+from dh2sim.limited_process import WorkerError, ask_worker, start_worker
 from dh2sim.typing import Array
 
-ROUNDING = 1e-15
-"""m and rad: less is of no account."""
-NEAR = 1e-3
-"""m and rad: of an origin that a small motion may take back."""
-NOTICED = 1e-7
-"""rad or m: its scene graph keeps a transform that differs by less than 1e-8 from the one before."""
+TIME_LIMIT: Final = 60
+"""Seconds of processor time for all poses of a file."""
+_WORKER: Final = "dh2sim.engines.yourdfpy_worker"
+
+
+def start_yourdfpy() -> None:
+    """Let yourdfpy be imported beside what this process does, where it is installed."""
+    if importlib.util.find_spec("yourdfpy") is not None:
+        start_worker(_WORKER)
 
 
 class YourdfpyEngine:
-    """One URDF file, read by yourdfpy; a Python loop, so it is used for fewer configurations."""
+    """One URDF file, read by yourdfpy in another process; a Python loop, so it is used for fewer configurations."""
 
     name = "yourdfpy"
 
@@ -35,47 +40,39 @@ class YourdfpyEngine:
 
         Raises:
             EngineError: yourdfpy refuses the file, or frames or joints are missing.
+            ImportError: yourdfpy is not installed.
         """
-        import yourdfpy
-
-        try:
-            self._urdf: Any = yourdfpy.URDF.load(str(path), load_meshes=False)
-        except Exception as error:  # its parser raises many types
-            raise EngineError(f"{path}: yourdfpy refuses the file: {' '.join(str(error).split())}") from error
-        found = list(self._urdf.actuated_joint_names)
-        require_joints(str(path), found, joints)
-        self._order = np.array([list(joints).index(name) for name in found], dtype=int)
-        self.frames = present_frames(str(path), list(self._urdf.link_map), rows, dh_frames_required=False)
+        if importlib.util.find_spec("yourdfpy") is None:
+            import yourdfpy  # noqa: F401  raises what says why
+        self._path = path
+        file = {"name": str(path), "path": str(path.absolute())}
+        self._request = {**file, "joints": list(joints), "rows": rows}
+        self.frames, _ = self._ask(np.empty((0, len(joints))))
 
     def frame_poses(self, q: Array) -> Array:
         """Return the poses of ``frames`` in base_link; see ``PoseEngine``.
 
         Raises:
-            EngineCapacityError: Something is displaced so little that yourdfpy does not notice.
+            EngineCapacityError: Something is displaced so little that yourdfpy does not notice, or it takes too long.
         """
-        if self._leaves_out(q):
-            raise EngineCapacityError(
-                "yourdfpy leaves out displacements of less than 1e-8 m or rad, as there are here"
-            )
-        poses = np.empty((len(q), len(self.frames), 4, 4))
-        for k, row in enumerate(q):
-            new = np.array(row[self._order], dtype=np.float64)
-            if (np.abs(new - self._urdf.cfg) < NOTICED).any():
-                self._urdf.update_cfg(new + 1.0)
-            self._urdf.update_cfg(new)
-            T, before = np.eye(4), "base_link"
-            for i, frame in enumerate(self.frames):
-                # from frame to frame: the time for a path through its scene graph grows with the cube of its length
-                T = T @ self._urdf.get_transform(frame, before)
-                poses[k, i], before = T, frame
-        return poses
+        _, poses = self._ask(q)
+        return np.frombuffer(poses).reshape(len(q), len(self.frames), 4, 4)
 
-    def _leaves_out(self, q: Array) -> bool:
-        """Whether some transform from link to link is so near the identity that it is taken for that."""
-        joints = self._urdf.robot.joints
-        gaps = {j.name: 0.0 if j.origin is None else float(np.abs(j.origin - np.eye(4)).max()) for j in joints}
-        moving = self._urdf.actuated_joint_names
-        own, moved = np.array([gaps[name] for name in moving]), np.abs(q[:, self._order])
-        left = np.minimum(moved, np.abs(moved - own))[:, own < NEAR]  # a slide may take back its origin
-        still = [gap for name, gap in gaps.items() if name not in moving]
-        return any(ROUNDING < gap < NOTICED for gap in still) or bool(((left > ROUNDING) & (left < NOTICED)).any())
+    def _ask(self, q: Array) -> tuple[tuple[str, ...], bytes]:
+        """Return the frames of the file, and the bytes of their poses."""
+        request = json.dumps({**self._request, "samples": len(q)}).encode() + b"\n" + q.tobytes()
+        try:
+            answer = ask_worker(_WORKER, request, seconds=TIME_LIMIT)
+        except WorkerError as error:
+            raise EngineCapacityError(f"yourdfpy was stopped: {error}") from None
+        head, _, poses = answer.partition(b"\n")
+        match json.loads(head):
+            case {"absent": reason}:
+                raise ImportError(reason)
+            case {"incapable": reason}:
+                raise EngineCapacityError(reason)
+            case {"refused": reason}:
+                raise EngineError(reason)
+            case {"frames": [*frames]}:
+                return tuple(frames), poses
+        raise EngineError(f"{self._path}: yourdfpy gives no frames")

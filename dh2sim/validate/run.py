@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.engines.pybullet_engine import PybulletEngine
-from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
+from dh2sim.engines.yourdfpy_engine import YourdfpyEngine, start_yourdfpy
 from dh2sim.errors import Dh2simError, EngineCapacityError, EngineError
 from dh2sim.export import export_robot, mixture
 from dh2sim.files import finish_interrupted, signals_deferred
@@ -41,6 +42,8 @@ from dh2sim.validate.source import SourceArm, check_source
 
 SLOW_ROWS = 8000
 """Most table rows that engines looping in Python compute: 1000 configurations of 8 rows."""
+SLOWEST_SAMPLES = 200
+"""Most configurations of yourdfpy, which takes the longest for each."""
 JACOBIAN_SAMPLES = 200
 DYNAMICS_SAMPLES = 20
 
@@ -57,7 +60,8 @@ def slow_samples(samples: int, rows: int) -> int:
 
 def engine_samples(samples: int, rows: int) -> int:
     """Return the number of configurations of all engines together, for a progress bar."""
-    return 3 * samples + 3 * slow_samples(samples, rows)
+    slow = slow_samples(samples, rows)
+    return 3 * samples + 2 * slow + min(slow, SLOWEST_SAMPLES)
 
 
 def validate_robot(
@@ -94,6 +98,7 @@ def validate_robot(
     """
     if not isinstance(samples, int | np.integer) or samples < 1:
         raise Dh2simError(f"samples must be a whole number of at least 1, got {samples!r}")
+    start_yourdfpy()
     model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
     arm = None if source is None else SourceArm.read(source, source_options or ImportOptions(), model)
     with mujoco_warnings() as warned:
@@ -132,27 +137,34 @@ def _validate(
     def poses(engine: Mover | YourdfpyEngine) -> list[Check]:
         quick = isinstance(engine, MujocoEngine)
         some, threads = (q, 0) if quick else (q[: slow_samples(len(q), len(model.joints))], 1)
+        if isinstance(engine, YourdfpyEngine):
+            some = some[:SLOWEST_SAMPLES]
         scale = model.longest_lever if isinstance(engine, PybulletEngine) else model.extent
         return [check_poses(engine, model.spec, some, allowed, scale, threads=threads, advance=advance)]
 
-    checks = [check_poses(library, model.spec, q, allowed, model.extent, threads=0, advance=advance)]
-    for engine in engines:
-        checks += _checks_of(engine, Quantity.POSE, poses)
-    if any(engine.name == "mujoco-mjcf" for engine in engines):
-        checks.append(check_unit_quaternions(mjcf))
+    def checks_of(engine: Mover | YourdfpyEngine) -> list[Check]:
+        return _checks_of(engine, Quantity.POSE, poses)
+
     movers = [engine for engine in engines if not isinstance(engine, YourdfpyEngine)]
+    with ThreadPoolExecutor(1) as pool:
+        beside = {engine.name: pool.submit(checks_of, engine) for engine in engines if engine not in movers}
+        own = check_poses(library, model.spec, q, allowed, model.extent, threads=0, advance=advance)
+        found = {engine.name: checks_of(engine) for engine in movers}
+        if any(engine.name == "mujoco-mjcf" for engine in engines):
+            unread = [check_unit_quaternions(mjcf), *unread]
+        others = [
+            *unread,
+            *_jacobians(model, library, movers, q[:JACOBIAN_SAMPLES], tolerance),
+            *_dynamics(model, movers, q[:DYNAMICS_SAMPLES], seed),
+            *([] if source is None else _masses(model, movers, source, q[:DYNAMICS_SAMPLES])),
+        ]
+        found |= {name: checks.result() for name, checks in beside.items()}
     return RobotReport(
         name=model.name,
         samples=samples,
         reach=model.reach,
         slips=find_slips(model),
-        checks=(
-            *checks,
-            *unread,
-            *_jacobians(model, library, movers, q[:JACOBIAN_SAMPLES], tolerance),
-            *_dynamics(model, movers, q[:DYNAMICS_SAMPLES], seed),
-            *([] if source is None else _masses(model, movers, source, q[:DYNAMICS_SAMPLES])),
-        ),
+        checks=(own, *(check for engine in engines for check in found[engine.name]), *others),
     )
 
 
