@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any, TypeVar
 
+import mujoco
 import numpy as np
 
 from dh2sim.errors import AssemblyError, ControllerError, SettingsError
@@ -266,7 +267,7 @@ def _attributes(
         "integrator": options.integrator,
         "versions": {
             "dh2sim": version("dh2sim"),
-            "mujoco": version("mujoco"),
+            "mujoco": mujoco.__version__,  # of whichever package: mujoco, or mujoco-core
             "numpy": np.__version__,
             "python": platform.python_version(),
         },
