@@ -112,7 +112,8 @@ def _options(
 def _print(found: Comparison) -> None:
     for label, spec in (("A", found.a), ("B", found.b)):
         joints = "".join("R" if row.type.turns else "P" for row in spec.moving_rows)
-        print(printable(f"{label}  {spec.name}: {len(joints)} joints, {joints}"))
+        count = "1 joint" if len(joints) == 1 else f"{len(joints)} joints"
+        print(printable(f"{label}  {spec.name}: {', '.join(filter(None, (count, joints)))}"))
     print()
     if found.equivalence is not None:
         _print_same(found.equivalence)

@@ -165,7 +165,7 @@ class _Matcher:
             for senses in self._senses(hypothesis.senses, group, failed):
                 previous = hypothesis.rotations[-1] if hypothesis.rotations else np.eye(3)
                 R = self._rotation(senses, index, previous)
-                ends = group.joints[0], group.joints[-1]
+                ends = min(group.joints, default=0), max(group.joints, default=0)
                 if self._misdirected(R, senses, group):
                     failed.setdefault(ObstacleKind.TWIST, ends)
                 elif self._misplaced(R, index):

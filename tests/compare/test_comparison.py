@@ -149,3 +149,10 @@ def test_limits_masses_and_gains_are_compared_as_a_counts() -> None:
         (first.name, "position limits"),
         (first.name, "mass"),
     ]
+
+
+def test_a_robot_whose_rows_are_all_fixed_is_the_same_as_any_other_such() -> None:
+    still = RobotSpec(name="still", rows=(row("bracket", "fixed", a=0.1),))
+    other = RobotSpec(name="other", rows=(row("bracket", "fixed", a=0.2, alpha=0.3),))
+    assert diff(still, still).sentences() == []
+    assert diff(still, other).same
