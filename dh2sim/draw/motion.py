@@ -88,7 +88,7 @@ def motion_of_run(rollout: RolloutData) -> Motion:
     """
     rollout.require("qpos", what="a video")
     try:
-        model = recorded_model(rollout.attributes, scene=True)
+        model = recorded_model(rollout.attributes, scene=True, design=rollout.design)
     except RunError as error:
         raise PictureError(f"{rollout.run}: {error}") from error
     return Motion(model=model, qpos=read_only(_recorded(rollout, model)), time=read_only(rollout.values("time")))

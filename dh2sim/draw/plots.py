@@ -67,7 +67,7 @@ def saturated(rollout: RolloutData) -> NDArray[np.bool_]:
     if "ctrl" not in rollout.data and "torque" not in rollout.data:
         return found
     try:
-        model = recorded_model(rollout.attributes)
+        model = recorded_model(rollout.attributes, design=rollout.design)
     except RunError as error:
         raise PictureError(f"{rollout.run}: {error}") from error
     for number in range(model.nu):

@@ -41,6 +41,12 @@ class RolloutData:
         return {str(name): value for name, value in self.data.attrs.items()}
 
     @property
+    def design(self) -> dict[str, float]:
+        """The numbers of the robot file that this rollout has of its own; empty for a run of one robot."""
+        variables = self.data.data_vars.values()
+        return {each.attrs["parameter"]: float(each) for each in variables if "parameter" in each.attrs}
+
+    @property
     def label(self) -> str:
         """The run and the rollout, for titles."""
         return f"{self.run}, rollout {self.number}"

@@ -10,12 +10,20 @@ import math
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
-from dh2sim.errors import ModelError, RunError
+from dh2sim.errors import Dh2simError, ModelError, RunError
 from dh2sim.formats.mjcf.compile import compile_text
+from dh2sim.formats.mjcf.scene import to_scene
+from dh2sim.formats.mjcf.write import MjcfOptions
 from dh2sim.messages import shown
+from dh2sim.model.build import build_model
 from dh2sim.robot.fields import name_problem
+from dh2sim.robot.read import parse_robot
+from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.variation import Variation
+from dh2sim.simulate.design_plants import PlantRecipe
 
 if TYPE_CHECKING:
     import mujoco
@@ -43,12 +51,15 @@ _SIDES: Final = (
 _FILES: Final = re.compile("file|plugin|content_type")
 
 
-def recorded_model(attributes: Mapping[str, Any], *, scene: bool = False) -> mujoco.MjModel:
+def recorded_model(
+    attributes: Mapping[str, Any], *, scene: bool = False, design: Mapping[str, float] = MappingProxyType({})
+) -> mujoco.MjModel:
     """Compile the model that a run was made with.
 
     Args:
         attributes: Of the run.
         scene: Whether with floor, light and camera.
+        design: Numbers of the robot file that the rollout has of its own.
 
     Raises:
         RunError: There is none, it is not one as dh2sim writes them, or MuJoCo refuses it.
@@ -58,6 +69,8 @@ def recorded_model(attributes: Mapping[str, Any], *, scene: bool = False) -> muj
         raise RunError(f"the attribute '{missing[0]}' is missing, so there is no model to show")
     if problem := name_problem(attributes["robot"]):
         raise RunError(f"the model in the run's attributes is not one that dh2sim wrote: {problem}")
+    if design:
+        attributes = {**attributes, **_of_design(attributes, design)}
     own = f"{attributes['robot']}.xml"
     for name in ("mjcf", "scene"):
         problem = next(_problems(attributes[name], included=own if name == "scene" else ""), None)
@@ -69,6 +82,29 @@ def recorded_model(attributes: Mapping[str, Any], *, scene: bool = False) -> muj
         return compile_text(attributes["mjcf"], {})
     except ModelError as error:
         raise RunError(f"MuJoCo refuses the model in the run's attributes: {error}") from error
+
+
+def _of_design(attributes: Mapping[str, Any], design: Mapping[str, float]) -> dict[str, str]:
+    """Return the model and the scene of a design, made of the robot file in the attributes.
+
+    Raises:
+        RunError: There is no robot file, or it has no such design.
+    """
+    text, settings = attributes.get("robot_file"), attributes.get("settings")
+    if not isinstance(text, str) or not text or not isinstance(settings, Mapping):
+        raise RunError("the run has no robot file that the rollout's own model can be made of")
+    try:
+        spec = parse_robot(text, file="robot_file", mesh_files=False)
+        model = build_model(Variation(spec, list(design)).make(list(design.values())))
+        kinds = {*re.findall(r"<(position|velocity|motor) name=", str(attributes["mjcf"]))}
+        kind = ActuatorType(min(kinds, default="none")) if len(kinds) < 2 else None  # several: the robot file's own
+        recipe = PlantRecipe(
+            actuation=kind,
+            mjcf=MjcfOptions(floating_base=settings.get("floating_base") is True),
+        )
+        return {"mjcf": recipe.text(model), "scene": to_scene(recipe.shown(model))}
+    except Dh2simError as error:
+        raise RunError(f"the rollout's own model cannot be made of the robot file: {error}") from error
 
 
 def _problems(text: str, *, included: str) -> Iterator[str]:

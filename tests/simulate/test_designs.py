@@ -24,6 +24,7 @@ from dh2sim.simulate.block import simulate_block
 from dh2sim.simulate.design_plants import groups
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.prepare import prepare
+from dh2sim.simulate.recorded_model import recorded_model
 from dh2sim.typing import Array
 from tests.simulate import plain
 
@@ -204,3 +205,14 @@ def test_a_wrong_file_of_designs_is_named_with_its_place(
 def test_wrong_options_of_designs_are_named(options: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         rollout("planar_2r", **{"steps": 1, **options})
+
+
+def test_the_model_that_a_rollout_is_shown_with_is_that_of_its_design() -> None:
+    run = rollout("stanford", rollouts=2, steps=3, vary={"d1": 0.2, "d2": 0.2})
+    for i in range(2):
+        one = run.isel(rollout=i)
+        model = recorded_model(run.attrs, scene=True, design={"d1": float(one.d1), "d2": float(one.d2)})
+        data = mujoco.MjData(model)
+        data.qpos[:] = one.qpos.values[-1]
+        mujoco.mj_kinematics(model, data)
+        np.testing.assert_allclose(data.site("tool0").xpos, one.tool_pose.values[-1, :3], atol=1e-12)
