@@ -190,6 +190,13 @@ def test_names_are_used_once() -> None:
         "m.yaml:9:116: branches.rocker.joints[0].name: duplicate joint name 'joint_2'; joints[1] on line 7 has it "
         "already"
     ]
+    assert _changed("{name: C,", "{name: joint_1,") == [
+        "m.yaml:11:12: closures[0].name: 'joint_1' clashes with the joint 'joint_1'"
+    ]
+    assert _changed("[{type: revolute, a: 1400}]", "[{type: revolute, a: 1400, name: C_hinge}]") == [
+        "m.yaml:11:12: closures[0].name: 'C' clashes with the joint 'C_hinge'; C_hinge is the name of a joint inside "
+        "the closure"
+    ]
     assert _changed("  rocker:", "  1rocker:")[0].startswith("m.yaml:9:3: branches: the name of a branch is made of")
 
 
