@@ -16,9 +16,11 @@ import pytest
 import xarray as xr
 
 from dh2sim import build_model, load_robot
+from dh2sim.model.mechanism import build_mechanism
 from dh2sim.simulate.dataset_layout import STATUS, Layout
 from dh2sim.simulate.options import DEFAULT_RECORD, RECORDABLE, RolloutOptions
 from dh2sim.simulate.prepare import prepare
+from dh2sim.simulate.quantities import QUANTITIES
 from dh2sim.simulate.store.metadata import make_metadata
 from tests.program import contents, dh2sim
 
@@ -28,7 +30,7 @@ JOINTED = """\
 name: jointed
 convention: standard
 joints:
-  - {type: revolute, a: 0.3, dynamics: {damping: 0.1, friction: 0.01, armature: 0.02}}
+  - {type: revolute, a: 0.3, limits: {effort: 10}, dynamics: {damping: 0.1, friction: 0.01, armature: 0.02}}
   - {type: prismatic, d: 0.2}
 """
 
@@ -54,12 +56,15 @@ def layouts(tmp_path_factory: pytest.TempPathFactory) -> list[Layout]:
     robot = tmp_path_factory.mktemp("robot") / "jointed.yaml"
     robot.write_text(JOINTED)
     model = build_model(load_robot(robot))
-    change = dict.fromkeys(("mass", "friction", "damping", "armature", "gain"), 0.1)
+    sensed = {name: 0.1 for name in QUANTITIES if name.startswith(("encoder", "sensor"))}
+    change = {name: 0.1 for name in QUANTITIES if name not in sensed}
     runs = (
         RolloutOptions(rollouts=4, steps=6, record=RECORDABLE, controller="computed-torque", floating_base=True),
         RolloutOptions(rollouts=4, steps=6, record=RECORDABLE, controller="hold", randomize=change),
+        RolloutOptions(rollouts=4, steps=6, controller="computed-torque", randomize=sensed),
     )
-    return [prepare(model, options).layout for options in runs]
+    mechanism = prepare(build_mechanism(load_robot("four_bar")), RolloutOptions(rollouts=4, steps=6)).layout
+    return [*(prepare(model, options).layout for options in runs), mechanism]
 
 
 def test_every_dimension_is_described_and_no_other(layouts: list[Layout]) -> None:

@@ -85,9 +85,11 @@ def rollout(
     randomize: Annotated[
         str,
         typer.Option(
-            metavar="NAME=X,…",
-            help="Multiply mass, friction, damping, armature or gain by a random factor from 1 - X to 1 + X, for "
-            "each link or joint of each rollout.",
+            metavar="NAME=X,…|FILE.yaml",
+            help="Draw for each rollout, link or joint factors in 1 - X to 1 + X of mass, friction, damping, "
+            "armature, gain, kp, kv, effort; offsets in -X to X of com, payload_com, zero, row_length, row_angle, "
+            "encoder_bias; payload, gravity (tilt), encoder_noise, sensor_delay, control_delay, push in 0 to X; SI "
+            "units. NAME[joint_3]=X for one; X may be uniform:LOW:HIGH, loguniform:LOW:HIGH, normal:SIGMA, fixed:X.",
         ),
     ] = "",
     vary: Annotated[
@@ -161,7 +163,7 @@ def rollout(
       dh2sim rollout scara --out run.zarr --controller pd:period=0.5
       dh2sim rollout ur5e --out run.zarr --start random --json -q
       dh2sim rollout my_arm.yaml --out run.zarr --rollouts 100000 --resume
-      dh2sim rollout puma560 --out run.zarr --randomize mass=0.2
+      dh2sim rollout puma560 --out run.zarr --randomize mass=0.2,payload=2
       dh2sim rollout puma560 --out run.zarr --vary a2=0.05,d3=normal:0.01
       dh2sim rollout stanford --out run.zarr --rollouts 100000 --share 3/16
     Then:
@@ -186,7 +188,7 @@ def rollout(
         seed=seed,
         record=record,
         every=every,
-        randomize=_shares(randomize),
+        randomize=_randomized(randomize),
         vary=named_values(vary, "--vary", "name=how, as in a2=0.05"),
         designs=None if designs is None else str(designs),
         per_design=per_design,
@@ -260,17 +262,19 @@ def _is_number(text: str) -> bool:
     return text.isascii() and text.isdigit() and len(text) < 19
 
 
-def _shares(text: str) -> dict[str, float]:
-    """Read ``name=share,…``."""
-    shares: dict[str, float] = {}
-    form = "name=share, as in mass=0.1"
-    for name, value in named_values(text, "--randomize", form).items():
+def _randomized(text: str) -> dict[str, float | str]:
+    """Read ``name=value,…``, or the file that is named."""
+    if text.strip().lower().endswith((".yaml", ".yml")):
+        from dh2sim.simulate.randomization_file import read_randomization
+
+        return read_randomization(text.strip())
+    settings: dict[str, float | str] = {}
+    for name, value in named_values(text, "--randomize", "name=value, as in mass=0.1 or com=normal:0.01").items():
         try:
-            shares[name] = float(value)
+            settings[name] = float(value)
         except ValueError:
-            item = f"'{name}={value}'"
-            raise typer.BadParameter(f"{item} is not of the form {form}", param_hint="--randomize") from None
-    return shares
+            settings[name] = value
+    return settings
 
 
 @dataclass

@@ -179,10 +179,30 @@ def _print(description: RunDescription, *, verified: bool) -> None:
             console.print(Text("\n".join(wrapped)), soft_wrap=True)
 
 
+def _change(key: str, setting: float | str) -> str:
+    """Return what is random, and how: ``mass ±10 %``, ``payload 0 to 2``, ``com normal:0.01``."""
+    from dh2sim.simulate.quantities import QUANTITIES, key_parts
+
+    quantity = QUANTITIES.get(key_parts(key)[0])
+    if isinstance(setting, str) or quantity is None:
+        return f"{key} {setting}"
+    units = {"gravity": "rad", "push_force": "N"}.get(quantity.variable, quantity.unit.partition(",")[0])
+    unit = f" {units}"
+    match quantity.kind:
+        case "factor":
+            return f"{key} ±{100 * setting:g} %"
+        case "offset":
+            return f"{key} ±{setting:g}{unit}"
+        case "size":
+            return f"{key} 0 to {setting:g}{unit}"
+        case _:
+            return f"{key} {setting:g}{unit}"
+
+
 def _sections(description: RunDescription, *, verified: bool) -> Iterator[tuple[str, list[str]]]:
     yield "robot", [description.robot]
     yield "controller", [description.controller]
-    changes = ", ".join(f"{name} ±{100 * share:g} %" for name, share in description.randomize.items())
+    changes = ", ".join(_change(name, setting) for name, setting in description.randomize.items())
     yield "randomised", [changes or "nothing"]
     yield (
         "rollouts",

@@ -15,7 +15,8 @@ from dh2sim.simulate.contacts import FirstContacts
 from dh2sim.simulate.dataset_layout import FINISHED, STATUS
 from dh2sim.simulate.mujoco_runtime import VELOCITY_STAGE, forward, set_models
 from dh2sim.simulate.plant import Plant
-from dh2sim.simulate.randomization import apply_scales
+from dh2sim.simulate.randomization import Draws
+from dh2sim.simulate.randomized_models import apply_draws, motors
 from dh2sim.simulate.records import Recorder
 from dh2sim.typing import Array
 
@@ -231,17 +232,17 @@ class BatchObservation:
 class GravityForces:
     """Forces of gravity alone, computed by the same models at rest."""
 
-    def __init__(self, plant: Plant, simulations: int, threads: int, factors: dict[str, Array]) -> None:
+    def __init__(self, plant: Plant, simulations: int, threads: int, drawn: Draws) -> None:
         """Describe the models, which are made when they are first needed."""
-        self._plant, self._simulations, self._threads, self._factors = plant, simulations, threads, factors
+        self._plant, self._simulations, self._threads, self._drawn = plant, simulations, threads, drawn
         self._batch: Batch | None = None
 
     def forces(self, qpos: Array) -> Array:
         """Return the joint forces, N·m or N, that balance gravity at the given positions, shape (batch, n)."""
         if self._batch is None:
             self._batch = Batch(self._plant.model, self._simulations, self._threads)
-            set_models(self._batch, self._plant, as_fields=bool(self._factors))
-            apply_scales(self._batch, self._plant, self._factors)
+            set_models(self._batch, self._plant, as_fields=bool(self._drawn))
+            apply_draws(self._batch, self._plant, self._drawn)
             self._space = _joint_space(self._plant, self._batch)
         mass, force = self._batch.bind("M"), self._batch.bind("qfrc_bias")
         self._batch.bind("qpos")[:] = qpos
@@ -264,9 +265,15 @@ WARNINGS = {
 class MonitoredBatch:
     """Simulations that run together; one that MuJoCo warns of or fails on stops alone."""
 
-    def __init__(self, plant: Plant, batch: Batch, recorder: Recorder, steps: int) -> None:
-        """Take over a batch at its start."""
+    def __init__(
+        self, plant: Plant, batch: Batch, recorder: Recorder, steps: int, effort: Array | None = None
+    ) -> None:
+        """Take over a batch at its start; ``effort`` has factors of actuators' limits, shape (batch, actuators)."""
         self.plant = plant
+        self._lower, self._upper = plant.control_lower, plant.control_upper
+        if effort is not None:
+            scale = np.where(motors(plant), effort, 1.0)
+            self._lower, self._upper = self._lower * scale, self._upper * scale
         self.batch = batch
         self.recorder = recorder
         self.steps = steps
@@ -277,6 +284,11 @@ class MonitoredBatch:
         self.gaps = np.zeros((batch.nsim, len(plant.gaps)))
         """The greatest of each closure so far, m."""
         self.contacts = FirstContacts(plant, batch.nsim, substeps=recorder.substeps)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of the controls of a time step: (batch, actuators)."""
+        return self.batch.nsim, len(self.plant.actuators)
 
     @property
     def ids(self) -> NDArray[np.int32] | None:
@@ -295,7 +307,7 @@ class MonitoredBatch:
         Args:
             wanted: Controls, shape (batch, …, actuators).
         """
-        lower, upper = self.plant.control_lower, self.plant.control_upper
+        lower, upper = self._lower, self._upper
         if wanted.ndim > lower.ndim > 1:
             lower, upper = lower[:, None], upper[:, None]
         outside = (wanted < lower) | (wanted > upper)

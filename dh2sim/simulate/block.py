@@ -11,19 +11,30 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from dh2sim.errors import ControllerError
+from dh2sim.messages import listed
 from dh2sim.processors import available_processors
 from dh2sim.robot.variation import CELLS
 from dh2sim.simulate.batch import BatchObservation, GravityForces, MonitoredBatch
-from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, OpenLoop, RolloutBatch
+from dh2sim.simulate.controllers.position import holding_controls
+from dh2sim.simulate.controllers.protocol import ClosedLoop, Controller, Follows, OpenLoop, RolloutBatch
 from dh2sim.simulate.controllers.registry import ControllerChoice
 from dh2sim.simulate.dataset_layout import Layout, design_variables
 from dh2sim.simulate.design_plants import DesignPlant, DesignPlants, groups
+from dh2sim.simulate.disturbances import (
+    SENSING,
+    DelayedClosedLoop,
+    DelayedOpenLoop,
+    Pushes,
+    SensedObservation,
+    delay_steps,
+)
 from dh2sim.simulate.initial_states import InitialStates
-from dh2sim.simulate.loops import Scheduled, checked, simulate_closed_loop, simulate_open_loop
+from dh2sim.simulate.loops import Observed, Scheduled, checked, simulate_closed_loop, simulate_open_loop
 from dh2sim.simulate.mujoco_runtime import quiet_engine, set_models
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.plant import Plant, batch_plant
-from dh2sim.simulate.randomization import Generators, Purpose, apply_scales, scales
+from dh2sim.simulate.randomization import Draws, Generators, Purpose, draw, push_time
+from dh2sim.simulate.randomized_models import apply_draws
 from dh2sim.simulate.records import Recorder
 from dh2sim.typing import Array, read_only
 
@@ -151,44 +162,58 @@ def _simulate_batch(
 ) -> None:
     """Simulate rollouts in one batch; ``start`` has the named configuration of each where they have designs."""
     options, name = job.options, job.controller.name
-    factors = scales(plant, options, rollouts)
+    drawn = draw(plant, options, rollouts, run_steps)
     qpos0, qvel0 = job.initial.states(plant, options, rollouts, start)
     controlled = plant.controlled
-    gravity = GravityForces(plant, len(rollouts), threads, factors)
-    controller = job.controller.make(
-        RolloutBatch(
-            plant=controlled,
-            steps=run_steps,
-            rollouts=rollouts,
-            q0=read_only(qpos0[:, controlled.positions]),
-            v0=read_only(qvel0[:, controlled.velocities]),
-            qpos0=read_only(qpos0),
-            gravity0=read_only(gravity.forces(qpos0)),
-            generators=Generators(options.seed, rollouts, Purpose.CONTROLLER),
-        )
+    gravity = GravityForces(plant, len(rollouts), threads, drawn)
+    started = RolloutBatch(
+        plant=controlled,
+        steps=run_steps,
+        rollouts=rollouts,
+        q0=read_only(qpos0[:, controlled.positions]),
+        v0=read_only(qvel0[:, controlled.velocities]),
+        qpos0=read_only(qpos0),
+        gravity0=read_only(gravity.forces(qpos0)),
+        generators=Generators(options.seed, rollouts, Purpose.CONTROLLER),
     )
+    own = job.controller.make(started)
+    controller = _delayed(own, started, drawn, name)
+    sensing = SENSING & drawn.keys()
+    if sensing and not isinstance(controller, ClosedLoop):
+        raise ControllerError(
+            f"controller '{name}' looks at no state: {listed(sorted(sensing))} would change nothing"
+        )
     recorder = Recorder(plant, arrays, options.every)
-    stepwise = isinstance(controller, ClosedLoop) or recorder.looks_between_steps
+    stepwise = isinstance(controller, ClosedLoop) or recorder.looks_between_steps or "push_force" in drawn
     # between the steps of a closed loop an MjData keeps what it has computed already
     batch = Batch(plant.model, len(rollouts), threads, persistent=stepwise)
-    set_models(batch, plant, as_fields=bool(factors))
-    apply_scales(batch, plant, factors)
+    set_models(batch, plant, as_fields=bool(drawn))
+    apply_draws(batch, plant, drawn)
     batch.bind("qpos")[:] = qpos0
     batch.bind("qvel")[:] = qvel0
-    monitored = MonitoredBatch(plant, batch, recorder, options.steps)
+    monitored = MonitoredBatch(plant, batch, recorder, options.steps, drawn.get("effort_scale"))
+    pushes = None
+    if "push_force" in drawn:
+        times = [push_time(options, name) for name in ("push_interval", "push_duration")]
+        pushes = Pushes(plant, batch, drawn, *times)
     monitored.contacts.number_as(job.plant.model)
     for state in recorder.state_fields:
         recorder.put_field(state, 0, batch.bind(state)[:, None])
     if isinstance(controller, ClosedLoop):
-        simulate_closed_loop(monitored, controller, BatchObservation(controlled, batch, gravity), name)
+        observation: Observed = BatchObservation(controlled, batch, gravity)
+        if sensing:
+            sources = Generators(options.seed, rollouts, Purpose.SENSE)
+            seen = BatchObservation(controlled, batch, gravity)
+            observation = SensedObservation(seen, drawn, sources, plant.timestep)
+        simulate_closed_loop(monitored, controller, observation, name, pushes)
     elif not isinstance(controller, OpenLoop):
         raise ControllerError(f"controller '{name}' has neither 'control' nor 'controls'")
     elif stepwise:
         scheduled = Scheduled(controller, monitored, name)
-        simulate_closed_loop(monitored, scheduled, BatchObservation(controlled, batch, gravity), name)
+        simulate_closed_loop(monitored, scheduled, BatchObservation(controlled, batch, gravity), name, pushes)
     else:
         simulate_open_loop(monitored, controller, name)
-    _record_reference(recorder, controller, job, len(rollouts))
+    _record_reference(recorder, own, job, len(rollouts))
     recorder.end(monitored.stop_step)
     arrays["status"][:], arrays["stop_step"][:] = monitored.status, monitored.stop_step
     arrays["saturation"][:] = monitored.saturation
@@ -197,8 +222,19 @@ def _simulate_batch(
     monitored.contacts.forget_after(monitored.stop_step)
     arrays["contact_step"][:] = monitored.contacts.step
     arrays["contact_link_a"][:], arrays["contact_link_b"][:] = monitored.contacts.links.T
-    for quantity, values in factors.items():
-        arrays[f"{quantity}_scale"][:] = values
+    for variable, values in drawn.items():
+        arrays[variable][:] = values
+
+
+def _delayed(controller: Controller, started: RolloutBatch, drawn: Draws, name: str) -> Controller:
+    """Return a controller whose controls arrive as late as was drawn; one that is wrong is left to be reported."""
+    if "control_delay" not in drawn or not isinstance(controller, OpenLoop | ClosedLoop):
+        return controller
+    delay = delay_steps(drawn["control_delay"], started.plant.timestep)
+    held = holding_controls(started, against_gravity=True)
+    if isinstance(controller, ClosedLoop):
+        return DelayedClosedLoop(controller, delay, held, name)
+    return DelayedOpenLoop(controller, delay, held, name)
 
 
 def _record_reference(recorder: Recorder, controller: object, job: Job, simulations: int) -> None:

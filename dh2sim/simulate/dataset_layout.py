@@ -16,7 +16,8 @@ from dh2sim.robot.variation import CELLS, Variation
 from dh2sim.simulate.contacts import NO_CONTACT, links_with_shapes
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.plant import Plant
-from dh2sim.simulate.randomization import links
+from dh2sim.simulate.quantities import AXES, QUANTITIES, randomized
+from dh2sim.simulate.randomization import links, push_count
 
 FORMAT = 1
 """Version of the layout, in the attribute ``dh2sim_run``."""
@@ -153,8 +154,10 @@ def _sizes(plant: Plant, options: RolloutOptions, variables: Iterable[Variable],
         "energy_kind": len(ENERGY),
         "twist": len(TWIST),
         "link": len(links(plant)),
-        "row": rows,
+        "row": rows or len(plant.spec.rows),
         "closure": len(plant.gaps),
+        "push": push_count(options, options.steps),
+        **{name: len(labels) for name, labels in AXES.items()},
     }
     used = {"step", "interval", "joint", *(name for variable in variables for name in variable.dimensions)}
     return {name: size for name, size in sizes.items() if name in used}
@@ -181,11 +184,13 @@ def _variables(
     flags = {"flag_values": list(bodies), "flag_meanings": " ".join(bodies.values())}
     for name, which in (("contact_link_a", "one"), ("contact_link_b", "the other")):
         yield _per_rollout(name, (), INT, NO_CONTACT, "1", f"{which} of the links that touched then", **flags)
-    dimensions = {"mass": ("link",), "gain": ("actuator",)}
-    for name in options.randomize:
-        yield _per_rollout(
-            f"{name}_scale", dimensions.get(name, ("joint",)), DOUBLE, np.nan, "1", f"factor of the {name}"
-        )
+    for name in randomized(options.randomize):
+        quantity = QUANTITIES[name]
+        pushes = ("push",) if name == "push" else ()
+        dimensions = tuple(filter(None, (quantity.owner, *pushes, quantity.axis)))
+        yield _per_rollout(quantity.variable, dimensions, DOUBLE, np.nan, quantity.unit, quantity.words)
+        if pushes:
+            yield _per_rollout("push_start", pushes, DOUBLE, np.nan, "s", "when a push begins")
     if variation is not None:
         yield from _of_design(variation, rows)
 
@@ -193,9 +198,10 @@ def _variables(
 TAKEN: Final = frozenset(
     """qpos qvel ctrl tool_pose qpos_ref qvel_ref qacc torque energy contacts base_pose base_twist status stop_step
     saturation contact_step contact_link_a contact_link_b design blocks rollout step interval joint actuator pose
-    energy_kind twist link row time interval_time joint_unit joint_lower joint_upper joint_velocity_limit
+    energy_kind twist link row axis length angle push push_start
+    time interval_time joint_unit joint_lower joint_upper joint_velocity_limit
     actuator_unit""".split()  # noqa: SIM905
-)
+) | {quantity.variable for quantity in QUANTITIES.values()}
 """Names of variables, coordinates and dimensions of runs, which no number of a design can have."""
 
 
@@ -295,12 +301,15 @@ def _coordinates(
         "energy_kind": ENERGY,
         "twist": TWIST,
         "link": tuple(plant.model.body(i).name for i in links(plant)),
-        "row": tuple(row.name for row in rows),
+        "row": tuple(row.name for row in rows or plant.spec.rows),
         "closure": tuple(sensor.closure for sensor in plant.gaps),
+        **AXES,
     }
     for name, texts in labels.items():
         if name in sizes:
             yield Coordinate(name=name, dimension=name, values=texts)
+    if "push" in sizes:
+        yield Coordinate(name="push", dimension="push", values=np.arange(sizes["push"], dtype=np.int64))
     if "actuator" in sizes:
         yield Coordinate(name="actuator_unit", dimension="actuator", values=_actuator_units(plant))
 

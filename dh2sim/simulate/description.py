@@ -116,7 +116,7 @@ class RunDescription:
     """Whether every block is committed."""
     integrator: str
     start: str
-    randomize: Mapping[str, float]
+    randomize: Mapping[str, float | str]
     recorded: Mapping[str, RecordedVariable]
     stopped: tuple[EarlyStop, ...]
     """Every rollout that stopped early."""

@@ -7,14 +7,14 @@ state it stops before every time step for the controller.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.errors import ControllerError
-from dh2sim.simulate.batch import BatchObservation, MonitoredBatch
+from dh2sim.simulate.batch import MonitoredBatch
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Observation, OpenLoop
 from dh2sim.simulate.records import DERIVED, INTERVALS
 from dh2sim.typing import Array
@@ -54,6 +54,7 @@ SEGMENT_BYTES = 2**23
 SCHEDULED_STEPS = 64
 """Time steps of controls computed at a time where MuJoCo stops before each."""
 _OPEN_LOOP_AXES = "rollouts, time steps or 1, actuators"
+_CLOSED_LOOP_AXES = "rollouts, actuators"
 
 
 def simulate_open_loop(monitored: MonitoredBatch, controller: OpenLoop, name: str) -> None:
@@ -72,21 +73,31 @@ def simulate_open_loop(monitored: MonitoredBatch, controller: OpenLoop, name: st
         if not monitored.alive.any():
             break
         count = min(segment.steps, monitored.steps - first)
-        controls, outside = monitored.clipped(controls_of(controller, first, count, monitored, name))
+        controls, outside = monitored.clipped(controls_of(controller, first, count, monitored.shape, name))
         segment.run(controls, first, count)
         monitored.count(outside, first, count)
     _end(monitored)
 
 
-def controls_of(controller: OpenLoop, first: int, count: int, monitored: MonitoredBatch, name: str) -> Array:
-    """Return the controls of some time steps, shape (batch, count or 1, actuators).
+def controls_of(controller: OpenLoop, first: int, count: int, shape: tuple[int, ...], name: str) -> Array:
+    """Return the controls of some time steps, shape (batch, count or 1, actuators); ``shape`` is that of one step's.
 
     Raises:
         ControllerError: They are not such an array.
     """
-    simulations, actuators = monitored.batch.nsim, len(monitored.plant.actuators)
+    simulations, actuators = shape
     shapes = [(simulations, count, actuators), (simulations, 1, actuators)]
     return checked(controller.controls(first, count), shapes, _OPEN_LOOP_AXES, controller=name, what="controls")
+
+
+def control_of(controller: ClosedLoop, observation: Observation, shape: tuple[int, ...], name: str) -> Array:
+    """Return the controls of a time step, shape (batch, actuators).
+
+    Raises:
+        ControllerError: They are not such an array.
+    """
+    returned = controller.control(observation)
+    return checked(returned, [shape], _CLOSED_LOOP_AXES, controller=name, what="controls")
 
 
 class Scheduled:
@@ -103,7 +114,7 @@ class Scheduled:
         if step == 0 or self._controls is None:
             first = observation.step - step
             count = min(SCHEDULED_STEPS, self._monitored.steps - first)
-            self._controls = controls_of(self._controller, first, count, self._monitored, self._name)
+            self._controls = controls_of(self._controller, first, count, self._monitored.shape, self._name)
         return self._controls[:, min(step, self._controls.shape[1] - 1)]
 
 
@@ -207,15 +218,34 @@ def _end(monitored: MonitoredBatch) -> None:
         monitored.recorder.put_field(field, monitored.steps, values[monitored.rows][:, None], monitored.rows, DERIVED)
 
 
+class Observed(Observation, Protocol):
+    """An observation that follows a batch."""
+
+    def advance(self) -> None:
+        """Note that the batch has taken a step."""
+        ...
+
+
+class Applied(Protocol):
+    """Something that acts on a batch before each of its steps."""
+
+    def apply(self, step: int) -> None:
+        """Act in a time step."""
+        ...
+
+
 PAGE_STEPS = 64
 """Time steps that are kept before they are recorded together."""
 BEFORE_STEP = (*DERIVED, "contacts")
 """Variables that MuJoCo has computed before a time step; the others of ``INTERVALS`` come with the step."""
-_CLOSED_LOOP_AXES = "rollouts, actuators"
 
 
 def simulate_closed_loop(
-    monitored: MonitoredBatch, controller: ClosedLoop, observation: BatchObservation, name: str
+    monitored: MonitoredBatch,
+    controller: ClosedLoop,
+    observation: Observed,
+    name: str,
+    pushes: Applied | None = None,
 ) -> None:
     """Simulate a batch from its start to its end, recording.
 
@@ -227,6 +257,7 @@ def simulate_closed_loop(
         controller: Its controller.
         observation: What the controller sees of the batch.
         name: Name of the controller, for errors.
+        pushes: Forces that are applied from outside.
 
     Raises:
         ControllerError: It did not return controls.
@@ -248,9 +279,9 @@ def simulate_closed_loop(
         for field, values in derived.items():
             if field != "qacc":
                 pages.note(field, "before", values)
-        wanted = checked(
-            controller.control(observation), [controls.shape], _CLOSED_LOOP_AXES, controller=name, what="controls"
-        )
+        wanted = control_of(controller, observation, controls.shape, name)
+        if pushes is not None:
+            pushes.apply(step)
         controls[:], outside = monitored.clipped(wanted)
         pages.note("ctrl", "before", controls)
         failed = monitored.call(batch.step, monitored.ids)

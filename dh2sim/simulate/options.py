@@ -15,14 +15,12 @@ from typing import Any, Final, SupportsIndex, TypedDict, Unpack
 from dh2sim.errors import SettingsError
 from dh2sim.messages import did_you_mean, listed
 from dh2sim.simulate.designs import DesignTable, Draw, read_design_table, read_draws
+from dh2sim.simulate.quantities import checked_settings
 
 RECORDABLE: Final = ("qpos", "qvel", "ctrl", "tool_pose", "reference", "qacc", "torque", "energy", "contacts")
 """What ``record`` may contain."""
 DEFAULT_RECORD: Final = ("qpos", "qvel", "ctrl", "tool_pose", "reference")
 """'reference' is recorded for controllers that follow one."""
-RANDOMIZABLE: Final = ("mass", "friction", "damping", "armature", "gain")
-"""What ``randomize`` may contain: mass and inertia of links together; dry friction, viscous damping and rotor inertia
-of joints; gains of position and velocity actuators."""
 STARTS: Final = ("home", "zero", "random")
 AUTO: Final = "auto"
 REFERENCE: Final = "reference"
@@ -55,7 +53,7 @@ class RolloutKeywords(TypedDict, total=False):
     seed: SupportsIndex
     record: str | Sequence[str]
     every: SupportsIndex
-    randomize: Mapping[str, float]
+    randomize: Mapping[str, float | str]
     floating_base: bool
     vary: Mapping[str, str | float | Draw]
     designs: str | PathLike[str] | Mapping[str, Any] | DesignTable | None
@@ -140,20 +138,15 @@ def _record(value: object) -> tuple[str, ...]:
     return tuple(name for name in RECORDABLE if name in names)
 
 
-def _randomize(value: object) -> Mapping[str, float]:
-    """Return shares in the order of ``RANDOMIZABLE``."""
+def _randomize(value: object) -> Mapping[str, float | str]:
+    """Return settings in the order of ``QUANTITIES``."""
     if not isinstance(value, Mapping):
-        raise _OptionError(f"must map names to shares, got {value!r}")
-    problems = _unknown(value, RANDOMIZABLE)
-    shares = {name: _number(value[name]) for name in RANDOMIZABLE if name in value}
-    problems += [
-        f"must have shares of at least 0 and below 1, got {name}={share:g}"
-        for name, share in shares.items()
-        if not 0.0 <= share < 1.0
-    ]
+        raise _OptionError(f"must map names to numbers or distributions, got {value!r}")
+    settings = {_text(name): each if isinstance(each, str) else _number(each) for name, each in value.items()}
+    found, problems = checked_settings(settings)
     if problems:
         raise _OptionError(*problems)
-    return MappingProxyType(shares)
+    return MappingProxyType(found)
 
 
 def _unknown(names: Iterable[Any], known: Sequence[str]) -> list[str]:
@@ -202,10 +195,11 @@ class RolloutOptions:
     """What is recorded, in the order of ``RECORDABLE``; may be given as one text with commas."""
     every: int = _option(1, partial(_whole, least=1))
     """Every N-th state is recorded; divides ``steps``."""
-    randomize: Mapping[str, float] = field(
+    randomize: Mapping[str, float | str] = field(
         default_factory=lambda: MappingProxyType({}), metadata={"read": _randomize}
     )
-    """Greatest relative change of ``RANDOMIZABLE`` quantities; each link or joint of a rollout has its own factor."""
+    """What is random, by the names of ``quantities.QUANTITIES``, with or without the name of a link, joint or row in
+    brackets: a number, or a distribution as text."""
     floating_base: bool = _option(False, _yes_or_no)
     """Whether base_link floats."""
     vary: Mapping[str, Draw] = field(default_factory=lambda: MappingProxyType({}), metadata={"read": read_draws})

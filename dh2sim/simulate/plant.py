@@ -19,6 +19,7 @@ from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import unloaded_gains
 from dh2sim.mujoco_warnings import mujoco_warnings
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.simulate.closed_loops import ClosedLoops
 from dh2sim.typing import Array, read_only
 
@@ -67,6 +68,8 @@ class Plant:
     """
 
     model: mujoco.MjModel = field(repr=False)
+    spec: RobotSpec = field(repr=False)
+    """The robot as its file describes it."""
     timestep: float
     """s."""
     floating: bool
@@ -206,6 +209,7 @@ def make_plant(compiled: mujoco.MjModel, robot: RobotModel | MechanismModel) -> 
     place = {int(joint): k for k, joint in enumerate(ids)}
     return Plant(
         model=compiled,
+        spec=robot.spec,
         timestep=float(compiled.opt.timestep),
         floating=bool(floating),
         joints=tuple(compiled.joint(int(i)).name for i in ids),

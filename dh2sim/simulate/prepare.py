@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import mujoco
 import numpy as np
@@ -27,6 +27,9 @@ from dh2sim.simulate.designs import Designs
 from dh2sim.simulate.initial_states import InitialStates, read_initial_states, reference_start
 from dh2sim.simulate.options import AUTO, REFERENCE, RolloutOptions
 from dh2sim.simulate.plant import Plant, compile_plant
+from dh2sim.simulate.quantities import randomized, unknown_labels
+from dh2sim.simulate.randomization import owners, push_time
+from dh2sim.simulate.randomized_models import motors
 from dh2sim.simulate.records import SENSED
 from dh2sim.typing import Array
 
@@ -75,7 +78,7 @@ def prepare(model: RobotModel | MechanismModel, options: RolloutOptions, *, comm
     if isinstance(model, MechanismModel):
         initial = initial.on_loops(plant, model)
         _check_driven(plant, controller)
-    idle = [("randomize", problem) for problem in _idle(plant, options.randomize)]
+    idle = [("randomize", problem) for problem in _unusable(plant, options)]
     if idle:
         raise SettingsError(idle)
     digests = {"controller_digest": controller.digest, "start_digest": initial.digest}
@@ -219,7 +222,31 @@ def _resolved(model: RobotModel | MechanismModel, options: RolloutOptions) -> tu
     return controller, initial
 
 
-def _idle(plant: Plant, randomize: Mapping[str, float]) -> Iterator[str]:
+_SERIAL: Final = (
+    "payload",
+    "zero",
+    "row_length",
+    "row_angle",
+    "encoder_bias",
+    "encoder_noise",
+    "sensor_delay",
+)
+"""Quantities that mechanisms cannot have."""
+
+
+def _unusable(plant: Plant, options: RolloutOptions) -> Iterator[str]:
+    """Yield what is wrong with what is randomized of a robot."""
+    names = randomized(options.randomize)
+    yield from unknown_labels(options.randomize, owners(plant))
+    interval = push_time(options, "push_interval")
+    if interval < options.timestep:
+        yield f"must have push_interval of at least a time step, got {interval:g}"
+    if plant.loops is not None and (serial := [name for name in _SERIAL if name in names]):
+        yield f"must not contain {listed(serial)}, which are of serial robots alone"
+    yield from _idle(plant, names)
+
+
+def _idle(plant: Plant, names: Sequence[str]) -> Iterator[str]:
     """Yield what is wrong with randomizing a quantity that is zero in every joint or actuator."""
     model, joints = plant.model, plant.velocities
     values = {
@@ -227,10 +254,18 @@ def _idle(plant: Plant, randomize: Mapping[str, float]) -> Iterator[str]:
         "damping": model.dof_damping[joints],
         "armature": model.dof_armature[joints],
         "gain": model.actuator_biasprm,  # motors have none
+        "kp": model.actuator_biasprm[:, 1],
+        "kv": model.actuator_biasprm[:, 2],
+        "effort": np.concatenate(
+            [model.jnt_actfrcrange, model.actuator_forcerange, model.actuator_ctrlrange[motors(plant)]]
+        ),
+        "gravity": model.opt.gravity,
     }
-    for name in randomize:
+    words = {"effort": "limit of effort", "kp": "stiffness", "kv": "damping of actuators"}
+    for name in names:
+        verb = "tilt" if name == "gravity" else "multiply"
         if name in values and not values[name].any():
-            yield f"must not contain '{name}': the robot as simulated has no {name} to multiply"
+            yield f"must not contain '{name}': the robot as simulated has no {words.get(name, name)} to {verb}"
 
 
 def _attributes(

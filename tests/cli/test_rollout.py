@@ -18,6 +18,7 @@ import xarray as xr
 
 from dh2sim.cli.output import size_text
 from dh2sim.simulate import open_dataset, rollout
+from dh2sim.simulate.quantities import QUANTITIES
 from tests.program import Outcome, contents, dh2sim, dh2sim_process, environment
 from tests.robot_files import RICH, small, snake, write
 
@@ -130,7 +131,7 @@ def test_every_mistake_is_reported_at_once(folder: Path) -> None:
         "--integrator must be one of Euler, RK4, implicit, implicitfast, got 'rk5'. Did you mean 'RK4'?",
         "--seed must be at least 0, got -1",
         f"--record must not contain 'qve'. Did you mean 'qvel'? Allowed: {KNOWN}",
-        "--randomize must not contain 'mas'. Did you mean 'mass'? Allowed: mass, friction, damping, armature, gain",
+        f"--randomize must not contain 'mas'. Did you mean 'mass'? Allowed: {', '.join(QUANTITIES)}",
         "--randomize must have shares of at least 0 and below 1, got gain=2",
         "--every must divide the 10 steps of a rollout, got 3",
     ]
@@ -167,6 +168,11 @@ def test_every_mistake_is_reported_at_once(folder: Path) -> None:
             "--randomize must not contain 'gain': the robot as simulated has no gain to multiply",
         ),
         (
+            ["--randomize", "mass=lots"],
+            "--randomize must be X, uniform:LOW:HIGH, loguniform:LOW:HIGH, normal:SIGMA, normal:MEAN:SIGMA or "
+            "fixed:X, got mass='lots'",
+        ),
+        (
             ["--controller", "random:rate=1e6"],
             "controller 'random': option 'rate' must be at most that of the time steps, 500 Hz, got 1e+06 Hz",
         ),
@@ -181,8 +187,8 @@ def test_one_mistake_is_reported_and_nothing_is_made(options: list[str], problem
 @pytest.mark.parametrize(
     ("share", "problem"),
     [
-        ("mass", "'mass' is not of the form name=share, as in mass=0.1"),
-        ("mass=lots", "'mass=lots' is not of the form name=share, as in mass=0.1"),
+        ("mass", "'mass' is not of the form name=value, as in mass=0.1 or com=normal:0.01"),
+        ("mass=", "'mass=' is not of the form name=value, as in mass=0.1 or com=normal:0.01"),
         ("mass=0.1,mass=0.2", "'mass' is given twice"),
     ],
 )

@@ -53,6 +53,32 @@ class Spring:
         return driven
 
 
+class Seen:
+    """Closed loop, motors at every joint: the forces are the positions that are seen."""
+
+    actuation = "motor"
+
+    def __init__(self, batch: RolloutBatch) -> None:
+        self._joints = list(batch.plant.driven)
+
+    def control(self, observation: Observation) -> Array:
+        seen: Array = observation.q[:, self._joints]
+        return seen
+
+
+class Strong:
+    """Open loop, motors at every joint, to and fro with more force than there is."""
+
+    actuation = "motor"
+
+    def __init__(self, batch: RolloutBatch) -> None:
+        self._shape = len(batch.rollouts), len(batch.plant.actuators)
+
+    def controls(self, first: int, count: int) -> Array:
+        signs = np.where(np.arange(first, first + count) % 2, 1e3, -1e3)
+        return np.tile(signs[None, :, None], (self._shape[0], 1, self._shape[1]))
+
+
 class _Bad:
     """Gives one rollout of its run something bad from a time step on."""
 

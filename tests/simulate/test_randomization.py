@@ -10,8 +10,7 @@ from dh2sim.errors import SettingsError
 from dh2sim.model.build import build_model
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType
 from dh2sim.simulate import rollout
-from dh2sim.simulate.options import RANDOMIZABLE
-from dh2sim.simulate.randomization import Generators, Purpose, generator
+from dh2sim.simulate.randomization import SCALES, Generators, Purpose, generator
 from tests.sample_robots import model
 from tests.simulate import plain, robots
 
@@ -23,8 +22,8 @@ RECORD = ("qpos", "qvel", "ctrl", "tool_pose", "qacc", "torque", "energy", "cont
 @pytest.mark.parametrize(
     ("controller", "what"),
     [
-        *(("random", what) for what in (*RANDOMIZABLE, "all")),
-        *(("tests.simulate.drivers:Spring", what) for what in (*RANDOMIZABLE, "all") if what != "gain"),
+        *(("random", what) for what in (*SCALES, "all")),
+        *(("tests.simulate.drivers:Spring", what) for what in (*SCALES, "all") if what != "gain"),
     ],
 )
 def test_each_rollout_moves_as_a_model_with_multiplied_fields(controller: str, what: str, floating: bool) -> None:
@@ -142,7 +141,7 @@ def test_the_model_in_the_attributes_is_the_one_that_is_multiplied() -> None:
 def test_a_generator_is_a_child_of_a_child_of_the_seed(seed: int, purpose: Purpose) -> None:
     children = np.random.SeedSequence(seed).spawn(5)
     for i, child in enumerate(children):
-        expected = np.random.Generator(np.random.PCG64(child.spawn(3)[purpose]))
+        expected = np.random.Generator(np.random.PCG64(child.spawn(len(Purpose))[purpose]))
         assert np.array_equal(generator(seed, i, purpose).random(10), expected.random(10))
 
 

@@ -357,8 +357,8 @@ def _attribute_problem(attributes: Mapping[str, Any]) -> str | None:
         return "its time steps are impossible"
     if not all(isinstance(version, str) for version in attributes["versions"].values()):
         return "its attribute 'versions' does not hold text"
-    if not all(isinstance(share, int | float) for share in attributes["randomize"].values()):
-        return "its attribute 'randomize' does not hold numbers"
+    if not all(isinstance(setting, int | float | str) for setting in attributes["randomize"].values()):
+        return "its attribute 'randomize' does not hold numbers and texts"
     return None
 
 

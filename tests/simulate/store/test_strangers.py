@@ -116,7 +116,7 @@ def setting(path: str, value: object) -> Change:
         (setting("timestep", None), "its attribute 'timestep' is nothing"),
         (setting("timestep", float("nan")), "its time steps are impossible"),
         (setting("versions", {"mujoco": [1]}), "its attribute 'versions' does not hold text"),
-        (setting("randomize", {"mass": "much"}), "its attribute 'randomize' does not hold numbers"),
+        (setting("randomize", {"mass": [1]}), "its attribute 'randomize' does not hold numbers and texts"),
         (setting("robot", ["stanford"]), "its attribute 'robot' is a list"),
     ],
 )

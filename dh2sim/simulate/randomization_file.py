@@ -1,0 +1,72 @@
+"""Files that say what is random in rollouts."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from dh2sim.errors import Dh2simError
+from dh2sim.messages import Loc, shown
+from dh2sim.robot.yaml_tree import MAX_BYTES, Node, Report, check_size, compose, decode
+from dh2sim.simulate.quantities import NEEDS, Setting, checked_settings, key_parts
+
+OTHERS = "others"
+"""Stands in a mapping for the links, joints or rows that it does not name."""
+
+
+def read_randomization(path: str | os.PathLike[str]) -> dict[str, Setting]:
+    """Return what a file makes random, as ``RolloutOptions`` takes it.
+
+    The file maps quantities to numbers or distributions; or, for each link, joint or row, to a mapping of names,
+    among them ``others``, to these.
+
+    Raises:
+        RobotFileError: The file is wrong; the error holds everything that is, with its place.
+        Dh2simError: It cannot be read.
+    """
+    name = os.fspath(path)
+    try:
+        with Path(path).open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise Dh2simError(f"{name}: cannot be read: {error.strerror or error}") from None
+    report = Report(name)
+    check_size(len(data), report)
+    root = compose(decode(data, report), report, needs="it maps quantities to numbers or distributions")
+    found: dict[str, Setting] = {}
+    for key, loc, node in _entries(root, report):
+        value = node.value
+        if not isinstance(value, str | int | float) or isinstance(value, bool):
+            report.add(node.line, node.column, loc, f"expected a number or a distribution, found {shown(value)}")
+            continue
+        setting = value if isinstance(value, str) else float(value)
+        # what a quantity needs besides itself is checked when all are known
+        _, problems = checked_settings({key: setting} | dict.fromkeys(_needed(key), 1.0))
+        for problem in problems:
+            report.add(node.line, node.column, loc, problem)
+        found[key] = setting
+    if not report.problems:
+        for problem in checked_settings(found)[1]:
+            report.add(root.line, root.column, (), problem)
+    if report.problems:
+        raise report.error()
+    return found
+
+
+def _needed(key: str) -> list[str]:
+    needed = NEEDS.get(key_parts(key)[0])
+    return [] if needed is None else [needed]
+
+
+def _entries(root: Node, report: Report) -> Iterator[tuple[str, Loc, Node]]:
+    """Yield the keys of settings, their places, and what they are set to."""
+    if not isinstance(root.value, dict):
+        report.add(root.line, root.column, (), "expected a mapping of quantities to numbers or distributions")
+        return
+    for name, entry in root.value.items():
+        if not isinstance(entry.value.value, dict):
+            yield name, (name,), entry.value
+            continue
+        for label, inner in entry.value.value.items():
+            yield (name if label == OTHERS else f"{name}[{label}]"), (name, label), inner.value
