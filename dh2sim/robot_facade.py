@@ -37,8 +37,11 @@ from dh2sim.robot.textbook_table import table_html, table_latex, table_text
 from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     import mujoco
     import xarray as xr
+    from distributed import Client
 
     from dh2sim.calibrate.calibration import CalibrationKeywords
     from dh2sim.calibrate.measurements import Measurements
@@ -712,16 +715,24 @@ class Robot:
         threads: int = 0,
         resume: bool = False,
         overwrite: bool = False,
+        share: tuple[int, int] | None = None,
+        block_size: int | None = None,
+        executor: Executor | Client | str | None = None,
         **options: Unpack[RolloutKeywords],
     ) -> xr.Dataset:
         """Simulate many rollouts with MuJoCo.
 
         Args:
             rollouts: Number of rollouts, 256 by default.
-            out: Folder to write the run to, by convention named ``….zarr``; None to keep it in memory.
+            out: Folder to write the run to, by convention named ``….zarr``, or ``s3://BUCKET/NAME``; None to keep it
+                in memory.
             threads: Number of threads, 0 for one a processor. The result does not depend on it.
             resume: Whether to continue the run at ``out``, if there is one.
             overwrite: Whether to replace the run at ``out``.
+            share: ``(i, n)``: simulate the i-th of n shares of the run's blocks, beside other processes.
+            block_size: Rollouts in a block; by default some seconds' work.
+            executor: Simulates the blocks in place of this process: one of ``concurrent.futures``, a client of Dask,
+                'local' or 'dask://HOST:PORT'.
             **options: What is simulated and recorded, as for :func:`dh2sim.simulate.rollout`: ``controller`` (its
                 name, or a class of your own), ``seed``, ``duration`` or ``steps``, ``timestep``, ``integrator``,
                 ``start``, ``record``, ``every``, ``randomize``, ``floating_base``; ``vary``, ``designs`` and
@@ -737,7 +748,17 @@ class Robot:
 
         if rollouts is not None:
             options["rollouts"] = rollouts
-        return rollout(self._written, out=out, threads=threads, resume=resume, overwrite=overwrite, **options)
+        return rollout(
+            self._written,
+            out=out,
+            threads=threads,
+            resume=resume,
+            overwrite=overwrite,
+            share=share,
+            block_size=block_size,
+            executor=executor,
+            **options,
+        )
 
     def calibrate(
         self,

@@ -36,6 +36,7 @@ ERRORS: dict[str, dict[str, float]] = {
     },
     "own_controller": {},
     "robot_in_code": {r"urdf: off the table by at most (\S+) m": 1e-14, r"mjcf: .* at most (\S+) m": 1e-14},
+    "rollouts_on_ray": {},
     "rollouts_to_xarray": {r"joint_1 follows its reference to within (\S+)": 0.01},
 }
 """Every example, with the errors that it prints and their bounds."""

@@ -117,7 +117,7 @@ def create_run(path: Path, files: Mapping[str, bytes], *, overwrite: bool, alone
         new = make_hidden(target, PARTIAL)
         _write_all(new[0], files)
         inner = FolderLock(new[0] / BLOCKS) if alone else None
-        _put_in_place(path, target, new[0])
+        _put_in_place(path, target, new[0], overwrite=overwrite)
         for folder in made:
             sync(folder.parent)
         new[1].share()
@@ -156,9 +156,9 @@ def _write_all(folder: Path, files: Mapping[str, bytes]) -> None:
         sync(inner)
 
 
-def _put_in_place(path: Path, target: Path, new: Path) -> None:
-    """Rename a new run into place, and delete the run that was there."""
-    if is_vacant(target):
+def _put_in_place(path: Path, target: Path, new: Path, *, overwrite: bool) -> None:
+    """Rename a new run into place, and delete the run that was there if that is to be replaced."""
+    if is_vacant(target) or not overwrite:
         _rename(path, target, new)
         return
     try:

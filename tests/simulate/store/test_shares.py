@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dh2sim import locks
 from dh2sim.errors import RunBusyError, RunDiffersError, RunError
+from dh2sim.simulate.store import directory
 from dh2sim.simulate.store.reader import damaged_blocks
 from dh2sim.simulate.store.writer import RunWriter
 from tests.program import contents
@@ -153,3 +155,20 @@ def test_a_plain_reader_sees_the_committed_blocks_of_a_run_in_the_making(tmp_pat
         writer.write(1, block_of(OF, 1), SECONDS)
         status = xr.open_zarr(path).status.to_numpy()
     assert np.flatnonzero(status != -1).tolist() == [2, 3]
+
+
+def test_a_run_that_another_process_has_made_meanwhile_is_joined_and_not_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.zarr"
+    make_hidden = locks.make_hidden
+
+    def late(target: Path, suffix: str) -> object:
+        monkeypatch.setattr(directory, "make_hidden", make_hidden)
+        make(path, OF)  # and its process has ended, so that nobody holds a lock
+        return make_hidden(target, suffix)
+
+    monkeypatch.setattr(directory, "make_hidden", late)
+    with RunWriter.join(path, OF) as writer:
+        assert writer.pending() == ()
+    assert os.listdir(tmp_path) == ["run.zarr"]
