@@ -93,8 +93,12 @@ def _installed(file: str) -> bool:
 
 
 def _of_python_or_dh2sim(file: str) -> bool:
-    of_python = Path(file).is_relative_to(Path(os.__file__).parent) and not _installed(file)
-    return of_python or file.startswith("<") or Path(file).is_relative_to(_DH2SIM)
+    # importlib_metadata, where a package brings it, takes the place of Python's own importlib.metadata
+    path = Path(file)
+    of_python = (path.is_relative_to(Path(os.__file__).parent) and not _installed(file)) or (
+        "importlib_metadata" in path.parts
+    )
+    return of_python or file.startswith("<") or path.is_relative_to(_DH2SIM)
 
 
 ENTRY_POINTS: Final = "dh2sim.controllers"
