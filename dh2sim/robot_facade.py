@@ -882,7 +882,8 @@ class Robot:
         """Draw the robot as textbooks do; a notebook shows the drawing.
 
         Args:
-            q: Joint vector, rad and m, or the name of a configuration; by default home.
+            q: Joint vector, rad and m, or the name of a configuration; by default home. Of a mechanism all joints or
+                the driven ones, as for :meth:`fk`.
             style: 'kinematic': joints as cylinders and boxes, axes, frames and lengths; 'frames': all axes of the
                 frames; 'stick': a stick plot in the box of the workspace, with base line and shadow.
             workspace: Of a stick plot: least and greatest x, y and z, m; by default a cube around the arm.

@@ -29,6 +29,7 @@ def drawings() -> dict[str, RobotDrawing]:
         "drawing_frames.svg": draw_robot(load_robot("puma560_standard"), style="frames"),
         "drawing_stick_zero.svg": draw_robot(stanford, "zero", style="stick", workspace=BOX, reach=1.0),
         "drawing_stick_printed.svg": draw_robot(stanford, printed, style="stick", workspace=BOX, reach=1.0),
+        "drawing_four_bar.svg": draw_robot(load_robot("four_bar")),
     }
 
 

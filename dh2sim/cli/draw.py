@@ -9,7 +9,13 @@ from typing import Annotated
 import typer
 
 from dh2sim.cli.common import MANY, RobotArgument, load_all
-from dh2sim.cli.joint_vector import DegreesOption, QArgument, RadiansOption, read_joint_vector
+from dh2sim.cli.joint_vector import (
+    DegreesOption,
+    QArgument,
+    RadiansOption,
+    read_joint_vector,
+    warn_open_loops,
+)
 from dh2sim.messages import printable
 
 
@@ -55,17 +61,20 @@ def draw(
     """Draw a robot as textbooks do: its kinematic diagram, its frames, or a stick plot.
 
     Without Q the robot is at its configuration 'home', or at zero moved inside the limits if its file has none. SVG
-    and TikZ need no other package; PNG and PDF need the extra 'plot'. The same robot gives the same bytes.
+    and TikZ need no other package; PNG and PDF need the extra 'plot'. The same robot gives the same bytes. Mechanisms
+    are drawn with the joints that close their loops, the driven ones coloured.
 
     \b
     Examples:
       dh2sim draw stanford
       dh2sim draw puma560 --style frames --out puma.pdf
       dh2sim draw scara 30 -45 0.1 0 --as tikz -o scara.tex
+      dh2sim draw four_bar 120 -o four_bar.png
       dh2sim draw stanford 45 60 0.2 45 0 -60 --style stick
         --workspace -1 1 -1 1 -1 1 --reach 1 -o stanford.png
     """
     from dh2sim.draw.diagram.drawing import DrawingFormat, draw_robot, format_named, format_of
+    from dh2sim.kinematics.tree import build_tree
 
     if q and configuration is not None:
         raise typer.BadParameter("gives the configuration already; leave Q out", param_hint="--configuration")
@@ -73,6 +82,8 @@ def draw(
     texts = [configuration] if configuration is not None else q
     options = "--configuration, --as, --style, --workspace, --reach, --out, --degrees, --radians, --help"
     vector = read_joint_vector(spec, texts, degrees=degrees, radians=radians, command="draw", options=options)
+    if spec.is_mechanism:
+        warn_open_loops(build_tree(spec), vector)
     format_ = format_named(kind) if kind is not None else DrawingFormat.SVG
     path = None if out == "-" else Path(f"{spec.name}.{format_.value}") if out is None else Path(out)
     if kind is None and path is not None:

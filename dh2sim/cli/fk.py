@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,6 +17,7 @@ from dh2sim.cli.joint_vector import (
     RadiansOption,
     format_numbers,
     read_joint_vector,
+    warn_open_loops,
 )
 from dh2sim.cli.output import json_text
 from dh2sim.errors import ConfigurationError, Dh2simError
@@ -102,13 +102,10 @@ def fk(
 
 def _mechanism_pose(spec: RobotSpec, vector: JointVector) -> Callable[[str], Array]:
     """Return what gives the pose of a frame of a mechanism; a warning is printed where its loops are not closed."""
-    from dh2sim.kinematics.loop_closure import closure_gaps, is_closed
     from dh2sim.kinematics.tree import build_tree, tree_frames
 
     tree = build_tree(spec)
-    if tree.closures and not is_closed(tree, vector.q):
-        gaps = "; ".join(map(str, closure_gaps(tree, vector.q)))
-        print(f"dh2sim: warning: the loops are not closed at these coordinates: {gaps}", file=sys.stderr)
+    warn_open_loops(tree, vector)
     frames = tree_frames(tree, vector.q)
 
     def pose_of(frame: str) -> Array:

@@ -13,6 +13,7 @@ import typer
 from dh2sim.errors import ConfigurationError
 
 if TYPE_CHECKING:
+    from dh2sim.kinematics.tree import KinematicTree
     from dh2sim.robot.spec import RobotSpec, Row, Units
 
 QArgument = Annotated[
@@ -168,6 +169,15 @@ def _wrong_count(spec: RobotSpec, words: Sequence[str], parts: Sequence[str], un
     known = spec.named_configurations
     hint = did_you_mean(words[0], known)
     return f"{spec.name} has no configuration {shown(words[0])}.{hint} Configurations: {listed(known)}"
+
+
+def warn_open_loops(tree: KinematicTree, vector: JointVector) -> None:
+    """Print a warning if the loops of a mechanism are not closed."""
+    from dh2sim.kinematics.loop_closure import closure_gaps, is_closed
+
+    if tree.closures and not is_closed(tree, vector.q):
+        gaps = "; ".join(map(str, closure_gaps(tree, vector.q)))
+        print(f"dh2sim: warning: the loops are not closed at these coordinates: {gaps}", file=sys.stderr)
 
 
 def _warn_outside(vector: JointVector) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from dh2sim.draw.diagram.arm import place_arm
 from dh2sim.draw.diagram.kinematic import draw_kinematic
+from dh2sim.draw.diagram.linkage import place_mechanism
 from dh2sim.draw.diagram.sheet import Sheet, Stroke, head_of, shaft_of, subscripted, tex_text, to_svg, to_tikz
 from dh2sim.draw.diagram.stick import draw_stick
 from dh2sim.draw.plot_style import plot_style, save
@@ -109,8 +110,9 @@ def draw_robot(
     """Draw a robot as textbooks do.
 
     Args:
-        robot: The robot.
-        q: Joint vector, rad and m, or the name of a configuration; by default home, or zero inside the limits.
+        robot: The robot, or a mechanism; that is drawn with the joints that close its loops.
+        q: Joint vector, rad and m, or the name of a configuration; by default home, or zero inside the limits. Of a
+            mechanism the coordinates of all joints, or of the driven ones.
         style: 'kinematic', 'frames' or 'stick'.
         workspace: Of a stick plot: least and greatest x, y and z, m.
         reach: Of a stick plot: length that joints and axes are measured by, m.
@@ -121,13 +123,19 @@ def draw_robot(
     Raises:
         PictureError: The style is unknown, or the workspace is no box.
         ConfigurationError: ``q`` is no joint vector or configuration of the robot.
+        AssemblyError: The loops of a mechanism cannot be closed.
+        SingularPositionError: A mechanism cannot be moved to ``q`` from its assembly.
     """
     spec = spec_of(robot)
     kind = _choice(DrawingStyle, style, "style")
     if kind is not DrawingStyle.STICK and (workspace is not None or reach is not None):
         raise PictureError("workspace and reach are of the style 'stick'")
-    vector = _configuration(spec, "home" if q is None else q) if q is None or isinstance(q, str) else q
-    arm = place_arm(spec, joint_vector(build_chain(spec), vector))
+    vector = "home" if q is None else q
+    if spec.is_mechanism:
+        arm = place_mechanism(spec, vector)
+    else:
+        named = _configuration(spec, vector) if isinstance(vector, str) else vector
+        arm = place_arm(spec, joint_vector(build_chain(spec), named))
     if kind is not DrawingStyle.STICK:
         return RobotDrawing(sheet=draw_kinematic(arm, symbols=kind is DrawingStyle.KINEMATIC))
     if reach is not None and not (math.isfinite(reach) and reach > 0.0):

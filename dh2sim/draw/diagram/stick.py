@@ -13,7 +13,7 @@ import numpy as np
 
 from dh2sim.draw.diagram.arm import Arm
 from dh2sim.draw.diagram.sheet import Sheet, text_box
-from dh2sim.draw.diagram.symbols import box, cylinder, towards_viewer
+from dh2sim.draw.diagram.symbols import ball, box, cylinder, towards_viewer
 from dh2sim.draw.frame_figure.paper import X_COLOR, Y_COLOR, Z_COLOR
 from dh2sim.draw.labels import Label, place_labels
 from dh2sim.draw.plot_style import INK
@@ -70,12 +70,13 @@ def draw_stick(arm: Arm, workspace: Box | None = None, reach: float | None = Non
 
     labels = _draw_box(sheet, at, low, high)
     base, tool = np.zeros(3), arm.T_base_tool[:3, 3]
-    points = np.array([base, *arm.frames[:, :3, 3], tool])
-    shadow = np.column_stack([points[:, :2], np.full(len(points), low[2])])
-    sheet.line(at(shadow), _SHADOW, 4.0)
+    for path in arm.paths:
+        shadow = path.points * [1.0, 1.0, 0.0] + [0.0, 0.0, low[2]]
+        sheet.line(at(shadow), _SHADOW, 4.0)
     foot = np.array([0.0, 0.0, low[2]])
     sheet.line([at(foot), at(base)], INK, 2.0, dash=(5.0, 4.0))
-    sheet.line(at(points), _ARM, 4.5)
+    for path in arm.paths:
+        sheet.line(at(path.points), _ARM, 4.5)
     size = arm.reach if reach is None else reach
     for joint in sorted(arm.joints, key=lambda joint: float(joint.reached @ towards_viewer(_VIEW))):
         middle = at(joint.origin if joint.type.turns else 0.5 * (joint.reached + joint.left))
@@ -84,6 +85,8 @@ def draw_stick(arm: Arm, workspace: Box | None = None, reach: float | None = Non
             cylinder(sheet, _VIEW, middle, joint.direction, across, style)
         elif joint.type.moves:
             box(sheet, _VIEW, middle, (joint.direction, joint.side), across, style)
+    for closure in arm.closures:
+        ball(sheet, at(closure.middle), max(2.5, scale * _RADIUS * size), ("#ffffff", INK, 0.8))
     for letter, column, color in (("x", 0, X_COLOR), ("y", 1, Y_COLOR), ("z", 2, Z_COLOR)):
         end = tool + _AXES * size * arm.T_base_tool[:3, column]
         sheet.arrow(at(tool), at(end), color, 1.4)

@@ -39,7 +39,7 @@ def cylinder(
     ring = radius * view.project(np.cos(angles) * first + np.sin(angles) * second)
     along = half * view.project(axis)
     front = along if float(axis @ towards_viewer(view)) >= 0.0 else -along
-    sheet.area(at + _hull(np.vstack([ring + along, ring - along])), fill, color, width)
+    sheet.area(at + hull(np.vstack([ring + along, ring - along])), fill, color, width)
     sheet.area(at + ring + front, fill, color, width)
 
 
@@ -71,6 +71,13 @@ def box(
         sheet.area(at + view.project(np.array(corners)), fill, color, width)
 
 
+def ball(sheet: Sheet, at: Array, radius: float, style: tuple[str, str, float]) -> None:
+    """Draw a ball around a point on the paper, given its fill, colour and width of the outline."""
+    angles = np.array([math.tau * k / _CORNERS for k in range(_CORNERS)])
+    fill, color, width = style
+    sheet.area(at + radius * np.column_stack([np.cos(angles), np.sin(angles)]), fill, color, width)
+
+
 def ground(sheet: Sheet, at: Array, color: str) -> None:
     """Draw the sign of what does not move, below a point on the paper."""
     x, y = at.tolist()
@@ -95,7 +102,7 @@ def _across(axis: Array) -> tuple[Array, Array]:
     return first, np.cross(axis, first)
 
 
-def _hull(points: Array) -> Array:
+def hull(points: Array) -> Array:
     """Return the corners of the convex hull of points on the paper, shape (count, 2)."""
     order = sorted(map(tuple, np.round(points, 6).tolist()))
     halves: list[tuple[float, float]] = []
