@@ -1,15 +1,10 @@
-"""The elimination that suits an arm, chosen by trial when it is built, and all solutions of many poses by it.
-
-No rule says beforehand which pencils are regular: of the 12 of a UR5 one is. So each is tried on poses that random
-configurations reach, and the best two are kept. What the trial shows that they miss is reported.
-"""
+"""All solutions of many poses at a time, by the elimination that suits an arm, and by others where that may fail."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from itertools import chain, product
 from typing import Protocol
 
 import numpy as np
@@ -21,14 +16,11 @@ from dh2sim.inverse.loop import (
     Indices,
     Loop,
     close_loop,
-    inverse_poses,
     pose_and_jacobian,
     pose_error,
 )
 from dh2sim.inverse.nearly_singular import near_solutions
-from dh2sim.inverse.pencil import build_pencil
 from dh2sim.inverse.polish import polish, refine
-from dh2sim.inverse.slides import OppositeSlides, ThreeSlides
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.typing import Array
 
@@ -50,14 +42,8 @@ SAME_IF_SINGULAR = 1e-4
 """... and by less than this where the arm is nearly singular, as rounding moves such solutions farther."""
 NEARLY_SINGULAR = 1e-6
 """Least singular value below which that is so."""
-TRIALS = 40
-"""Poses of the trial."""
-_FIRST = 8
-"""Of them on which a hopeless elimination is told from others."""
 _VIRTUAL = 0.05
 """How far virtual joints of a candidate may be from zero."""
-_NUDGE = 1e-6
-"""Size of changes, in lengths of the arm and rad, that make singular eliminations regular."""
 _NEAR_BY = 4
 """Poses near a nearly singular one whose solutions are counted, too,"""
 _APART = 1e-3
@@ -87,6 +73,23 @@ class Elimination(Protocol):
     def condition(self, loop: Loop) -> Array:
         """Return how ill-conditioned the elimination is at N poses, shape (N,)."""
         ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Nudged:
+    """An elimination of an arm whose links are a little different, where that of the arm itself is singular."""
+
+    elimination: Elimination
+    nudges: Array = field(repr=False)
+    """Small motions of the six links, shape (6, 4, 4)."""
+
+    def candidates(self, loop: Loop) -> Candidates:
+        """Return configurations near all solutions of N poses, and some that are none."""
+        return self.elimination.candidates(loop.moved(self.nudges))
+
+    def condition(self, loop: Loop) -> Array:
+        """Return how ill-conditioned the elimination is at N poses, shape (N,)."""
+        return self.elimination.condition(loop.moved(self.nudges))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -153,7 +156,7 @@ class Method:
             values = {joint: q if len(q) == 1 else q[block] for joint, q in locked.items()}
             found = self._solve_block(T[block], values)
             blocks.append(found.among(np.arange(start, start + _BLOCK)))
-        return _joined(blocks, self.arm.n)
+        return joined(blocks, self.arm.n)
 
     def _held(self, T: Array, locked: Mapping[int, Array]) -> Found:
         """Return the configuration in which all joints are locked, for the poses that it reaches."""
@@ -165,21 +168,31 @@ class Method:
         return found.of(reached)
 
     def _solve_block(self, T: Array, locked: Mapping[int, Array]) -> Found:
-        found = self.solve_by(self.eliminations[0], T, locked) if self.eliminations else _joined([], self.arm.n)
-        for other in (*self.eliminations[1:], None):
+        found = self.solve_by(self.eliminations[0], T, locked) if self.eliminations else joined([], self.arm.n)
+        for other in self.eliminations[1:]:
             again = np.flatnonzero(self.doubtful(found, len(T)))
             if not len(again):
-                break
-            if other is None or other is not self.eliminations[1]:
-                again = self._ill(again, found, T, locked, last=other is None)
+                return found
+            if other is not self.eliminations[1]:
+                again = self._ill(again, found, T, locked, last=False)
             if len(again):
-                values = {joint: q if len(q) == 1 else q[again] for joint, q in locked.items()}
-                more = self._searched(T[again], values) if other is None else self.solve_by(other, T[again], values)
-                found = self.distinct(_joined([found, more.among(again)], self.arm.n))
-                if other is None:
-                    found = self._sharp(found)
-                    found = replace(found, unsure=self._unsure(again, found, T, locked))
+                found = self._joined_with(found, again, self.solve_by(other, T[again], _values_at(locked, again)))
+        again = np.flatnonzero(self.doubtful(found, len(T)))
+        again = self._ill(again, found, T, locked, last=True) if len(again) else again
+        for search in (self._in_valleys, self._scattered):
+            if not len(again):
+                break
+            more = search(T[again], _values_at(locked, again))
+            found = self._sharp(self._joined_with(found, again, more))
+            found = replace(found, unsure=self._unsure(again, found, T, locked))
+            if not self.virtual:
+                odd = np.bincount(found.pose, minlength=len(T))[again] % 2 == 1
+                again = np.union1d(found.unsure, again[odd])
         return found
+
+    def _joined_with(self, found: Found, poses: Indices, more: Found) -> Found:
+        """Return solutions of N poses, and more of some of these."""
+        return self.distinct(joined([found, more.among(poses)], self.arm.n))
 
     def _unsure(self, poses: Indices, found: Found, T: Array, locked: Mapping[int, Array]) -> Indices:
         """Return of some poses those that may have more solutions: fewer were found than near by poses have."""
@@ -192,15 +205,11 @@ class Method:
         # where solutions have met, one stands for two
         met = np.where(found.sigma < _MET, 2, 1)
         counts = np.bincount(found.pose, weights=met, minlength=len(T))[poses]
-        values = {joint: q if len(q) == 1 else q[poses] for joint, q in locked.items()}
-        rng = np.random.default_rng(_SEED)
-        sure = (counts > 0) & (counts % 2 == 0)
-        for _ in range(_NEAR_BY):
-            near = T[poses] @ _small_motions(rng, 1, _APART)[0]
-            sure &= (
-                np.bincount(self.solve_by(self.eliminations[0], near, values).pose, minlength=len(poses)) <= counts
-            )
-        unsure: Indices = poses[np.logical_not(sure)]
+        motions = small_motions(np.random.default_rng(_SEED), _NEAR_BY, _APART)
+        near = (T[poses, None] @ motions).reshape(-1, 4, 4)
+        near_by = self.solve_by(self.eliminations[0], near, _values_at(locked, np.repeat(poses, _NEAR_BY)))
+        most = np.bincount(near_by.pose, minlength=len(near)).reshape(-1, _NEAR_BY).max(axis=1)
+        unsure: Indices = poses[(counts == 0) | (counts % 2 == 1) | (most > counts)]
         return unsure
 
     @staticmethod
@@ -247,43 +256,41 @@ class Method:
 
     def _condition(self, poses: Indices, T: Array, locked: Mapping[int, Array], *, all_of_them: bool) -> Array:
         """Return how ill-conditioned the first, or else the best elimination is at some poses."""
-        values = {joint: q if len(q) == 1 else q[poses] for joint, q in locked.items()}
-        loop = close_loop(self.arm, T[poses], values, self.virtual)
+        loop = close_loop(self.arm, T[poses], _values_at(locked, poses), self.virtual)
         condition = self.eliminations[0].condition(loop)
         for other in self.eliminations[1:] if all_of_them else ():
             if not isinstance(other, Nudged):  # which is regular where the arm itself is singular
                 condition = np.minimum(condition, other.condition(loop))
         return condition
 
-    def _searched(self, T: Array, locked: Mapping[int, Array]) -> Found:
-        """Return what is found in other ways: the last resort where all eliminations are ill-conditioned.
-
-        That is, in the valleys that lead through what eliminations leave, and by Levenberg-Marquardt's steps from
-        scattered starts.
-        """
+    def _scattered(self, T: Array, locked: Mapping[int, Array]) -> Found:
+        """Return what Levenberg-Marquardt's steps from scattered starts find: the last resort."""
         starts = scattered_configurations(self.ranges[:, 0], self.ranges[:, 1], _STARTS)
         pose = np.repeat(np.arange(len(T)), _STARTS)
         q = np.tile(starts, (len(T), 1))
         for joint, value in locked.items():
             q[:, joint] = value[0] if len(value) == 1 else value[pose]
-        parts = [self.polished(pose, q, T, gate=math.inf)]
-        pose, q, error = self._stuck(T, locked)
-        for k in dict.fromkeys(pose.tolist()) if int(self.moving.sum()) == 6 else ():
-            own = np.flatnonzero(pose == k)
-            near = near_solutions(self.arm, q[own[np.argsort(error[own])]], T[k], self.moving)
-            parts.append(self.polished(np.full(len(near), k), near, T))
-        return _joined(parts, self.arm.n)
+        return self.polished(pose, q, T, gate=math.inf)
 
-    def _stuck(self, T: Array, locked: Mapping[int, Array]) -> tuple[Indices, Array, Array]:
-        """Return configurations of eliminations that almost reach poses, with their poses and errors."""
-        parts = []
-        for elimination in self.eliminations:
-            pose, q = self._candidates(elimination, T, locked)
-            q, error, _ = polish(self.arm, q, T[pose], self.moving, gate=_GATE)
-            stuck = (error > CONVERGED) & (error < _STUCK)
-            parts.append((pose[stuck], q[stuck], error[stuck]))
-        pose, q, error = (np.concatenate(each) for each in zip(*parts, strict=True))
-        return pose, q, error
+    def _in_valleys(self, T: Array, locked: Mapping[int, Array]) -> Found:
+        """Return what is found in the valleys that lead through what eliminations leave."""
+        if not self.eliminations or int(self.moving.sum()) != 6:
+            return joined([], self.arm.n)
+        pose, q = self._stuck(T, locked)
+        which, q = near_solutions(self.arm, q, T[pose], self.moving)
+        pose = pose[which]
+        frame, J = pose_and_jacobian(self.arm, q)
+        error = np.linalg.norm(pose_error(frame, T[pose]), axis=1)
+        near = self.distinct(Found(pose=pose, q=q, sigma=np.zeros(len(q)), error=error, J=J))
+        return self.polished(near.pose, refine(self.arm, near.q, T[near.pose], self.moving)[0], T)
+
+    def _stuck(self, T: Array, locked: Mapping[int, Array]) -> tuple[Indices, Array]:
+        """Return configurations of eliminations that almost reach poses, and their poses."""
+        parts = [self._candidates(elimination, T, locked) for elimination in self.eliminations]
+        pose, q = (np.concatenate(each) for each in zip(*parts, strict=True))
+        q, error, _ = polish(self.arm, q, T[pose], self.moving, gate=_GATE)
+        stuck = (error > CONVERGED) & (error < _STUCK)
+        return pose[stuck], q[stuck]
 
     def solve_by(self, elimination: Elimination, T: Array, locked: Mapping[int, Array]) -> Found:
         """Return the solutions of N poses that one elimination leads to."""
@@ -350,107 +357,7 @@ class Method:
         return replace(found.of(chosen), q=q[chosen])
 
 
-def choose_method(arm: Arm, moving: Flags, ranges: Array) -> Method:
-    """Try the eliminations of an arm and return how its poses are solved.
-
-    Args:
-        arm: The arm.
-        moving: Which joints are not locked, bool, shape (n,): at most six.
-        ranges: Where trial configurations are drawn from, in the arm's units, shape (n, 2).
-    """
-    if not moving.any():
-        return Method(arm=arm, moving=moving, ranges=ranges, virtual=(), eliminations=(), found_share=1.0)
-    rng = np.random.default_rng(_SEED)
-    missing = 6 - int(moving.sum())
-    q = rng.uniform(ranges[:, 0], ranges[:, 1], (2 * TRIALS, arm.n))
-    J = pose_and_jacobian(arm, q)[1][:, :, moving]
-    q = q[np.sort(np.argsort(-np.linalg.svd(J, compute_uv=False)[:, -1])[:TRIALS])]  # away from singular ones
-    # three virtual joints make a wrist, unless that leaves the others with a point that they cannot move freely
-    wrists = (True, False) if missing == 3 else (False,)
-    methods = [_tried(arm, moving, ranges, q, _virtual_links(missing, rng, wrist=wrist), rng) for wrist in wrists[:1]]
-    if methods[0].found_share < 1.0 and len(wrists) > 1:
-        methods.append(_tried(arm, moving, ranges, q, _virtual_links(missing, rng, wrist=False), rng))
-    return max(methods, key=lambda method: method.found_share)
-
-
-def _tried(
-    arm: Arm, moving: Flags, ranges: Array, q: Array, virtual: tuple[Array, ...], rng: np.random.Generator
-) -> Method:
-    """Return the best eliminations for the poses that trial configurations reach."""
-    T = np.zeros((len(q), 4, 4))
-    T[:, :3], T[:, 3, 3] = pose_and_jacobian(arm, q)[0], 1.0
-    locked = {int(joint): q[:, joint] for joint in np.flatnonzero(np.logical_not(moving))}
-    loop = close_loop(arm, T, locked, virtual)
-    J = pose_and_jacobian(arm, q)[1]
-    drawn = Found(pose=np.arange(len(q)), q=q, sigma=np.ones(len(q)), error=np.zeros(len(q)), J=J)
-    bare = Method(arm=arm, moving=moving, ranges=ranges, virtual=virtual, eliminations=(), found_share=0.0)
-    trials: list[_Trial] = []
-    share = 0.0
-    nudges = _small_motions(rng, 6, _NUDGE)
-    nudged = loop.moved(nudges)
-    for seen, hidden in ((loop, (0,)), (loop, (1, 2)), (nudged, (0,)), (nudged, (1, 2))):
-        for elimination in _eliminations(seen, hidden, rng):
-            used = elimination if seen is loop else Nudged(elimination=elimination, nudges=nudges)
-            few = bare.solve_by(used, T[:_FIRST], {joint: value[:_FIRST] for joint, value in locked.items()})
-            if _own(bare, few, drawn) >= _FIRST // 2:
-                found = bare.solve_by(used, T, locked)
-                own, condition = _own(bare, found, drawn), float(np.median(elimination.condition(seen)))
-                trials.append(_Trial(elimination=used, found=found, own=own, condition=condition))
-        trials.sort(key=lambda trial: trial.rank)
-        union = bare.distinct(_joined([drawn, *(trial.found for trial in trials)], arm.n))
-        ours = bare.distinct(_joined([trial.found for trial in trials[:2]], arm.n))
-        share = len(ours.pose) / len(union.pose)
-        if share == 1.0 and not bare.doubtful(ours, len(q)).any():
-            break
-    best = [trial.elimination for trial in trials[:2]]
-    # near a singularity another kind may be regular, and at one an arm that is nearly the same
-    others = [trial.elimination for trial in trials[2:] if trials[0].is_another(trial)]
-    best += [
-        *others[:1],
-        *(Nudged(elimination=elimination, nudges=_small_motions(rng, 6, _NUDGE)) for elimination in best[:1]),
-    ]
-    return replace(bare, eliminations=tuple(best), found_share=share)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Trial:
-    """How an elimination did."""
-
-    elimination: Elimination
-    found: Found
-    own: int
-    """How many of the drawn configurations it found."""
-    condition: float
-
-    @property
-    def rank(self) -> tuple[int, int, float]:
-        """Sort the best first: what finds most, then what is conditioned best."""
-        return -self.own, -len(self.found.pose), self.condition
-
-    def is_another(self, other: _Trial) -> bool:
-        """Whether another elimination is of another kind, and found as much."""
-        wrists = [getattr(trial.elimination, "wrist", None) for trial in (self, other)]
-        return wrists[0] != wrists[1] and self.own == other.own
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Nudged:
-    """An elimination of an arm whose links are a little different, where that of the arm itself is singular."""
-
-    elimination: Elimination
-    nudges: Array = field(repr=False)
-    """Small motions of the six links, shape (6, 4, 4)."""
-
-    def candidates(self, loop: Loop) -> Candidates:
-        """Return configurations near all solutions of N poses, and some that are none."""
-        return self.elimination.candidates(loop.moved(self.nudges))
-
-    def condition(self, loop: Loop) -> Array:
-        """Return how ill-conditioned the elimination is at N poses, shape (N,)."""
-        return self.elimination.condition(loop.moved(self.nudges))
-
-
-def _small_motions(rng: np.random.Generator, count: int, size: float) -> Array:
+def small_motions(rng: np.random.Generator, count: int, size: float) -> Array:
     """Return random motions of about a size, in lengths of the arm and rad, shape (count, 4, 4)."""
     motions = np.zeros((count, 4, 4))
     turns, shifts = size * rng.normal(size=(2, count, 3))
@@ -463,48 +370,9 @@ def _small_motions(rng: np.random.Generator, count: int, size: float) -> Array:
     return motions
 
 
-def _eliminations(loop: Loop, hidden: tuple[int, ...], rng: np.random.Generator) -> Iterator[Elimination]:
-    """Yield the eliminations that may suit a ring, with the first or another joint as the eigenvalue of pencils."""
-    slides = [i for i, turns in enumerate(loop.turns) if not turns]
-    both = (False, True)
-    if len(slides) == 3:
-        yield ThreeSlides()
-    elif len(slides) == 2 and slides[1] - slides[0] == 3:
-        yield from (OppositeSlides(first=first, backwards=backwards) for first, backwards in product(slides, both))
-    else:
-        wrists = product((True,), (0, 1), both, range(6)) if 0 in hidden else ()
-        for wrist, which, backwards, first in chain(wrists, product((False,), hidden, both, range(6))):
-            pencil = build_pencil(loop, first, backwards=backwards, wrist=wrist, hidden=which, rng=rng)
-            if pencil is not None:
-                yield pencil
-
-
-def _own(method: Method, found: Found, drawn: Found) -> int:
-    """Return how many of the drawn configurations are among the solutions found."""
-    drawn = drawn.of(drawn.pose <= found.pose.max(initial=-1))
-    both = method.distinct(_joined([found, drawn], method.arm.n))
-    return len(found.pose) + len(drawn.pose) - len(both.pose)
-
-
-def _virtual_links(count: int, rng: np.random.Generator, *, wrist: bool) -> tuple[Array, ...]:
-    """Return links around virtual joints: random, so that the ring is not singular; their product is the identity.
-
-    Those of a wrist meet in a point, which then is all that the other joints have to reach.
-    """
-    if count == 0:
-        return ()
-    links = []
-    for k in range(count):
-        K = np.eye(4)
-        K[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        K[:3, :3] *= np.sign(np.linalg.det(K[:3, :3]))
-        if k == 0 or not wrist:
-            K[:3, 3] = rng.choice([-1.0, 1.0], 3) * rng.uniform(0.3, 0.8, 3)
-        links.append(K)
-    product = np.eye(4)
-    for K in links:
-        product = product @ K
-    return (*links, inverse_poses(product))
+def _values_at(locked: Mapping[int, Array], poses: Indices) -> Mapping[int, Array]:
+    """Return the locked joints' coordinates at some poses."""
+    return {joint: q if len(q) == 1 else q[poses] for joint, q in locked.items()}
 
 
 def _extents(q: Array, turns: Flags) -> Array:
@@ -517,7 +385,8 @@ def _wrapped(q: Array) -> Array:
     return np.asarray(q - 2.0 * np.pi * np.round(q / (2.0 * np.pi)))
 
 
-def _joined(parts: list[Found], n: int) -> Found:
+def joined(parts: list[Found], n: int) -> Found:
+    """Return the solutions of several parts, for an arm of n joints."""
     none = Found(
         pose=np.zeros(0, dtype=np.intp),
         q=np.zeros((0, n)),
@@ -525,5 +394,5 @@ def _joined(parts: list[Found], n: int) -> Found:
         error=np.zeros(0),
         J=np.zeros((0, 6, n)),
     )
-    joined = {f.name: np.concatenate([getattr(part, f.name) for part in (none, *parts)]) for f in fields(Found)}
-    return Found(**joined)
+    values = {f.name: np.concatenate([getattr(part, f.name) for part in (none, *parts)]) for f in fields(Found)}
+    return Found(**values)

@@ -19,7 +19,7 @@ _NEAR = 1e-3
 """What is not as near as that to its pose after a few steps is not on its way to a solution nearby."""
 _LONGEST = 1.0
 """Longest step of a coordinate, rad or lengths of the arm."""
-_CAREFUL_STEPS = 100
+_CAREFUL_STEPS = 30
 _EXACT = 2e-15
 """What is left of a pose where careful steps end."""
 _PROBE = 1e-3

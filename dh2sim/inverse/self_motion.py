@@ -59,27 +59,20 @@ def follow(arm: Arm, q: Array, T: Array, moving: NDArray[np.bool_]) -> Path:
     Returns:
         The curve, both ways from ``q`` until it closes or cannot be followed any farther.
     """
-    points, closed = PoseCurve(arm, T, moving).both_ways(q)
-    return Path(q=points, closed=closed)
+    curve = _Curve(arm, T, moving)
+    ahead, closed = curve.followed(q, 1.0)
+    if closed:
+        return Path(q=ahead, closed=True)
+    back, _ = curve.followed(q, -1.0)
+    return Path(q=np.concatenate([back[:0:-1], ahead]), closed=False)
 
 
-class PoseCurve:
+class _Curve:
     """The configurations that reach one pose."""
 
-    longest = LONGEST
-
     def __init__(self, arm: Arm, T: Array, moving: NDArray[np.bool_]) -> None:
-        self.arm, self.T = arm, T[None]
-        self._moving = moving
+        self._arm, self._T, self._moving = arm, T[None], moving
         self._turns = np.array(arm.turns)
-
-    def both_ways(self, start: Array) -> tuple[Array, bool]:
-        """Return points of the curve on both sides of one of them, shape (m, n), and whether they close."""
-        ahead, closed = self.followed(start, 1.0)
-        if closed:
-            return ahead, True
-        back, _ = self.followed(start, -1.0)
-        return np.concatenate([back[:0:-1], ahead]), False
 
     def followed(self, start: Array, sign: float) -> tuple[Array, bool]:
         """Return points from ``start`` on in one direction, and whether they lead back to it."""
@@ -87,7 +80,7 @@ class PoseCurve:
         q, direction, step = start, first, FIRST
         points = [start]
         while len(points) < MOST:
-            reached = self.onto(q + step * direction)
+            reached = self._onto(q + step * direction)
             ahead = None if reached is None else self._direction(reached[1], direction)
             if reached is None or ahead is None or float(ahead @ direction) < STRAIGHT:
                 step *= 0.5
@@ -100,16 +93,14 @@ class PoseCurve:
             if (np.abs(there - start) > np.where(self._turns, WOUND, FAR)).any():
                 return np.array(points), False
             points.append(there)
-            if self.ends(there):
-                return np.array(points), False
-            q, direction, step = there, ahead, min(1.5 * step, self.longest)
+            q, direction, step = there, ahead, min(1.5 * step, LONGEST)
         return np.array(points), False
 
     def _first_direction(self, q: Array) -> Array:
         """Return a unit vector along a curve through ``q``: of several, one that goes on."""
-        directions = null_directions(self.arm, q, self._moving)
+        directions = null_directions(self._arm, q, self._moving)
         for direction in directions if len(directions) > 1 else ():
-            reached = self.onto(q + FIRST * direction)
+            reached = self._onto(q + FIRST * direction)
             if reached is not None and float(np.linalg.norm(reached[0] - q - FIRST * direction)) < 0.1 * FIRST:
                 return np.asarray(direction)
         return np.asarray(directions[-1])
@@ -122,28 +113,24 @@ class PoseCurve:
         length = float(np.linalg.norm(direction))
         return direction / length if length > 0.0 else direction
 
-    def onto(self, q: Array) -> tuple[Array, Array] | None:
+    def _onto(self, q: Array) -> tuple[Array, Array] | None:
         """Return the point of the curve near ``q``, and the Jacobian of the joints that move; None if it is far."""
         q = q.copy()
         for _ in range(6):
-            error, J = self.error(q)
+            error, J = self._error(q)
             if float(np.abs(error).max()) <= ON_POSE:
                 return q, J
             move = np.linalg.lstsq(J, error, rcond=FLAT)[0]
-            if float(np.abs(move).max(initial=0.0)) > 4.0 * self.longest:
+            if float(np.abs(move).max(initial=0.0)) > 4.0 * LONGEST:
                 return None
             q[self._moving] += move
-        error, J = self.error(q)
+        error, J = self._error(q)
         return (q, J) if float(np.abs(error).max()) <= 100.0 * ON_POSE else None
 
-    def error(self, q: Array) -> tuple[Array, Array]:
+    def _error(self, q: Array) -> tuple[Array, Array]:
         """Return what is left to the pose, shape (6,), and the Jacobian of the joints that move."""
-        frame, J = pose_and_jacobian(self.arm, q[None])
-        return pose_error(frame, self.T)[0], J[0][:, self._moving]
-
-    def ends(self, q: Array) -> bool:  # noqa: ARG002
-        """Return whether the curve ends at a point for another reason than that it cannot be followed."""
-        return False
+        frame, J = pose_and_jacobian(self._arm, q[None])
+        return pose_error(frame, self._T)[0], J[0][:, self._moving]
 
     def _passes(self, start: Array, q: Array, there: Array) -> bool:
         """Return whether a step leads past the start, angles modulo whole turns."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError
 from dh2sim.inverse.branches import branch_names
-from dh2sim.inverse.elimination import Found, Method, choose_method
+from dh2sim.inverse.elimination import Found, Method
 from dh2sim.inverse.families import family_kind, moving_joints, split_families
 from dh2sim.inverse.goals import Free, read_goals, require_free
 from dh2sim.inverse.loop import Arm, Flags, Indices, build_arm, joint_rank, pose_and_jacobian
@@ -31,6 +31,7 @@ from dh2sim.inverse.reach import limits_reason, position_limits, why_unreachable
 from dh2sim.inverse.redundancy import SAMPLES, curves_and_nearest, joints_to_lock, self_motions
 from dh2sim.inverse.self_motion import LONGEST, SELF_MOTION, Path
 from dh2sim.inverse.solutions import Solutions
+from dh2sim.inverse.trial import choose_method
 from dh2sim.inverse.turns import Turns
 from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, spec_of
 from dh2sim.messages import did_you_mean, listed, shown

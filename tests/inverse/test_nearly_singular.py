@@ -19,8 +19,8 @@ WRIST_TOO = [-0.935642, 1.007584, 1.85578127e-03, -0.401353, 5.45290418e-05, -1.
 @pytest.mark.parametrize(
     "q",
     [
-        pytest.param(FAR_OFF, id="eliminations are far off", marks=pytest.mark.slow),
-        pytest.param(IN_THE_VALLEY, id="rounding leaves others in the valley", marks=pytest.mark.slow),
+        pytest.param(FAR_OFF, id="eliminations are far off"),
+        pytest.param(IN_THE_VALLEY, id="rounding leaves others in the valley"),
         pytest.param(WRIST_TOO, id="wrist nearly singular, too"),
     ],
 )
