@@ -111,6 +111,7 @@ def test_json_tells_the_same_alone(run: Path, arrays: Arrays) -> None:
         "stopped": [{"rollout": 4, "reason": "bad_qacc", "step": 5}],
         "touched": 1,
         "first_contact": {"rollout": 2, "step": 3, "time": 0.006, "links": ["base_link", "link_3"]},
+        "loop_gap": None,
         "saturated": 7,
         "saturated_joints": {"slide": 7},
         "steps": 8,
