@@ -50,22 +50,27 @@ class DynamicsEngine(PoseEngine, Protocol):
         ...
 
 
-def present_frames(path: str, found: Sequence[str], rows: int, *, dh_frames_required: bool) -> tuple[str, ...]:
-    """Return those of dh_0 … dh_n and tool0 that a file has.
+def present_frames(
+    path: str, found: Sequence[str], rows: int | Sequence[str], *, dh_frames_required: bool
+) -> tuple[str, ...]:
+    """Return those of dh_0 … dh_n and tool0 that a file has, or the frames of a mechanism.
 
     Args:
         path: Of the file, for the message.
         found: Names of all frames in the file.
-        rows: Number of rows of the table.
+        rows: Number of rows of the table; or the names of a mechanism's frames, all of which must be there.
         dh_frames_required: Whether a file may leave out all DH frames (never only some of them).
 
     Raises:
         EngineError: tool0 or a DH frame is missing.
     """
-    dh = [f"dh_{i}" for i in range(rows + 1)]
     known = set(found)
-    some = dh_frames_required or any(name in known for name in dh)
-    wanted = [*dh, "tool0"] if some else ["tool0"]
+    if isinstance(rows, int):
+        dh = [f"dh_{i}" for i in range(rows + 1)]
+        some = dh_frames_required or any(name in known for name in dh)
+        wanted = [*dh, "tool0"] if some else ["tool0"]
+    else:
+        wanted = list(rows)
     missing = [name for name in wanted if name not in known]
     if missing:
         raise EngineError(f"{path}: frame not found: {', '.join(missing)}")

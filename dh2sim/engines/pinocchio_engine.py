@@ -22,13 +22,13 @@ class PinocchioEngine:
     name = "pinocchio"
     inertia_rounding = 0.0
 
-    def __init__(self, path: Path, joints: Sequence[str], rows: int) -> None:
+    def __init__(self, path: Path, joints: Sequence[str], rows: int | Sequence[str]) -> None:
         """Read a file.
 
         Args:
             path: A .urdf file.
             joints: Names of the moving joints, in the order of a joint vector.
-            rows: Number of rows of the table.
+            rows: Number of rows of the table, or the names of a mechanism's frames.
 
         Raises:
             ImportError: pinocchio is not installed.

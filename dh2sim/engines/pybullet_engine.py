@@ -31,13 +31,13 @@ class PybulletEngine:
     inertia_rounding = 1e-5
     """It turns a tensor until what is left beside the diagonal is below 1e-6 of its trace, and drops that."""
 
-    def __init__(self, path: Path, joints: Sequence[str], rows: int) -> None:
+    def __init__(self, path: Path, joints: Sequence[str], rows: int | Sequence[str]) -> None:
         """Read a file.
 
         Args:
             path: A .urdf file.
             joints: Names of the moving joints, in the order of a joint vector.
-            rows: Number of rows of the table.
+            rows: Number of rows of the table, or the names of a mechanism's frames.
 
         Raises:
             ImportError: PyBullet is not installed.

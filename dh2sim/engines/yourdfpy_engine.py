@@ -30,13 +30,13 @@ class YourdfpyEngine:
 
     name = "yourdfpy"
 
-    def __init__(self, path: Path, joints: Sequence[str], rows: int) -> None:
+    def __init__(self, path: Path, joints: Sequence[str], rows: int | Sequence[str]) -> None:
         """Read a file.
 
         Args:
             path: A .urdf file.
             joints: Names of the moving joints, in the order of a joint vector.
-            rows: Number of rows of the table.
+            rows: Number of rows of the table, or the names of a mechanism's frames.
 
         Raises:
             EngineError: yourdfpy refuses the file, or frames or joints are missing.
@@ -46,7 +46,7 @@ class YourdfpyEngine:
             import yourdfpy  # noqa: F401  raises what says why
         self._path = path
         file = {"name": str(path), "path": str(path.absolute())}
-        self._request = {**file, "joints": list(joints), "rows": rows}
+        self._request = {**file, "joints": list(joints), "rows": rows if isinstance(rows, int) else list(rows)}
         self.frames, _ = self._ask(np.empty((0, len(joints))))
 
     def frame_poses(self, q: Array) -> Array:

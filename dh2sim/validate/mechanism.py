@@ -9,9 +9,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from dh2sim.engines.mujoco_mechanism import MujocoMechanism
-from dh2sim.errors import EngineError
+from dh2sim.engines.pinocchio_engine import PinocchioEngine
+from dh2sim.engines.pybullet_engine import PybulletEngine
+from dh2sim.engines.yourdfpy_engine import YourdfpyEngine
+from dh2sim.errors import EngineCapacityError, EngineError
 from dh2sim.export import export_robot
+from dh2sim.files import signals_deferred
 from dh2sim.kinematics.loop_closure import constraint_jacobian
+from dh2sim.kinematics.parallelograms import find_couplings
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.kinematics.table_oracle import table_mechanism_frames
 from dh2sim.kinematics.transforms import pose_errors
@@ -24,12 +29,14 @@ GAP_LIMIT = 1e-3
 """Of loops in motion, in sizes of the mechanism, and rad."""
 _MOST_SAMPLES = 100
 """Configurations that one is computed at a time for."""
+_OTHERS_SAMPLES = 20
+"""Configurations of the readers of URDF that are not MuJoCo."""
 
 
 def validate_mechanism(
     model: MechanismModel, *, samples: int = 1000, seed: int = 0, tolerance: float = 1e-12, folder: Path | None = None
 ) -> RobotReport:
-    """Compare the library and MuJoCo with the tables of a mechanism, and MuJoCo's loops with ours.
+    """Compare the library and all engines with the tables of a mechanism, and MuJoCo's loops with ours.
 
     Args:
         model: The mechanism.
@@ -65,7 +72,51 @@ def validate_mechanism(
                 checks += _loops(read, model, tolerance)
         except (EngineError, KeyError) as error:
             checks.append(Check(engine=engine, quantity=Quantity.FILE, ok=False, reason=str(error)))
+    checks += _other_readers(folder / f"{model.name}.urdf", model, q[:_OTHERS_SAMPLES], tolerance)
     return RobotReport(name=model.name, samples=len(q), reach=model.size, checks=tuple(checks))
+
+
+def _other_readers(path: Path, model: MechanismModel, q: Array, tolerance: float) -> list[Check]:
+    """Compare the poses of the tree that other programs read from a URDF with the table."""
+    names = [joint.name for joint in model.moving_joints]
+    couplings = find_couplings(model.spec).joints if model.tree.closures else {}
+    checks = []
+    for engine, make, package in (
+        ("yourdfpy", YourdfpyEngine, "'dh2sim[engines]'"),
+        ("pinocchio", PinocchioEngine, "pin"),
+        ("pybullet", PybulletEngine, "pybullet"),
+    ):
+        if not path.is_file():
+            continue  # which is said of MuJoCo
+        own, vectors = list(range(len(names))), q
+        if make is YourdfpyEngine:  # the only one that moves joints that mimic others
+            vectors = q.copy()
+            for k, coupling in couplings.items():
+                vectors[:, k] = coupling.sign * q[:, coupling.root] + coupling.offset
+            own = [k for k in own if k not in couplings]
+        table = [table_mechanism_frames(model.spec, vector) for vector in vectors]
+        if make is PybulletEngine:  # which tells nothing of the link that is its base
+            table = [{frame: T for frame, T in poses.items() if frame != "base_link"} for poses in table]
+        try:
+            with signals_deferred():
+                reader = make(path, [names[k] for k in own], tuple(table[0]))
+            poses = reader.frame_poses(np.ascontiguousarray(vectors[:, own]))
+        except ImportError as error:
+            reason = f"not installed ({error}); pip install {package}"
+            checks.append(Check(engine=engine, quantity=Quantity.POSE, ok=None, reason=reason))
+        except EngineCapacityError as error:
+            checks.append(Check(engine=engine, quantity=Quantity.POSE, ok=None, reason=str(error)))
+        except EngineError as error:
+            checks.append(Check(engine=engine, quantity=Quantity.FILE, ok=False, reason=str(error)))
+        except MemoryError:
+            raise
+        except Exception as error:  # a file may contain anything
+            reason = f"{engine} failed: {type(error).__name__}: {' '.join(str(error).split())}"
+            checks.append(Check(engine=engine, quantity=Quantity.FILE, ok=False, reason=reason))
+        else:
+            found = [dict(zip(reader.frames, each, strict=True)) for each in poses]
+            checks.append(_poses(engine, model, found, table, vectors, tolerance))
+    return checks
 
 
 def _poses(

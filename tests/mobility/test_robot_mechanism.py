@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from dh2sim import Robot, find_mobility, parse_robot
 from dh2sim.kinematics.loop_closure import assembly, constraint_jacobian
+from dh2sim.kinematics.loop_motion import mechanism_pose
 from dh2sim.mobility.result import Mobility
 from dh2sim.robot.catalog import builtin_mechanisms, builtin_path, builtin_robots
 from dh2sim.robot.read import load_robot
@@ -161,3 +163,72 @@ def test_an_assembly_that_cannot_be_closed_is_refused_with_its_place(tmp_path: P
     result = dh2sim("mobility", file)
     assert result.status == 2
     assert result.err.startswith(f"dh2sim: {file}:20:15: assembly.q: the loops cannot be closed: C stays open by")
+
+
+def test_schatzs_linkage_turns_inside_out() -> None:
+    """P. Schatz's six-bar (1942): three equal lengths, right angles, sqrt(3) times as much on the ground."""
+    text = """parameters: {a: 0.5, R: 0.4}
+joints:
+  - {type: revolute, d: R, alpha: 90}
+  - {type: revolute, a: a, alpha: 90}
+  - {type: revolute, a: a, alpha: 90}
+  - {type: revolute, a: a, alpha: 90}
+  - {type: revolute, alpha: 90}
+branches:
+  ground: {from: base_link, pose: {xyz: [-sqrt(3) * a, 0, 0]}, joints: [{type: fixed, d: R}]}
+closures:
+  - {name: loop, between: [dh_5, ground/dh_1], type: revolute}
+actuated: [joint_1]
+assembly: {q: [20, 60, 120, 120, 60]}
+"""
+    found = of(text)
+    assert (found.gruebler, found.instantaneous, found.finite) == (0, 1, 1)
+    rigid = of(text.replace("d: R}]", "d: -R}]").replace("actuated: [joint_1]\n", ""))
+    assert (rigid.gruebler, rigid.finite) == (0, 0), "the offsets on both sides of the ground must be equal"
+
+
+def test_goldbergs_linkage_is_two_of_bennetts() -> None:
+    """M. Goldberg (1943): Bennett loops (a, b) and (b, c) share a link of length b, which is taken out."""
+    angles = {"a": 40.0, "b": 70.0, "c": 25.0}
+    a, b, c = (math.sin(math.radians(angle)) for angle in angles.values())
+    text = f"""joints:
+  - {{type: revolute, a: {b!r}, alpha: 70}}
+  - {{type: revolute, a: {a + c!r}, alpha: 65}}
+  - {{type: revolute, a: {b!r}, alpha: 70}}
+  - {{type: revolute, a: {c!r}, alpha: 25}}
+  - {{type: fixed, a: {a!r}, alpha: 40}}
+closures: [{{name: loop, between: [dh_5, base_link], type: revolute}}]
+assembly: {{q: [120, -60, 120, -60]}}
+"""
+    found = of(text)
+    assert (found.gruebler, found.instantaneous, found.finite) == (-1, 1, 1)
+
+
+def test_peaucelliers_linkage_draws_a_straight_line() -> None:
+    text = """name: peaucellier
+convention: standard
+units: {angle: deg}
+tool: {xyz: [0, 0, 0]}
+joints:
+  - {type: revolute, a: 3}
+  - {type: revolute, a: 1}
+branches:
+  bar: {from: dh_1, joints: [{type: revolute, a: 1}]}
+  arm: {from: base_link, joints: [{type: revolute, a: 3}, {type: revolute, a: 1}]}
+  bar_2: {from: arm/dh_1, joints: [{type: revolute, a: 1}]}
+  crank: {from: base_link, pose: {xyz: [1.2, 0, 0]}, joints: [{type: revolute, a: 1.2}]}
+closures:
+  - {name: near, between: [dh_2, arm/dh_2], type: revolute}
+  - {name: far, between: [bar/dh_1, bar_2/dh_1], type: revolute}
+  - {name: P, between: [dh_2, crank/dh_1], type: revolute}
+actuated: [crank_joint_1]
+assembly: {q: [15, -160, -60, -15, 160, 60, 20]}
+"""
+    found = find_mobility(parse_robot(text))
+    assert (found.gruebler, found.instantaneous, found.finite) == (1, 1, 1)
+    line = [
+        mechanism_pose(parse_robot(text), [math.radians(angle)], "bar/dh_1")[0, 3] for angle in (-40, -10, 20, 50)
+    ]
+    assert np.allclose(line, (3**2 - 1**2) / (2 * 1.2), rtol=0, atol=1e-11), (
+        "inversion of a circle through its centre"
+    )

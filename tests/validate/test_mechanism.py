@@ -9,9 +9,11 @@ import pytest
 
 from dh2sim import Robot
 from dh2sim.robot.catalog import builtin_mechanisms
+from dh2sim.validate.mechanism import validate_mechanism
 from tests.program import dh2sim
 
 LOOPS = ["loops at home", "freedoms of loops", "loops in motion"]
+OTHERS = ["yourdfpy", "pinocchio", "pybullet"]
 COSTLY = [name if name == "four_bar" else pytest.param(name, marks=pytest.mark.slow) for name in builtin_mechanisms()]
 
 
@@ -23,7 +25,8 @@ def test_mechanisms_that_come_with_dh2sim_match_their_tables(name: str) -> None:
     report = robot.validate()
     assert report.ok, [check for check in report.checks if not check.ok]
     poses = [check for check in report.checks if check.quantity == "pose"]
-    assert [check.engine for check in poses] == ["dh2sim", "mujoco-mjcf", "mujoco-urdf"]
+    assert [check.engine for check in poses] == ["dh2sim", "mujoco-mjcf", "mujoco-urdf", *OTHERS]
+    assert all(check.reason for check in poses if check.ok is None), "absent ones say why"
     if robot.spec.closures:
         assert [check.quantity for check in report.checks if check.reference == "loops"] == LOOPS
 
@@ -45,6 +48,26 @@ def test_a_constraint_that_is_missing_or_moved_fails(tmp_path: Path) -> None:
     path.write_text(exported, encoding="utf-8")
     _changed(path, '<body name="rocker/link_1" pos="2.0', '<body name="rocker/link_1" pos="2.001')
     assert _failed(tmp_path)[:2] == ["pose", "loops at home"]
+
+
+def test_readers_of_urdf_find_what_was_moved_in_the_tree_and_in_what_mimics(tmp_path: Path) -> None:
+    robot = Robot.load("parallel_four_bar")
+    robot.export(tmp_path)
+    folder = tmp_path / "parallel_four_bar"
+    path = folder / "parallel_four_bar.urdf"
+    exported = path.read_text(encoding="utf-8")
+    _changed(path, 'multiplier="-1.0"', 'multiplier="-1.001"')
+    report = validate_mechanism(robot.mechanism, samples=5, folder=folder)
+    failed = [check.engine for check in report.checks if check.ok is False]
+    assert failed == [check.engine for check in report.checks if check.engine == "yourdfpy" and check.ok is not None]
+    path.write_text(exported.replace("<robot", "<robo"), encoding="utf-8")
+    report = validate_mechanism(robot.mechanism, samples=5, folder=folder)
+    present = [
+        "mujoco-urdf",
+        *(check.engine for check in report.checks if check.engine in OTHERS and not check.frames),
+    ]
+    assert [check.engine for check in report.checks if check.ok is False] == present
+    assert all(check.quantity == "file" for check in report.checks if check.ok is False)
 
 
 def _failed(folder: Path) -> list[str]:
