@@ -15,6 +15,7 @@ import numpy as np
 from dh2sim.calibrate.measurements import OTHER_KINDS, Kind, Measurements, grouped, problems_of
 from dh2sim.calibrate.parameters import rotation_of
 from dh2sim.errors import Dh2simError, MeasurementFileError, Problem
+from dh2sim.input_files import read_input
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import counted, did_you_mean, listed, member, shown
@@ -115,8 +116,7 @@ def read_measurements(
     name = os.fspath(path)
     wanted = None if kind is None else member(Kind, OTHER_KINDS.get(str(kind), str(kind)), "kind")
     try:
-        with Path(path).open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
+        data = read_input(Path(path), MAX_BYTES)
     except OSError as error:
         raise Dh2simError(f"{name}: cannot be read: {error.strerror or error}") from None
     report = _Report(name)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dh2sim.errors import Dh2simError, Problem
+from dh2sim.input_files import read_input
 from dh2sim.messages import shown
 from dh2sim.model.slips import SlipKind
 from dh2sim.validate.report import RobotReport
@@ -42,6 +43,8 @@ RULES: Final = {
     SlipKind.FAR_FRAMES.value: "Frames are far from the robot",
 }
 """Every rule, with what it finds."""
+MAX_BYTES: Final = 100_000_000
+"""Of a baseline."""
 _WARNINGS: Final = {kind.value for kind in SlipKind}
 
 
@@ -181,9 +184,13 @@ class Baseline:
             Dh2simError: It cannot be read, or is no baseline.
         """
         try:
-            content = json.loads(path.read_bytes())
+            data = read_input(path, MAX_BYTES)
         except OSError as error:
             raise Dh2simError(f"cannot read the baseline '{path}': {error.strerror or error}") from error
+        if len(data) > MAX_BYTES:
+            raise Dh2simError(f"{path}: is larger than {MAX_BYTES // 10**6} MB, the most that is read of a baseline")
+        try:
+            content = json.loads(data)
         except (ValueError, RecursionError) as error:
             raise Dh2simError(f"{path}: is not a baseline: {error}") from None
         if not isinstance(content, dict) or content.get("version") != _VERSION:

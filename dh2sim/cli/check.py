@@ -99,6 +99,8 @@ def check(
         raise typer.BadParameter("only with --changed-since", param_hint="--pictures")
     if baseline is not None and write_baseline is not None:
         raise typer.BadParameter("not together with --write-baseline", param_hint="--baseline")
+    if json_ and form not in ("text", "json"):
+        raise typer.BadParameter("not together with --format", param_hint="--json")
     from dh2sim.checking.files import find_robot_files
     from dh2sim.checking.findings import Baseline, CheckPart
     from dh2sim.checking.formats import ReportFormat, format_of, report_text

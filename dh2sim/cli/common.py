@@ -211,7 +211,11 @@ def complain(error: object) -> int:
 def _as_option(name: str, message: str) -> str:
     """Return what is wrong with an argument of the library, and with the one it excludes, in options' names."""
     option = f"--{name.replace('_', '-')} " if name else ""
-    return option + re.sub(r"(?<=\btogether with )(?=\w)", "--", message)
+    return option + re.sub(
+        r"\b(together with )(\w[\w-]*)(?:( or )(\w[\w-]*))?",
+        lambda found: "".join(part if k % 2 == 0 else f"--{part}" for k, part in enumerate(found.groups()) if part),
+        message,
+    )
 
 
 # ---------------------------------------------------------------------------- robots

@@ -41,6 +41,7 @@ def read_pose_file(path: str) -> PoseFile:
     Raises:
         Dh2simError: It cannot be read, or holds no pose; the text says everything that is wrong, and where.
     """
+    from dh2sim.input_files import read_input
     from dh2sim.robot.yaml_tree import MAX_BYTES, Report, compose, decode
 
     name = "<stdin>" if path == STDIN else path
@@ -48,8 +49,7 @@ def read_pose_file(path: str) -> PoseFile:
         if path == STDIN:
             data = sys.stdin.buffer.read(MAX_BYTES + 1)
         else:
-            with Path(path).open("rb") as stream:
-                data = stream.read(MAX_BYTES + 1)
+            data = read_input(Path(path), MAX_BYTES)
     except OSError as error:
         raise Dh2simError(f"{path}: cannot be read: {error.strerror or error}") from None
     report = Report(name)

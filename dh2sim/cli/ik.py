@@ -77,7 +77,12 @@ def ik(
     ] = None,
     no_limits: Annotated[bool, typer.Option("--no-limits", help="Ignore the joints' position limits.")] = False,
     numeric: Annotated[
-        bool, typer.Option("--numeric", help="Search one solution numerically, or the nearest configuration.")
+        bool,
+        typer.Option(
+            "--numeric",
+            help="Search one solution numerically, or the nearest configuration; needed where more than 50 joints "
+            "move.",
+        ),
     ] = False,
     explain: Annotated[
         bool, typer.Option("--explain", help="Print the textbook's steps, where it has some.")
@@ -304,8 +309,13 @@ def _solved(asked: _Asked, *, limits: bool, numeric: bool) -> Solutions:
     import numpy as np
 
     from dh2sim.inverse.self_motion import SELF_MOTION
-    from dh2sim.inverse.solver import InverseSolver
+    from dh2sim.inverse.solver import MOST_JOINTS, InverseSolver
 
+    moving = len(asked.spec.moving_rows) - len(asked.lock)
+    if not numeric and moving > MOST_JOINTS:
+        raise SettingsError(
+            [("numeric", f"is needed: {moving} joints move, and all solutions are found for at most {MOST_JOINTS}")]
+        )
     solver = InverseSolver(asked.spec)
     solutions: Solutions = solver.solve(asked.T, asked.near, limits, asked.lock, asked.free, numeric)
     if not limits or numeric or any(curve.kind == SELF_MOTION for curve in solutions.curves):

@@ -28,6 +28,8 @@ from dh2sim.typing import Array
 TOLERANCE = 1e-6
 """rad, and m for a reach of up to 1 m, then of the reach."""
 CONFIGURATIONS = 1000
+MOST_JOINTS = 64
+"""That move, of robots that are compared: time grows with their fourth power."""
 _LOOSER = (1e-5, 1e-4, 1e-3, 1e-2)
 """Tolerances at which robots that differ are compared once more."""
 
@@ -210,11 +212,26 @@ def diff(
         options_b: The same for ``b``.
 
     Raises:
-        Dh2simError: A file is wrong, or a robot has closed loops or branches.
+        Dh2simError: A file is wrong, or a robot has closed loops, branches, or more than ``MOST_JOINTS`` joints that
+            move.
     """
     if isinstance(tolerance, bool) or not isinstance(tolerance, int | float) or not 0.0 < tolerance < 1.0:
         raise Dh2simError(f"tolerance must be above 0 and below 1, got {tolerance!r}")
-    return compared(read_any(a, options_a), read_any(b, options_b), float(tolerance))
+    of_a, of_b = read_any(a, options_a), read_any(b, options_b)
+    for read in (of_a, of_b):
+        require_comparable(read.spec)
+    return compared(of_a, of_b, float(tolerance))
+
+
+def require_comparable(spec: RobotSpec) -> None:
+    """Refuse a robot whose comparison would take minutes.
+
+    Raises:
+        Dh2simError: More than ``MOST_JOINTS`` of its joints move.
+    """
+    count = len(spec.moving_rows)
+    if count > MOST_JOINTS:
+        raise Dh2simError(f"{spec.name}: {count} joints move; robots with at most {MOST_JOINTS} can be compared")
 
 
 def compared(a: ReadRobot, b: ReadRobot, tolerance: float, labels: tuple[str, str] = LABELS) -> Comparison:

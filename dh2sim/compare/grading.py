@@ -16,15 +16,16 @@ from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
 
-from dh2sim.compare.comparison import Comparison, compared
+from dh2sim.compare.comparison import Comparison, compared, require_comparable
 from dh2sim.compare.inputs import PLAINLY, ReadRobot, read_any
 from dh2sim.compare.matching import ObstacleKind
 from dh2sim.compare.misreadings import MisreadingKind
 from dh2sim.errors import Dh2simError
 from dh2sim.importing.sources import ImportOptions
+from dh2sim.input_files import read_input
 from dh2sim.kinematics.chain import SpecLike
 from dh2sim.messages import did_you_mean, listed, shown
-from dh2sim.robot.yaml_tree import Node, Report, compose, decode
+from dh2sim.robot.yaml_tree import MAX_BYTES, Node, Report, check_size, compose, decode
 
 TOLERANCE_OF_GRADES = 1e-3
 """rad, and m for a reach of up to 1 m, then of the reach: tables are rounded."""
@@ -136,11 +137,12 @@ def read_rubric(path: str | os.PathLike[str]) -> Rubric:
     """
     file = os.fspath(path)
     try:
-        data = Path(path).read_bytes()
+        data = read_input(Path(path), MAX_BYTES)
     except OSError as error:
         raise Dh2simError(f"{file}: cannot be read: {error.strerror or error}") from error
     report = Report(file)
-    root = compose(decode(data, report), report)
+    check_size(len(data), report)
+    root = compose(decode(data, report), report, needs="a rubric needs points, kinds or off")
     if report.problems:
         raise report.error()
     groups = {"kinds": tuple(_SHARES), "off": tuple(FreeChoice)}
@@ -211,12 +213,14 @@ def grade(
         Dh2simError: The solution cannot be read. A submission that cannot be is graded as unreadable.
     """
     right = read_any(solution)
+    require_comparable(right.spec)
     return [_grade(right, os.fspath(file), rubric or Rubric(), tolerance, options) for file in submissions]
 
 
 def _grade(right: ReadRobot, file: str, rubric: Rubric, tolerance: float, options: ImportOptions) -> Grade:
     try:
         read = read_any(file, options, strangers=True)
+        require_comparable(read.spec)
     except (Dh2simError, OSError) as error:
         return Grade(
             submission=file,

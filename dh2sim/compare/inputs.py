@@ -50,7 +50,7 @@ def read_any(
         return ReadRobot(spec=serial_spec_of(source))
     file = os.fspath(source)
     path = Path(file)
-    if file != STDIN and not path.is_file():
+    if file != STDIN and (not path.exists() or path.is_dir()):
         return ReadRobot(spec=serial_spec_of(load_robot(file)))  # a name, or the message for what is not there
     data = sys.stdin.buffer.read() if file == STDIN else read_file(path)
     if not data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(_XML_OR_TABLE) and not is_calibration(data):

@@ -23,6 +23,7 @@ from dh2sim.importing.explain import explanation
 from dh2sim.importing.result import Imported
 from dh2sim.importing.serial import import_serial, robot_name
 from dh2sim.importing.source_errors import MADE, errors_of
+from dh2sim.input_files import read_input
 from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.compaction import far_frames
 from dh2sim.kinematics.frame_assignment.recover import TOLERANCE
@@ -281,8 +282,7 @@ def read_file(path: Path) -> bytes:
         Dh2simError: It cannot be read, or is too large.
     """
     try:
-        with path.open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
+        data = read_input(path, MAX_BYTES)
     except OSError as error:
         raise Dh2simError(f"{path}: cannot be read: {error.strerror or error}") from error
     if len(data) > MAX_BYTES:

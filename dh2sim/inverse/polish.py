@@ -61,7 +61,7 @@ def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) 
         Jt = np.swapaxes(J, 1, 2)
         A = Jt @ J
         A[:, diagonal, diagonal] += (damping[active] * np.minimum(norm[active] ** 2, 1.0) + 1e-15)[:, None]
-        step = np.linalg.solve(A, Jt @ error[:, :, None])[:, :, 0]
+        step = solved(A, Jt @ error[:, :, None])[:, :, 0]
         step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
         trial = q[active]
         trial[:, moving] += step
@@ -79,6 +79,14 @@ def polish(arm: Arm, q: Array, T: Array, moving: Flags, gate: float = math.inf) 
             keep &= norm[active] < _NEAR
         active, J, error = active[keep], J[keep], error[keep]
     return q, norm, all_J
+
+
+def solved(A: Array, b: Array) -> Array:
+    """Return x of A x = b, the shortest where a damped matrix is singular in double precision nevertheless."""
+    try:
+        return np.asarray(np.linalg.solve(A, b))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(A, rcond=1e-15, hermitian=True) @ b)
 
 
 def refine(arm: Arm, q: Array, T: Array, moving: Flags) -> tuple[Array, Array, Array]:

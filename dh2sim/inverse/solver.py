@@ -53,6 +53,10 @@ _EQUAL: Final = 1e-6
 _GOAL_JOINTS: Final[Mapping[str | None, int]] = {None: 0, "roll": 1, "rotation": 3}
 
 
+MOST_JOINTS: Final = 50
+"""That move, of arms whose solutions are all found; of others one is searched numerically."""
+
+
 class InverseSolver:
     """All solutions of the inverse kinematics of one robot.
 
@@ -129,14 +133,20 @@ class InverseSolver:
             and how far a pose is out of reach is found out.
 
         Raises:
-            ConfigurationError: A pose is no rigid transform, ``q0`` has the wrong shape, or a joint to lock is
-                unknown.
+            ConfigurationError: A pose is no rigid transform, ``q0`` has the wrong shape, a joint to lock is unknown,
+                or more than ``MOST_JOINTS`` joints move and ``numeric`` is not given.
         """
         goals = read_goals(T)
         poses = goals.reshape(-1, 4, 4)
         near = self._home if q0 is None else joint_vector(self._chain, q0)
         locked = self._locked(lock or {}, len(poses))
         require_free(free)
+        count = len(self.names) - len(locked)
+        if not numeric and count > MOST_JOINTS:
+            raise ConfigurationError(
+                f"{self._spec.name}: {count} joints move; all solutions are found of arms with at most "
+                f"{MOST_JOINTS}: use numeric for one solution"
+            )
         surplus = 0 if numeric else self._surplus(free, tuple(sorted(locked)))
         if numeric:
             results = self._numeric(poses, near, locked, free, limits=limits)

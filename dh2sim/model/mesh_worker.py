@@ -17,6 +17,7 @@ import trimesh
 
 from dh2sim.messages import shown
 from dh2sim.model.collada import read_collada
+from dh2sim.model.mesh_defects import defect_of, reason_of
 from dh2sim.model.meshes import MAX_FACES
 from dh2sim.typing import Array
 
@@ -66,8 +67,7 @@ def _surface(suffix: str, data: bytes) -> tuple[dict[str, Any], bytes]:
     except _UnreadableError:
         raise
     except Exception as error:  # trimesh's readers raise many types, with words of Python or NumPy
-        name = suffix[1:].upper()
-        raise _UnreadableError(f"it is not a valid {name} file, or only a part of one") from error
+        raise _UnreadableError(reason_of(suffix, data)) from error
 
 
 def _measured(surface: Any) -> tuple[dict[str, Any], bytes]:
@@ -90,8 +90,10 @@ def _check_file(suffix: str, data: bytes) -> None:
     """Check how much a file says that it holds.
 
     Raises:
-        ValueError: It is too much.
+        ValueError: It is too much, or plainly not what its name says.
     """
+    if (defect := defect_of(suffix, data)) is not None:
+        raise ValueError(defect)
     match suffix:
         case ".glb":
             check_glb(data)

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from dh2sim.errors import Dh2simError, RobotError, UnknownRobotError
+from dh2sim.input_files import read_input
 from dh2sim.messages import Loc, did_you_mean, listed, loc_of, path_of, shown
 from dh2sim.robot.catalog import builtin_mechanisms, builtin_path, builtin_robots
 from dh2sim.robot.checks import placed_rows
@@ -37,9 +38,8 @@ def load_robot(path_or_name: str | os.PathLike[str]) -> RobotSpec:
     given = os.fsdecode(path_or_name)
     path, file = _find(given)
     try:
-        with path.open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
-            size = max(len(data), os.fstat(stream.fileno()).st_size)
+        data = read_input(path, MAX_BYTES)
+        size = max(len(data), path.stat().st_size)
     except OSError as error:
         raise Dh2simError(f"{given}: cannot be read: {error.strerror or error}") from error
     check_size(size, Report(file))

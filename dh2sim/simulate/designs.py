@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.errors import DesignFileError, Problem, RobotError, SettingsError
+from dh2sim.input_files import read_input
 from dh2sim.messages import shown
 from dh2sim.robot.expressions import NumberError, to_number
 from dh2sim.robot.spec import RobotSpec
@@ -193,11 +194,11 @@ def _read_csv(name: str) -> DesignTable:
     """Read a CSV file; lines that are empty or begin with # are passed over."""
     path = Path(name)
     try:
-        if path.stat().st_size > MOST_FILE_BYTES:
-            raise _refused(f"must be a file of at most {MOST_FILE_BYTES / 2**20:g} MB, got {name}")
-        data = path.read_bytes()
+        data = read_input(path, MOST_FILE_BYTES)
     except OSError as error:
         raise _refused(f"cannot be read: {name}: {error.strerror or error}") from error
+    if len(data) > MOST_FILE_BYTES:
+        raise _refused(f"must be a file of at most {MOST_FILE_BYTES / 2**20:g} MB, got {name}")
     problems: list[Problem] = []
 
     def wrong(line: int, column: int, message: str, path: str = "") -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dh2sim.errors import Dh2simError
+from dh2sim.input_files import read_input
 from dh2sim.messages import Loc, shown
 from dh2sim.robot.yaml_tree import MAX_BYTES, Node, Report, check_size, compose, decode
 from dh2sim.simulate.quantities import NEEDS, Setting, checked_settings, key_parts
@@ -27,8 +28,7 @@ def read_randomization(path: str | os.PathLike[str]) -> dict[str, Setting]:
     """
     name = os.fspath(path)
     try:
-        with Path(path).open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
+        data = read_input(Path(path), MAX_BYTES)
     except OSError as error:
         raise Dh2simError(f"{name}: cannot be read: {error.strerror or error}") from None
     report = Report(name)

@@ -300,7 +300,10 @@ def settings_of(model: RobotModel, task: Task) -> dict[str, Any]:
     }
     for name in task.measures:
         if name not in MEASURES:
-            file = inspect.getsourcefile(inspect.unwrap(load_function(name)))
+            try:
+                file = inspect.getsourcefile(inspect.unwrap(load_function(name)))
+            except TypeError:  # it is compiled, or an object that can be called
+                file = None
             if file is not None:
                 own[f"code of {name}"] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
     return own

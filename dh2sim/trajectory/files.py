@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from dh2sim.errors import OutputError, SettingsError, TrajectoryError
 from dh2sim.files import atomic_file
+from dh2sim.input_files import read_input
 from dh2sim.messages import listed, shown
 from dh2sim.trajectory.curves import ORDERS, PiecewisePolynomial, cubic_spline, quintic_hermite
 from dh2sim.typing import Array, read_only
@@ -199,11 +200,11 @@ def read_trajectory(path: str | os.PathLike[str]) -> SampledTrajectory:
     if file.suffix.lower() not in SUFFIXES:
         raise TrajectoryError(f"{name} is not a trajectory file, which ends in .csv or .npz")
     try:
-        if file.stat().st_size > MOST_BYTES:
-            raise TrajectoryError(f"{name} is larger than {MOST_BYTES // 2**20} MB")
-        data = file.read_bytes()
+        data = read_input(file, MOST_BYTES)
     except OSError as error:
         raise TrajectoryError(f"cannot read {name}: {error.strerror or error}") from None
+    if len(data) > MOST_BYTES:
+        raise TrajectoryError(f"{name} is larger than {MOST_BYTES // 2**20} MB")
     digest = hashlib.sha256(data).hexdigest()
     return _from_csv(data, name, digest) if file.suffix.lower() == ".csv" else _from_npz(data, name, digest)
 

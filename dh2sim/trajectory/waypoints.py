@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final
 import numpy as np
 
 from dh2sim.errors import ConfigurationError, Dh2simError, SettingsError
+from dh2sim.input_files import read_input
 from dh2sim.inverse.goals import read_goals
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import Loc, did_you_mean, listed, path_of, shown
@@ -215,8 +216,7 @@ def read_waypoints(path: str | os.PathLike[str], spec: RobotSpec) -> WaypointFil
     """
     name = os.fspath(path)
     try:
-        with Path(path).open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
+        data = read_input(Path(path), MAX_BYTES)
     except OSError as error:
         raise Dh2simError(f"{name}: cannot be read: {error.strerror or error}") from None
     report = Report(name)

@@ -80,6 +80,7 @@ def test_robots_that_changed_are_drawn_before_and_after(folder: Path) -> None:
         (["-o", "report.html"], "report.html: a report ends in .txt or .sarif or .json or .xml or .md"),
         (["--pictures", "x"], "--pictures: only with --changed-since"),
         (["--baseline", "a", "--write-baseline", "b"], "--baseline: not together with --write-baseline"),
+        (["--json", "--format", "sarif"], "--json: not together with --format"),
         (["--baseline", "none.json"], "cannot read the baseline 'none.json'"),
         (["nowhere"], "no file or folder named 'nowhere'"),
         (["-o", "no/report.json"], "there is no folder 'no'"),

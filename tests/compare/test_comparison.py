@@ -156,3 +156,12 @@ def test_a_robot_whose_rows_are_all_fixed_is_the_same_as_any_other_such() -> Non
     other = RobotSpec(name="other", rows=(row("bracket", "fixed", a=0.2, alpha=0.3),))
     assert diff(still, still).sentences() == []
     assert diff(still, other).same
+
+
+def test_robots_of_very_many_joints_are_refused_at_once() -> None:
+    long = replace(
+        robot("planar_2r"), rows=tuple(row(name=f"joint_{k}", a=0.1) for k in range(65)), configurations={}
+    )
+    assert refusal(Dh2simError, diff, long, robot("planar_2r")) == (
+        "planar_2r: 65 joints move; robots with at most 64 can be compared"
+    )

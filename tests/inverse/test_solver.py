@@ -10,6 +10,7 @@ import pytest
 
 import dh2sim
 from dh2sim.errors import ConfigurationError
+from dh2sim.inverse.polish import solved
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.solver import InverseSolver
 from dh2sim.kinematics.table_oracle import table_tool_pose
@@ -102,3 +103,20 @@ def test_with_all_joints_locked_the_pose_is_reached_or_not() -> None:
 def test_a_robot_without_joints_is_refused() -> None:
     with pytest.raises(ConfigurationError, match="still has no joint that moves"):
         InverseSolver(RobotSpec(name="still", rows=(Row(type=JointType.FIXED, a=0.3),)))
+
+
+def test_all_solutions_of_an_arm_of_very_many_joints_are_refused_at_once() -> None:
+    long = RobotSpec(name="long", rows=[Row(name=f"joint_{k}", type=JointType.REVOLUTE, a=0.1) for k in range(51)])
+    arm = InverseSolver(long)
+    with pytest.raises(ConfigurationError) as caught:
+        arm.solve(np.eye(4))
+    assert str(caught.value) == (
+        "long: 51 joints move; all solutions are found of arms with at most 50: use numeric for one solution"
+    )
+    T = table_tool_pose(long, np.linspace(0.0, 0.2, 51))
+    assert len(arm.solve(T, np.linspace(0.0, 0.2, 51), numeric=True))
+
+
+def test_a_matrix_that_stays_singular_although_it_is_damped_gives_the_shortest_step() -> None:
+    A = np.diag([4.0, 0.0, 0.0])[None]
+    np.testing.assert_allclose(solved(A, np.array([[[2.0], [0.0], [0.0]]]))[0, :, 0], [0.5, 0.0, 0.0])

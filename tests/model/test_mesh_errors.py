@@ -16,6 +16,7 @@ import trimesh
 from dh2sim import limited_process
 from dh2sim.errors import MeshError, RobotFileError
 from dh2sim.model.build import build_model
+from dh2sim.model.mesh_worker import answer
 from dh2sim.model.meshes import MAX_BYTES, MAX_FACES
 from dh2sim.robot.read import parse_robot
 from tests.refusals import refusal
@@ -42,17 +43,17 @@ def triangles(vertices: list[list[float]], faces: list[list[int]]) -> bytes:
     return data
 
 
+BOX = bytes(trimesh.creation.box().export(file_type="stl"))
+BOX_PLY = bytes(trimesh.creation.box().export(file_type="ply"))
+
+
 @pytest.mark.parametrize(
     ("name", "data"),
     [
-        ("empty.stl", b""),
         ("header.stl", bytes(84)),
-        ("text.stl", b"hello world"),
-        ("cut.stl", triangles([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2], [1, 3, 2]])[:120]),
-        ("empty.obj", b""),
         ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"),
     ],
-    ids=["empty STL", "STL header", "text", "cut STL", "empty OBJ", "points"],
+    ids=["STL header", "points"],
 )
 def test_a_file_without_faces_is_refused(tmp_path: Path, name: str, data: bytes) -> None:
     (tmp_path / name).write_bytes(data)
@@ -62,13 +63,7 @@ def test_a_file_without_faces_is_refused(tmp_path: Path, name: str, data: bytes)
 @pytest.mark.parametrize(
     ("name", "data", "reason"),
     [
-        ("empty.ply", b"", "it is not a valid PLY file, or only a part of one"),
-        (
-            "cut.ply",
-            b"ply\nformat ascii 1.0\nelement vertex 8\n",
-            "it is not a valid PLY file, or only a part of one",
-        ),
-        ("cut.glb", b"glTF1234", "it is not a valid GLB file, or only a part of one"),
+        ("cut.ply", BOX_PLY[:-9], "it is not a valid PLY file, or only a part of one: copy or export it again"),
         (
             "beyond.ply",
             b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -84,6 +79,76 @@ def test_a_mesh_file_that_is_malformed_is_refused_in_plain_words(
     file = tmp_path / name
     file.write_bytes(data)
     assert refused(tmp_path, name) == f"{WHERE}: cannot read the mesh '{file}': {reason}"
+
+
+@pytest.mark.parametrize(
+    ("suffix", "data", "reason"),
+    [
+        (".stl", b"", "it is empty"),
+        (".stl", b"hello world", "it has 11 bytes, and is no STL file: a binary one has at least 84"),
+        (
+            ".stl",
+            BOX[:300],
+            "as an STL file it announces 12 faces in 684 bytes, but has 300 bytes: it is only a part of an STL file, "
+            "or none; copy or export it again",
+        ),
+        (
+            ".stl",
+            b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n",
+            "it ends in line 4 without 'endsolid', so that a part is missing: copy or export it again",
+        ),
+        (
+            ".stl",
+            b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 zork 0\nendsolid\n",
+            "line 4: a corner needs three numbers, found 'zork'",
+        ),
+        (".stl", b"glTF12345", "it is a GLB file: name it *.glb"),
+        (".stl", b"<!DOCTYPE html><html>", "it is a web page, not a mesh: download the file itself"),
+        (
+            ".obj",
+            b"version https://git-lfs.github.com/spec/v1\n",
+            "it is a pointer of Git LFS, not the mesh: run 'git lfs pull'",
+        ),
+        (".obj", b"v 0 0 0\nv 1 0\nf 1 2 1\n", "line 2: a corner needs three numbers, found 2 of them"),
+        (".obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "line 4: a face refers to corner 9; the file has 3"),
+        (
+            ".obj",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n",
+            "line 4: a face refers to corner 0; corners count from 1",
+        ),
+        (".ply", b"hello", "it does not begin with 'ply', and is no PLY file"),
+        (
+            ".ply",
+            b"ply\nformat ascii 1.0\nelement vertex 8\n",
+            "it has no line 'end_header', so that a part is missing: copy or export it again",
+        ),
+        (
+            ".ply",
+            b"ply\nformat zork 1.0\nend_header\n",
+            "its format is 'zork'; it must be ascii, binary_little_endian or binary_big_endian",
+        ),
+        (
+            ".ply",
+            b"ply\nformat ascii 1.0\nelement vertex 2\nend_header\n0 0 0\n",
+            "it announces 2 elements, a line each, but has 1 lines behind 'end_header', so that a part is missing: "
+            "copy or export it again",
+        ),
+        (".glb", b"glTF1234", "it has 8 bytes, so that a part is missing: copy or export it again"),
+        (
+            ".glb",
+            b"glTF" + struct.pack("<III", 2, 900, 40) + b"JSON{}",
+            "it should have 900 bytes, but has 22, so that a part is missing: copy or export it again",
+        ),
+        (
+            ".glb",
+            b'{"asset": {}}',
+            "it is a glTF file in text, which keeps its corners in other files: export it as GLB",
+        ),
+    ],
+)
+def test_a_file_that_is_no_mesh_is_refused_with_what_to_do(suffix: str, data: bytes, reason: str) -> None:
+    facts = json.loads(answer(suffix.encode() + b"\n" + data).partition(b"\n")[0])
+    assert facts == {"refused": reason}
 
 
 def test_a_file_that_is_gone_is_named_with_its_place(tmp_path: Path) -> None:
