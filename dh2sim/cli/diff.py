@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -52,15 +53,18 @@ def diff(
     length: Annotated[
         str | None, typer.Option(metavar="m|mm|cm|in", help="Unit of lengths of a table that does not say it.")
     ] = None,
+    kinematics: Annotated[
+        bool, typer.Option("--kinematics", help="Compare the mechanisms alone: no limits, masses and gains.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
 ) -> int:
-    """Compare two robots: are they the same mechanism?
+    """Compare two robots: are they the same?
 
     Kinematics are the same up to base, tool, zeros and senses of the joints, and names; what of these differs is
     told, and limits, masses and gains that both give differently. Otherwise: where the mechanisms first differ, and
     which single misreading of the table explains it.
 
-    Exit status: 0 the same mechanism, 1 different, 2 bad input.
+    Exit status: 0 the same mechanism, with the same limits, masses and gains; 1 different; 2 bad input.
 
     \b
     Examples:
@@ -75,11 +79,13 @@ def diff(
     options_a, options_b = (_options(file, which, (base, tip), words) for which, file in enumerate((a, b)))
     with errors_with_options():
         found = compare(a, b, tolerance=allowed, options_a=options_a, options_b=options_b)
+    if kinematics:
+        found = replace(found, quantities=())
     if as_json:
         print(json_text(found.to_dict()))
     else:
         _print(found)
-    return DONE if found.same else FELL_SHORT
+    return DONE if found.equal else FELL_SHORT
 
 
 def _options(

@@ -136,6 +136,11 @@ class Comparison:
         """Whether both are the same mechanism."""
         return self.equivalence is not None
 
+    @property
+    def equal(self) -> bool:
+        """Whether both are the same mechanism, with the same limits, masses and gains as far as both give them."""
+        return self.same and not self.quantities
+
     def sentences(self) -> list[str]:
         """Return what is different, in words: of the same mechanism, or of two."""
         if self.equivalence is not None:
@@ -153,7 +158,8 @@ class Comparison:
 
     def to_dict(self) -> dict[str, object]:
         """Return everything as plain data."""
-        made: dict[str, object] = {"a": self.a.name, "b": self.b.name, "same": self.same, "tolerance": self.tolerance}
+        made: dict[str, object] = {"a": self.a.name, "b": self.b.name, "same": self.same, "equal": self.equal}
+        made["tolerance"] = self.tolerance
         if (same := self.equivalence) is not None:
             made["joints"] = [
                 {"a": joint.a, "b": joint.b, "sense": joint.sense, "zero": joint.zero} for joint in same.joints

@@ -26,6 +26,19 @@ def test_different_mechanisms_are_named_and_json_says_the_same(tmp_path: Path) -
     assert [found["kind"] for found in report["misreadings"]] == ["value"]
 
 
+def test_another_limit_is_another_robot_unless_mechanisms_alone_are_asked_for(tmp_path: Path) -> None:
+    one, other = write(tmp_path, small("one")), write(tmp_path, small("other").replace("[-2, 2]", "[-2, 1.5]", 1))
+    run = dh2sim("diff", one, other)
+    assert (run.status, run.err) == (1, "")
+    assert "The same mechanism." in run.out
+    assert "joint_1: position limits" in run.out
+    report = json.loads(dh2sim("diff", one, other, "--json").out)
+    assert (report["same"], report["equal"]) == (True, False)
+    run = dh2sim("diff", one, other, "--kinematics")
+    assert run.status == 0
+    assert "limits" not in run.out
+
+
 def test_bad_input_ends_with_2(tmp_path: Path) -> None:
     for words in (["four_bar", "scara"], ["scara", "none"], ["scara", "scara", "--tolerance", "-1"], ["scara"]):
         run = dh2sim("diff", *words)
