@@ -107,7 +107,7 @@ class Found:
     J: Array = field(repr=False)
     """Jacobians of all joints in the arm's units, shape (M, 6, n)."""
     unsure: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
-    """Indices of nearly singular poses at which every elimination is ill-conditioned: solutions may be missing."""
+    """Indices of poses of which solutions may be missing: by one elimination, or by all that was tried."""
 
     def of(self, chosen: Indices | Flags) -> Found:
         """Return some of them, by index or bool."""
@@ -140,6 +140,8 @@ class Method:
     """The best one, and those to fall back on."""
     found_share: float
     """Share of the solutions known of the trial's poses that the first two find."""
+    telling: bool = True
+    """Whether the first one tells where it may lack solutions: not if it says so of most poses."""
 
     def solve(self, T: Array, locked: Mapping[int, Array]) -> Found:
         """Return all solutions of N poses.
@@ -169,16 +171,21 @@ class Method:
 
     def _solve_block(self, T: Array, locked: Mapping[int, Array]) -> Found:
         found = self.solve_by(self.eliminations[0], T, locked) if self.eliminations else joined([], self.arm.n)
+        blurred = np.zeros(len(T), dtype=np.bool_)
+        blurred[found.unsure] = self.telling
+        found = replace(found, unsure=found.unsure[:0])
         for other in self.eliminations[1:]:
-            again = np.flatnonzero(self.doubtful(found, len(T)))
+            again = np.flatnonzero(self.doubtful(found, len(T)) | blurred)
             if not len(again):
                 return found
             if other is not self.eliminations[1]:
-                again = self._ill(again, found, T, locked, last=False)
+                again = self._ill(again, blurred, found, T, locked, last=False)
             if len(again):
-                found = self._joined_with(found, again, self.solve_by(other, T[again], _values_at(locked, again)))
-        again = np.flatnonzero(self.doubtful(found, len(T)))
-        again = self._ill(again, found, T, locked, last=True) if len(again) else again
+                more = self.solve_by(other, T[again], _values_at(locked, again))
+                blurred[np.delete(again, more.unsure)] = False
+                found = self._joined_with(found, again, replace(more, unsure=more.unsure[:0]))
+        again = np.flatnonzero(self.doubtful(found, len(T)) | blurred)
+        again = self._ill(again, blurred, found, T, locked, last=True) if len(again) else again
         for search in (self._in_valleys, self._scattered):
             if not len(again):
                 break
@@ -242,14 +249,17 @@ class Method:
             (regular % 2 == 1) & (regular == all_of_them) & (bool(self.eliminations) and not self.virtual)
         )
 
-    def _ill(self, again: Indices, found: Found, T: Array, locked: Mapping[int, Array], *, last: bool) -> Indices:
+    def _ill(
+        self, again: Indices, blurred: Flags, found: Found, T: Array, locked: Mapping[int, Array], *, last: bool
+    ) -> Indices:
         """Return doubtful poses, without those that are well-conditioned and have no solution: out of reach.
 
         Nor are those searched at the last that have singular solutions where an elimination is well-conditioned:
         these are among its eigenvalues.
         """
         counts = np.bincount(found.pose, minlength=len(T))[again]
-        asked = again[(counts % 2 == 0) if last else (counts == 0)]
+        none = (counts == 0) & ~blurred[again]
+        asked = again[none | ((counts > 0) & (counts % 2 == 0))] if last else again[none]
         if not len(asked) or not self.eliminations:
             return again
         return np.setdiff1d(again, asked[self._condition(asked, T, locked, all_of_them=last) < _ILL])
@@ -287,17 +297,18 @@ class Method:
     def _stuck(self, T: Array, locked: Mapping[int, Array]) -> tuple[Indices, Array]:
         """Return configurations of eliminations that almost reach poses, and their poses."""
         parts = [self._candidates(elimination, T, locked) for elimination in self.eliminations]
-        pose, q = (np.concatenate(each) for each in zip(*parts, strict=True))
+        pose, q = np.concatenate([part.pose for part in parts]), np.concatenate([part.q for part in parts])
         q, error, _ = polish(self.arm, q, T[pose], self.moving, gate=_GATE)
         stuck = (error > CONVERGED) & (error < _STUCK)
         return pose[stuck], q[stuck]
 
     def solve_by(self, elimination: Elimination, T: Array, locked: Mapping[int, Array]) -> Found:
         """Return the solutions of N poses that one elimination leads to."""
-        return self.polished(*self._candidates(elimination, T, locked), T)
+        candidates = self._candidates(elimination, T, locked)
+        return replace(self.polished(candidates.pose, candidates.q, T), unsure=candidates.blurred)
 
-    def _candidates(self, elimination: Elimination, T: Array, locked: Mapping[int, Array]) -> tuple[Indices, Array]:
-        """Return configurations of all joints that an elimination leads to, and their poses."""
+    def _candidates(self, elimination: Elimination, T: Array, locked: Mapping[int, Array]) -> Candidates:
+        """Return configurations of all joints that an elimination leads to."""
         loop = close_loop(self.arm, T, locked, self.virtual)
         candidates = elimination.candidates(loop)
         pose, ring = candidates.pose, candidates.q
@@ -308,7 +319,7 @@ class Method:
         q[:, self.moving] = ring
         for joint, value in locked.items():
             q[:, joint] = value[0] if len(value) == 1 else value[pose]
-        return pose, q
+        return Candidates(pose=pose, q=q, blurred=candidates.blurred)
 
     def polished(self, pose: Indices, q: Array, T: Array, gate: float = _GATE) -> Found:
         """Return the distinct solutions that configurations lead to, if their errors are below the gate."""

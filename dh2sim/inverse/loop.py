@@ -298,3 +298,5 @@ class Candidates:
     """Index of the pose of each, shape (M,)."""
     q: Array
     """Coordinates of the ring's six joints, shape (M, 6)."""
+    blurred: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    """Indices of poses at which others may have been lost: eigenvalues are double, or ill-conditioned."""

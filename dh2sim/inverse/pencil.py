@@ -15,12 +15,16 @@ from functools import reduce
 
 import numpy as np
 
-from dh2sim.inverse.loop import Candidates, Indices, Loop, inverse_poses, joint_motion, loop_order
+from dh2sim.inverse.loop import Candidates, Flags, Indices, Loop, inverse_poses, joint_motion, loop_order
 from dh2sim.inverse.spherical import spherical_angles
 from dh2sim.typing import Array
 
 _GATE = 0.15
 """Imaginary part of half an angle up to which an eigenvalue may be a real solution that rounding has moved."""
+_CLOSE = 1e-5
+"""Half angles that differ by less, in rad, may be one, whose eigenvector is any mixture of those of two solutions."""
+_LARGE = 1e5
+"""Quotient of matrices above which eigenvalues are ill-conditioned."""
 _ZERO = 1e-11
 """Singular values below this share of the largest are zero."""
 _MEET = 1e-9
@@ -64,8 +68,9 @@ class Pencil:
         ends = self._ends(ring)
         right = self._right_side(ring, ends[1])
         with np.errstate(all="ignore"):
-            t, v = _eigenpairs(self._matrices(ring, ends[0], right))
+            t, v, large = _eigenpairs(self._matrices(ring, ends[0], right))
             half = np.arctan(t)
+        blurred = np.flatnonzero(large | _double(half))
         largest = np.take_along_axis(v, np.abs(v).argmax(1)[:, None], 1)[:, 0]
         poses, k = np.nonzero((np.abs(half.imag) < _GATE) & (np.abs(largest) > 0.0))
         half, v = half[poses, k], (v[poses, :, k] / largest[poses, k, None]).real
@@ -80,7 +85,7 @@ class Pencil:
         pose, q = pose[sane], q[sane]
         ordered = np.empty_like(q)
         ordered[:, loop_order(self.first, backwards=self.backwards)] = -q if self.backwards else q
-        return Candidates(pose=pose, q=ordered)
+        return Candidates(pose=pose, q=ordered, blurred=blurred)
 
     def condition(self, loop: Loop) -> Array:
         """Return the condition numbers of the matrices that are divided by, shape (N,): huge if singular."""
@@ -324,14 +329,15 @@ def _in_half_tangents(turns: bool, phase: float) -> Array:
     return np.asarray(matrix)
 
 
-def _eigenpairs(C: Array) -> tuple[Array, Array]:
+def _eigenpairs(C: Array) -> tuple[Array, Array, Flags]:
     """Solve (C_0 + t C_1 + t² C_2) v = 0.
 
     Args:
         C: Shape (3, N, s, s).
 
     Returns:
-        Eigenvalues, complex, shape (N, 2s), and vectors in columns, shape (N, s, 2s).
+        Eigenvalues, complex, shape (N, 2s), vectors in columns, shape (N, s, 2s), and which are ill-conditioned,
+        because C_2 is nearly singular, bool, shape (N,).
     """
     size = C.shape[-1]
     companion = np.zeros((C.shape[1], 2 * size, 2 * size))
@@ -341,7 +347,18 @@ def _eigenpairs(C: Array) -> tuple[Array, Array]:
     companion[bad] = 0.0
     t, V = np.linalg.eig(companion)
     t = np.where(bad[:, None], np.nan, t).astype(np.complex128)
-    return t, np.where((np.abs(t) <= 1.0)[:, None, :], V[:, :size], V[:, size:]).astype(np.complex128)
+    large = bad | (np.abs(companion).max(axis=(1, 2)) > _LARGE)
+    return t, np.where((np.abs(t) <= 1.0)[:, None, :], V[:, :size], V[:, size:]).astype(np.complex128), large
+
+
+def _double(half: Array) -> Flags:
+    """Return for which poses two real half angles are the same, shape (N, 2s), as then eigenvectors are mixtures."""
+    real = np.abs(half.imag) < _CLOSE
+    angles = np.sort(np.where(real, half.real, np.inf), axis=1)
+    last = np.where(real, half.real, -np.inf).max(axis=1)
+    with np.errstate(invalid="ignore"):  # of infinities
+        double = (np.diff(angles, axis=1) < _CLOSE).any(axis=1)
+    return np.asarray(double | (angles[:, 0] + np.pi - last < _CLOSE))
 
 
 def _solved(A: Array, B: Array) -> Array:

@@ -87,7 +87,8 @@ def _tried(
         *others[:1],
         *(Nudged(elimination=elimination, nudges=small_motions(rng, 6, _NUDGE)) for elimination in best[:1]),
     ]
-    return replace(bare, eliminations=tuple(best), found_share=share)
+    telling = not trials or 2 * len(trials[0].found.unsure) < len(q)
+    return replace(bare, eliminations=tuple(best), found_share=share, telling=telling)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,0 +1,26 @@
+"""Poses at which joints stand at right angles: solutions share coordinates there, and eigenvalues are double."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dh2sim.inverse.nearest import goal_sigma_min
+from dh2sim.inverse.solver import InverseSolver
+from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.spec import RobotSpec
+from tests.inverse.arms import CRX, JACO, ORTHOGONAL
+from tests.inverse.campaign import is_found
+from tests.sample_robots import robot
+
+
+@pytest.mark.parametrize("spec", [robot("puma560"), JACO, CRX, ORTHOGONAL], ids=lambda spec: spec.name)
+def test_regular_configurations_with_joints_at_right_angles_are_found(spec: RobotSpec) -> None:
+    rng = np.random.default_rng(105)
+    q = rng.choice([0.0, 0.5 * np.pi, -0.5 * np.pi, np.pi], (200, 6))
+    q = np.where(rng.random(q.shape) < 0.4, rng.uniform(-2.0, 2.0, q.shape), q)
+    solver = InverseSolver(spec)
+    q = q[goal_sigma_min(spec, q, free=None, size=solver.size, rank=6) > 1e-4]
+    assert len(q) > 80
+    for drawn, found in zip(q, solver.solve(table_tool_pose(spec, q), limits=False), strict=True):
+        assert is_found(spec, drawn, found.q)
