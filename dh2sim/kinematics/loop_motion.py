@@ -25,9 +25,10 @@ from dh2sim.kinematics.loop_closure import (
     is_closed,
     mechanism_size,
 )
+from dh2sim.kinematics.transforms import identity
 from dh2sim.kinematics.tree import Frame, KinematicTree, body_poses, joint_values, placed
 from dh2sim.messages import did_you_mean, listed, shown
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import ClosureType, RobotSpec
 from dh2sim.typing import Array, read_only
 
 _LONGEST: Final = 0.1
@@ -172,9 +173,15 @@ def mechanism_jacobian(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0"
     body, T_body_frame = tree.frame(frame)
     vector = named_configuration(spec, q) if isinstance(q, str) else mechanism_configuration(spec, q)
     poses = body_poses(tree, vector)
-    origin = placed(poses, Frame(body, T_body_frame))[:3, 3]
+    J = _twists(tree, poses, Frame(body, T_body_frame))
+    return read_only(J @ _Motion(spec, tree, sorted(actuated_joints(spec))).followed(vector))
+
+
+def _twists(tree: KinematicTree, poses: Sequence[Array], frame: Frame) -> Array:
+    """Return the twist of a frame for a unit velocity of each joint of the tree, shape (6, n)."""
+    origin = placed(poses, frame)[:3, 3]
     J = np.zeros((6, tree.n))
-    for k in tree.path(body):
+    for k in tree.path(frame.body):
         joint, column = tree.joints[k], tree.coordinates[k]
         if column < 0:
             continue
@@ -183,7 +190,7 @@ def mechanism_jacobian(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0"
             J[:3, column], J[3:, column] = np.cross(z, origin - poses[k][:3, 3]), z
         else:
             J[:3, column] = z
-    return read_only(J @ _Motion(spec, tree, sorted(actuated_joints(spec))).followed(vector))
+    return J
 
 
 class _Motion:
@@ -197,6 +204,8 @@ class _Motion:
         self._scale = np.array([1.0 if joint.type.turns else self._size for joint in tree.moving_joints])
         lengths = np.array(closure_residual(tree, np.zeros(tree.n))[1])
         self._weights = np.where(lengths, 1.0 / self._size, 1.0)
+        self._determined = len(self._passive)
+        """How many independent motions of the passive joints the loops determine."""
 
     def follow(self, q: Array, target: Array) -> Array:
         """Return the configuration that moving the driven joints straight to a target leads to.
@@ -231,9 +240,9 @@ class _Motion:
     def _rates(self, q: Array, way: Array) -> tuple[Array, float]:
         """Return the passive joints' rates along a way of the driven ones, and the least singular value."""
         J = self._jacobian(q)
-        values = np.linalg.svd(J[:, self._passive], compute_uv=False)
+        values = np.linalg.svd(J[:, self._passive], compute_uv=False)[: self._determined]
         rates = np.linalg.lstsq(J[:, self._passive], -J[:, self._driven] @ way, rcond=_RANK)[0]
-        least = float(values[len(self._passive) - 1]) if self._passive else 1.0
+        least = float(values.min(initial=1.0))
         return np.asarray(rates), least
 
     def _moved(self, q: Array, start: Array, target: Array, done: float, guess: Array) -> Array | None:
@@ -277,7 +286,8 @@ class _Motion:
         whole, passive = (_rank(matrix) for matrix in (J, J[:, self._passive]))
         free = self._tree.n - whole
         names = listed(self._tree.moving_joints[k].name for k in self._driven)
-        if passive < len(self._passive):
+        self._determined = passive
+        if passive < len(self._passive) and not self._is_idle(q, J):
             raise SingularPositionError(
                 f"{self._spec.name}: {names} driven, {free} freedoms {where}: "
                 f"{len(self._passive) - passive} of them stay open, so that the passive joints are not determined"
@@ -287,6 +297,31 @@ class _Motion:
                 f"{self._spec.name}: {names} driven, but the loops leave {free} freedoms: these joints cannot be "
                 "moved independently; give the coordinates of all joints"
             )
+
+    def _is_idle(self, q: Array, J: Array) -> bool:
+        """Whether what stays open turns links about themselves only, as a rod between two ball joints.
+
+        Then the origins of tool0, of all joints and closures rest, and closures do not turn unless they are ball
+        joints; of the motions that keep the loops closed the least is taken.
+        """
+        tree, poses = self._tree, body_poses(self._tree, q)
+        _, values, Vt = np.linalg.svd(J[:, self._passive])
+        rank = int((values > _RANK * max(1.0, float(values.max(initial=0.0)))).sum())
+        loose = np.zeros((tree.n, len(self._passive) - rank))
+        loose[self._passive] = Vt[rank:].T
+        ends = [[tree.frame(name) for name in (each.a, each.b)] for each in tree.closures]
+        looped = {body for a, b in ends for body in set(tree.path(a.body)) ^ set(tree.path(b.body))}
+        still = [column for body, column in enumerate(tree.coordinates) if column >= 0 and body not in looped]
+        frames = [tree.frame("tool0"), *(frame for pair in ends for frame in pair)]
+        frames += [Frame(body, identity()) for body, column in enumerate(tree.coordinates) if column >= 0]
+        points = np.concatenate([_twists(tree, poses, frame)[:3] for frame in frames])
+        turning = [
+            _twists(tree, poses, a)[3:] - _twists(tree, poses, b)[3:]
+            for each, (a, b) in zip(tree.closures, ends, strict=True)
+            if each.type is not ClosureType.SPHERICAL
+        ]
+        moved = np.concatenate([points / self._size, *turning]) * self._scale @ loose
+        return bool(np.abs(moved).max(initial=0.0) < _RANK and np.abs(loose[still]).max(initial=0.0) < _RANK)
 
     def _stuck(self, start: Array, target: Array, done: float) -> SingularPositionError:
         """Return the error of the position that stops the motion."""

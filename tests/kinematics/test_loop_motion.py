@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -19,7 +20,7 @@ from dh2sim.kinematics.loop_motion import (
     mechanism_pose,
 )
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, ToolSpec
 from tests.refusals import refusal
 
 
@@ -182,3 +183,50 @@ def test_the_jacobian_of_a_crank_is_that_of_the_textbook() -> None:
     slope = crank * math.sin(angle) / math.sqrt(rod**2 - (crank * math.sin(angle)) ** 2)
     x_rate = -crank * math.sin(angle) - crank * math.cos(angle) * slope
     assert J[:3, 0] == pytest.approx([x_rate, 0, 0], abs=1e-10)
+
+
+RSSR = """name: rssr
+convention: standard
+units: {angle: deg}
+parameters: {crank: 0.3, rod: 1.2, rocker: 0.8}
+joints:
+  - {type: revolute, a: crank}
+  - {type: revolute, alpha: 90}                      # a ball joint
+  - {type: revolute, theta: 90, alpha: 90}
+  - {type: revolute, theta: 90, a: rod}
+branches:
+  rocker: {from: base_link, pose: {xyz: [1, 0.3, 0.2], rpy: [90, 0, 0]}, joints: [{type: revolute, a: rocker}]}
+closures: [{name: S, between: [dh_4, rocker/dh_1], type: spherical}]
+actuated: [joint_1]
+assembly: {q: [60, 0, 0, 0, 80]}
+"""
+
+
+def test_a_rod_that_spins_between_two_ball_joints_hinders_nothing() -> None:
+    spec = parse_robot(RSSR)
+    for crank in (0.2, 1.0, 2.5):
+        q = mechanism_configuration(spec, [crank])
+        near = mechanism_pose(spec, q, "dh_1")[:3, 3]
+        far = mechanism_pose(spec, q, "rocker/dh_1")[:3, 3]
+        assert math.dist(near, (0.3 * math.cos(crank), 0.3 * math.sin(crank), 0.0)) < 1e-12
+        assert math.dist(near, far) == pytest.approx(1.2, abs=1e-11)
+        assert math.dist(far, (1.0, 0.3, 0.2)) == pytest.approx(0.8, abs=1e-12)
+        step = 1e-6
+        moved = [mechanism_pose(spec, [crank + sign * step], "rocker/dh_1")[:3, 3] for sign in (1, -1)]
+        velocity = mechanism_jacobian(spec, [crank], "rocker/dh_1")[:3, 0]
+        assert np.allclose(velocity, (moved[0] - moved[1]) / (2 * step), rtol=0, atol=1e-8)
+
+
+def test_a_joint_that_hangs_loose_is_no_idle_spin() -> None:
+    text = RSSR.replace("closures:", "  flag: {from: dh_1, joints: [{type: revolute, a: 0.1}]}\nclosures:")
+    spec = parse_robot(text.replace("0, 80]", "0, 80, 0]"))
+    with pytest.raises(SingularPositionError, match="stay open, so that the passive joints are not determined"):
+        mechanism_configuration(spec, [1.0])
+
+
+def test_loops_that_nothing_drives_do_not_pass_for_idle_spins() -> None:
+    """Their closures, and tool0, are at rest in the ground."""
+    for name in ("bennett", "spherical_four_bar"):
+        loose = dataclasses.replace(Robot.load(name).spec, actuated=(), tool=ToolSpec())
+        with pytest.raises(SingularPositionError, match="none driven, 1 freedoms"):
+            mechanism_configuration(loose, [])
