@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from pathlib import Path
@@ -101,3 +102,12 @@ def test_a_driven_joint_moves_the_passive_ones() -> None:
     assert four_bar.draw([2.0]).svg != four_bar.draw().svg
     with pytest.raises(ConfigurationError, match="four_bar has no configuration 'hom'"):
         four_bar.draw("hom")
+
+
+def test_a_closure_may_have_a_name_with_underscores(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="the extra 'plot' is not installed")
+    spec = Robot.load("four_bar").spec
+    [closure] = spec.closures
+    drawing = draw_robot(dataclasses.replace(spec, closures=(dataclasses.replace(closure, name="C_a_b"),)))
+    assert r"{$C_{a\_b}$}" in drawing.tikz
+    drawing.save(tmp_path / "a.png")

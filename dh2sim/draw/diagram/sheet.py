@@ -208,6 +208,7 @@ def tex_text(text: str) -> str:
         return plain.replace("\N{MINUS SIGN}", "$-$").replace("^", r"\^{}").replace("~", r"\~{}")
     for plain, tex in _GREEK.items():
         letter, index = letter.replace(plain, tex), index.replace(plain, tex)
+    index = index.replace("_", r"\_")
     return f"${letter}_{{{index}}}$"
 
 
