@@ -106,7 +106,9 @@ def test_a_robot_without_joints_is_refused() -> None:
 
 
 def test_all_solutions_of_an_arm_of_very_many_joints_are_refused_at_once() -> None:
-    long = RobotSpec(name="long", rows=[Row(name=f"joint_{k}", type=JointType.REVOLUTE, a=0.1) for k in range(51)])
+    long = RobotSpec(
+        name="long", rows=tuple(Row(name=f"joint_{k}", type=JointType.REVOLUTE, a=0.1) for k in range(51))
+    )
     arm = InverseSolver(long)
     with pytest.raises(ConfigurationError) as caught:
         arm.solve(np.eye(4))
