@@ -23,6 +23,7 @@ from dh2sim.robot.spec import AngleUnit, LengthUnit, RobotSpec
 from dh2sim.typing import Array, read_only
 
 MAX_BYTES: Final = 100_000_000
+MOST_ROWS: Final = 20_000
 _MOST_PROBLEMS: Final = 50
 _LENGTH_UNITS: Final = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
 _ANGLE_UNITS: Final = {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "mrad": 1e-3}
@@ -140,6 +141,14 @@ def _read(text: str, spec: RobotSpec, report: _Report, kind: Kind | None, groups
     ]
     if not lines:
         report(1, 1, "", "the file is empty; the first line must name the columns")
+        report.raise_any()
+    if len(lines) - 1 > MOST_ROWS:
+        report(
+            lines[0][0],
+            1,
+            "",
+            f"the file has {len(lines) - 1} measurements; at most {MOST_ROWS} are fitted: choose some",
+        )
         report.raise_any()
     number, header = lines[0]
     separator = max(",;\t", key=header.count)

@@ -24,9 +24,16 @@ from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
 from dh2sim.messages import member
 from dh2sim.model.build import build_model
+from dh2sim.mujoco_warnings import mujoco_warnings
 from dh2sim.typing import Array, read_only
 
 CANDIDATES: Final = 1500
+MOST: Final = 1000
+"""Configurations of a plan: choosing takes time in proportion to their square."""
+MOST_JOINTS: Final = 50
+"""That move, of a robot that is planned for."""
+_HOPELESS: Final = 200
+"""Candidates in a row at which links touch each other."""
 _EXCHANGES: Final = 20
 """For each configuration of the plan, at most."""
 _PASSES: Final = 3
@@ -91,7 +98,12 @@ def plan_measurements(
         )
     if count < 1:
         raise CalibrationError(f"the number of configurations must be at least 1, got {count}")
+    if count > MOST:
+        raise CalibrationError(f"the number of configurations must be at most {MOST}, got {count}")
     length, angle = noise if isinstance(noise, tuple) else (noise, noise)
+    joints = len(spec.moving_rows)
+    if joints > MOST_JOINTS:
+        raise CalibrationError(f"{joints} joints move; configurations are chosen for at most {MOST_JOINTS}")
     parameters = RobotParameters(fit_rows(spec))
     q, touching = _candidates(spec, max(CANDIDATES, 4 * count), seed)
     points = _stations(parameters, q, stations) if wanted is Kind.DISTANCE else None
@@ -168,10 +180,13 @@ def _candidates(spec: SpecLike, count: int, seed: int) -> tuple[Array, int]:
     for _ in range(10 * count):
         q = rng.uniform(lower, upper)
         data.qpos[:] = q
-        mujoco.mj_kinematics(compiled, data)
-        mujoco.mj_collision(compiled, data)
+        with mujoco_warnings():  # of a great many contacts, which say no more than one does
+            mujoco.mj_kinematics(compiled, data)
+            mujoco.mj_collision(compiled, data)
         if data.ncon:
             touching += 1
+            if touching == _HOPELESS and not found:
+                break
             continue
         found.append(q)
         if len(found) == count:

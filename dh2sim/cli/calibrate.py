@@ -103,7 +103,7 @@ def calibrate(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write a report as HTML, one file with all plots.")
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random number generator.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the random number generator.")] = 0,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in rad and m.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
@@ -143,6 +143,8 @@ def calibrate(
             else "cannot be combined with DATA",
             param_hint="DATA" if data is None else "--from-run",
         )
+    if out is not None and report is not None and out.resolve() == report.resolve():
+        raise typer.BadParameter("must not be the file of --out", param_hint="--report")
     if rows is not None and from_run is None:
         raise typer.BadParameter("needs --from-run", param_hint="--rows")
 

@@ -25,6 +25,8 @@ from dh2sim.typing import Array, read_only
 
 STREAM: Final = 16
 """Of random numbers, beside those of ``Purpose``; each name has one of its own below it."""
+_MOST_PROBLEMS: Final = 50
+"""Of a file, that are reported."""
 MOST_FILE_BYTES: Final = 2**28
 """Largest file of designs that is read."""
 MOST_NAMES: Final = 1000
@@ -238,6 +240,12 @@ def _read_csv(name: str) -> DesignTable:
                 values[design, column] = _number(cell)
             except NumberError as error:
                 wrong(line, place, str(error), columns[column])
+    if len(problems) > _MOST_PROBLEMS:
+        left = len(problems) - _MOST_PROBLEMS
+        problems = [
+            *problems[:_MOST_PROBLEMS],
+            replace(problems[_MOST_PROBLEMS], path="", message=f"and {left} more"),
+        ]
     if problems:
         raise DesignFileError(problems)
     return DesignTable(

@@ -21,6 +21,8 @@ ONSET: Final = 0.1
 """s: where no jerk limit is given, a joint takes this long to its acceleration limit."""
 INSIDE: Final = 1.0 - 1e-6
 """Share of the limits that is used: peaks are known to that."""
+SMALLEST: Final = 1e-9
+"""Limit that is taken, in SI units or %; 1e9 is the greatest."""
 QUANTITIES: Final = ("velocity", "acceleration", "jerk")
 GIVEN: Final = (*QUANTITIES, "tool_speed", "tool_turn")
 """What ``motion_limits`` takes."""
@@ -189,4 +191,6 @@ def _number(value: object, own: float) -> float | str:
         return f"must be a number, or a share such as '50%', got {value!r}"
     if isinstance(value, bool) or not (math.isfinite(number) and number > 0.0):
         return f"must be a finite number above 0, got {value!r}"
+    if not SMALLEST <= number <= 1.0 / SMALLEST:
+        return f"must be from {SMALLEST:g} to {1.0 / SMALLEST:g}, got {value!r}"
     return number / 100.0 * own if share else number

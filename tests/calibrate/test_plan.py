@@ -14,9 +14,10 @@ from dh2sim.calibrate.plan import plan_measurements
 from dh2sim.errors import CalibrationError
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.spec import RobotSpec
 from tests.calibrate.measured import SIGMA, measured, numbers, off, random_q
 from tests.refusals import refusal
-from tests.sample_robots import model, robot
+from tests.sample_robots import model, robot, row
 
 
 @pytest.mark.parametrize(
@@ -70,6 +71,13 @@ def test_what_a_plan_predicts_is_what_fits_show() -> None:
 def test_what_cannot_be_planned_is_refused() -> None:
     assert "8 configurations give 24 equations, which cannot tell 27 parameters: at least 9 are needed" in refusal(
         CalibrationError, plan_measurements, robot("puma560"), 8
+    )
+    assert refusal(CalibrationError, plan_measurements, robot("puma560"), 1001) == (
+        "the number of configurations must be at most 1000, got 1001"
+    )
+    long = RobotSpec(name="long", rows=tuple(row(name=f"joint_{k}", a=0.1) for k in range(51)))
+    assert refusal(CalibrationError, plan_measurements, long, 200) == (
+        "51 joints move; configurations are chosen for at most 50"
     )
     assert "the ball has to be in one" in refusal(
         CalibrationError, plan_measurements, robot("puma560"), 20, kind="socket"

@@ -185,6 +185,15 @@ def test_a_wrong_file_of_designs_is_named_with_its_place(
     assert (problem.file, problem.line, problem.column, problem.path) == (str(path), *place)
 
 
+def test_of_a_file_that_is_wrong_throughout_the_first_problems_are_reported(tmp_path: Path) -> None:
+    path = tmp_path / "designs.csv"
+    path.write_text("a1\n" + "zork\n" * 1000)
+    with pytest.raises(DesignFileError) as caught:
+        rollout("planar_2r", designs=path, steps=1)
+    assert len(caught.value.problems) == 51
+    assert str(caught.value.problems[-1]) == f"{path}:52:1: and 950 more"
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -379,6 +379,7 @@ def test_everything_that_is_wrong_with_waypoints_is_reported_at_once() -> None:
         ({"duration": -1.0}, "duration must be a finite time above 0 s, got -1.0"),
         ({"free": "all"}, "free must be one of rotation, roll, got 'all'"),
         ({"speed": 1}, "speed is not an option."),
+        ({"limits": {"velocity": 1e-300}}, "limits velocity must be from 1e-09 to 1e+09, got 1e-300"),
         ({"limits": {"velocity": 0}}, "limits velocity must be a finite number above 0, got 0"),
         ({"limits": {"jerk": 5}, "profile": "trapezoid"}, "limits must not contain 'jerk' with profile 'trapezoid'"),
         ({"kind": "arc"}, "waypoints of arcs are start, via, end"),
