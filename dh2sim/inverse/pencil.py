@@ -25,6 +25,8 @@ _CLOSE = 1e-5
 """Half angles that differ by less, in rad, may be one, whose eigenvector is any mixture of those of two solutions."""
 _LARGE = 1e5
 """Quotient of matrices above which eigenvalues are ill-conditioned."""
+_SINGULAR = 1e8
+"""Condition above which they are, too, though quotients of what rounding leaves may be small."""
 _ZERO = 1e-11
 """Singular values below this share of the largest are zero."""
 _MEET = 1e-9
@@ -342,12 +344,15 @@ def _eigenpairs(C: Array) -> tuple[Array, Array, Flags]:
     size = C.shape[-1]
     companion = np.zeros((C.shape[1], 2 * size, 2 * size))
     companion[:, :size, size:] = np.eye(size)
-    companion[:, size:] = -_solved(C[2], np.concatenate([C[0], C[1]], axis=2))
+    unit = np.broadcast_to(np.eye(size), C[2].shape)
+    solved = _solved(C[2], np.concatenate([C[0], C[1], unit], axis=2))
+    companion[:, size:] = -solved[:, :, : 2 * size]
     bad = np.logical_not(np.isfinite(companion).all(axis=(1, 2)))
     companion[bad] = 0.0
     t, V = np.linalg.eig(companion)
     t = np.where(bad[:, None], np.nan, t).astype(np.complex128)
-    large = bad | (np.abs(companion).max(axis=(1, 2)) > _LARGE)
+    condition = np.abs(C[2]).max(axis=(1, 2)) * np.abs(solved[:, :, 2 * size :]).max(axis=(1, 2))
+    large = bad | (np.abs(companion).max(axis=(1, 2)) > _LARGE) | (condition > _SINGULAR)
     return t, np.where((np.abs(t) <= 1.0)[:, None, :], V[:, :size], V[:, size:]).astype(np.complex128), large
 
 

@@ -24,3 +24,11 @@ def test_regular_configurations_with_joints_at_right_angles_are_found(spec: Robo
     assert len(q) > 80
     for drawn, found in zip(q, solver.solve(table_tool_pose(spec, q), limits=False), strict=True):
         assert is_found(spec, drawn, found.q)
+
+
+def test_a_pose_at_which_a_pencil_is_singular_but_for_rounding_has_all_eight() -> None:
+    ur10e = robot("ur10e")
+    q = np.array([0.0, np.pi, -0.5 * np.pi, np.pi, 0.5 * np.pi, 0.0])
+    found = InverseSolver(ur10e).solve(table_tool_pose(ur10e, q), limits=False)
+    assert len(found) == 8
+    assert is_found(ur10e, q, found.q)
