@@ -15,7 +15,16 @@ def read_input(path: Path, most: int) -> bytes:
     Raises:
         OSError: It cannot be read.
     """
-    if path.is_fifo() and not path.is_relative_to("/dev") and path.resolve().exists():
-        raise OSError(errno.EINVAL, "is a named pipe, not a file", str(path))
+    refuse_named_pipe(path)
     with path.open("rb") as file:
         return file.read(most + 1)
+
+
+def refuse_named_pipe(path: Path) -> None:
+    """Refuse a pipe that has a name in a folder, as ``read_input`` does.
+
+    Raises:
+        OSError: It is one.
+    """
+    if path.is_fifo() and not path.is_relative_to("/dev") and path.resolve().exists():
+        raise OSError(errno.EINVAL, "is a named pipe, not a file", str(path))

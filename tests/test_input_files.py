@@ -6,6 +6,7 @@ import pytest
 from dh2sim.errors import Dh2simError
 from dh2sim.input_files import read_input
 from dh2sim.robot.read import load_robot
+from dh2sim.simulate.run import rollout
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
@@ -33,3 +34,13 @@ def test_a_pipe_of_the_shell_is_read_to_its_end() -> None:
 def test_a_file_that_is_larger_is_read_one_byte_further(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(bytes(100))
     assert len(read_input(tmp_path / "file", 10)) == 11
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+@pytest.mark.parametrize("option", ["start", "controller"])
+def test_a_rollout_does_not_wait_for_a_pipe_with_a_name(tmp_path: Path, option: str) -> None:
+    pipe = tmp_path / "states.csv"
+    os.mkfifo(pipe)
+    value = str(pipe) if option == "start" else f"replay:{pipe}"
+    with pytest.raises(Dh2simError, match="is a named pipe, not a file"):
+        rollout("planar_2r", rollouts=1, steps=1, **{option: value})  # type: ignore[arg-type]

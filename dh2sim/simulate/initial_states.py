@@ -14,6 +14,7 @@ from mujoco.batch import Batch
 
 from dh2sim.errors import SettingsError
 from dh2sim.formats.mjcf.mechanism import joint_coordinates
+from dh2sim.input_files import refuse_named_pipe
 from dh2sim.messages import did_you_mean, listed
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.simulate.closed_loops import ClosedLoops
@@ -193,6 +194,7 @@ def reference_start(first: Mapping[str, float] | None, joints: tuple[str, ...]) 
 
 def _read_file(path: Path, joints: tuple[str, ...], rollouts: int) -> Array:
     try:
+        refuse_named_pipe(path)
         if path.stat().st_size > MOST_FILE_BYTES:
             raise _refused(f"{path}: is larger than {MOST_FILE_BYTES / 2**30:g} GB")
         states = _npy(path, joints) if path.suffix.lower() == ".npy" else _csv(path, joints)

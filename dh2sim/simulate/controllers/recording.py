@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from dh2sim.errors import ControllerError, RunError
+from dh2sim.input_files import refuse_named_pipe
 from dh2sim.messages import closest, listed
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.controllers.reference import read_reference
@@ -229,6 +230,7 @@ def read_recording(file: str, kind: str) -> Recording:
     if path.suffix.lower() not in readers:
         raise ControllerError(f"'{file}' cannot be replayed; it must be a .csv, .npy or .npz file or a run of dh2sim")
     try:
+        refuse_named_pipe(path)
         return readers[path.suffix.lower()](path, file, kind)
     except OSError as error:
         raise ControllerError(f"cannot read '{file}': {error.strerror or error}") from error

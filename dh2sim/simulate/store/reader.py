@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.errors import RunDamagedError, RunDiffersError, RunError
+from dh2sim.errors import Dh2simError, RunDamagedError, RunDiffersError
 from dh2sim.extras import require_extra
 from dh2sim.simulate.store.codec import CHECKSUM_BYTES, ITEM_SIZES, decode_text, stored_checksum, verified_checksum
 from dh2sim.simulate.store.manifest import (
@@ -257,7 +257,7 @@ def reading(path: Place) -> Iterator[None]:
     """
     try:
         yield
-    except RunError:
+    except Dh2simError:
         raise
     except (OSError, ValueError, RuntimeError, KeyError, TypeError) as error:
         raise RunDamagedError(damaged_run(path)) from error

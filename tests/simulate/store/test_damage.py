@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import zarr
 
-from dh2sim.errors import RunDamagedError, RunError
+from dh2sim.errors import CalibrationError, RunDamagedError, RunError
 from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.description import describe
 from dh2sim.simulate.store.reader import open_dataset, reading
@@ -217,3 +217,8 @@ def test_a_reader_of_any_damaged_file_gets_the_sound_numbers_or_an_error_for_use
         _truncate(damaged / file)
         with suppress(RunDamagedError), reading(damaged):
             assert open_dataset(damaged).load().identical(dataset), file
+
+
+def test_what_is_wrong_with_a_use_of_a_run_is_not_called_damage(tmp_path: Path) -> None:
+    with pytest.raises(CalibrationError, match="its joints are others"), reading(tmp_path):
+        raise CalibrationError("its joints are others")
