@@ -191,7 +191,9 @@ class Baseline:
             raise Dh2simError(f"{path}: is larger than {MAX_BYTES // 10**6} MB, the most that is read of a baseline")
         try:
             content = json.loads(data)
-        except (ValueError, RecursionError) as error:
+        except RecursionError:
+            raise Dh2simError(f"{path}: is not a baseline: it is nested too deeply") from None
+        except ValueError as error:
             raise Dh2simError(f"{path}: is not a baseline: {error}") from None
         if not isinstance(content, dict) or content.get("version") != _VERSION:
             raise Dh2simError(f"{path}: is not a baseline of version {_VERSION}; write it with --write-baseline")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from dh2sim.cli.common import FELL_SHORT, choice, tolerance_of
+from dh2sim.cli.common import FELL_SHORT, choice, refuse_other_formats, tolerance_of
 from dh2sim.cli.output import progress_bar
 from dh2sim.messages import printable
 
@@ -111,6 +111,8 @@ def check(
     parts = [part for name in only or () if (part := choice(name, CheckPart, "--only")) is not None]
     forms = [(path, format_of(path)) for path in out or ()]
     accepted = None if baseline is None else Baseline.read(baseline)
+    for path in paths or ():
+        refuse_other_formats(str(path))
     files = find_robot_files(paths or [Path()])
     with progress_bar("checking", "robots", len(files)) as advance:
         report = check_files(

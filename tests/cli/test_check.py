@@ -9,6 +9,7 @@ import pytest
 
 from tests.program import dh2sim
 from tests.robot_files import small, write
+from tests.sample_robots import ROBOTS_DIR
 
 
 @pytest.fixture(autouse=True)
@@ -91,3 +92,10 @@ def test_wrong_usage_is_status_2(arguments: list[str], message: str, folder: Pat
     assert run.status == 2
     assert message in " ".join(run.err.split()).replace("Invalid value for ", "")
     assert sorted(path.name for path in folder.iterdir()) == ["arm.yaml"]
+
+
+def test_a_file_of_another_format_is_named_as_such() -> None:
+    urdf = ROBOTS_DIR.parent / "generated" / "planar_2r" / "planar_2r.urdf"
+    run = dh2sim("check", urdf)
+    assert (run.status, run.out) == (2, "")
+    assert run.err.startswith(f"dh2sim: {urdf}: this is a URDF, not a robot file: run 'dh2sim import ")
