@@ -147,6 +147,7 @@ def test_tables_that_are_called_the_same_arm_have_the_same_tool_everywhere(compa
     assert rotation < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("comparison", SAME, ids=lambda comparison: comparison.heading)
 def test_a_wrong_number_in_a_table_would_be_noticed(comparison: Comparison) -> None:
     for row in comparison.rows[1:-1]:
@@ -210,6 +211,7 @@ def test_every_error_in_the_tables_is_within_its_tolerance() -> None:
         assert max(float(value) for cell in cells for value in cell) <= float(tolerance)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", ARMS, ids=[arm.key for arm in ARMS])
 def test_a_line_is_made_again_as_it_is_but_for_the_digits_of_errors(arm: Arm) -> None:
     root = installed(arm.package)

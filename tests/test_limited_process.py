@@ -76,6 +76,7 @@ def test_a_worker_writes_no_file(tmp_path: Path) -> None:
     assert not any(path.stat().st_size for path in tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_modules_in_the_current_folder_are_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("dh2sim", "struct", "tests"):
         (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w')")

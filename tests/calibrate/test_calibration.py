@@ -71,6 +71,7 @@ def test_what_folds_into_what_is_named() -> None:
     assert all(each.change == 0.0 and each.value == each.nominal for each in unchanged)
 
 
+@pytest.mark.slow
 def test_a_tracker_may_stand_anywhere_and_the_tool_be_any() -> None:
     nominal = robot("ur5e")
     true = off(nominal, 1e-3, 1)
@@ -144,6 +145,7 @@ def sockets(count: int = 30, places: int = 3) -> tuple[RobotSpec, dict[str, list
     return nominal, names, q
 
 
+@pytest.mark.slow
 def test_a_ball_in_sockets_tells_the_arm_once_a_distance_is_known() -> None:
     nominal, names, q = sockets(12, 4)
     given = measurements(nominal, q, distances=np.full(len(q), 0.06), **names)  # type: ignore[arg-type]

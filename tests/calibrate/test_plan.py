@@ -20,6 +20,7 @@ from tests.refusals import refusal
 from tests.sample_robots import model, robot, row
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["scara", *(pytest.param(name, marks=pytest.mark.slow) for name in ("puma560", "franka_panda"))]
 )

@@ -108,6 +108,7 @@ def test_a_report_is_one_page_that_needs_nothing_else(points: Path, tmp_path: Pa
     assert "nan" not in text
 
 
+@pytest.mark.slow
 def test_configurations_to_measure_are_written_as_the_columns_of_a_file(tmp_path: Path) -> None:
     out = tmp_path / "plan.csv"
     run = dh2sim("calibrate", "scara", "--plan", "10", "-o", out)

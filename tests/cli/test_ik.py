@@ -220,6 +220,7 @@ def test_the_derivation_in_json_has_a_value_for_every_symbol_of_every_branch() -
         assert [values[f"q{i}"] for i in range(1, 7)] == pytest.approx(branch["q"], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_why_there_is_no_derivation_is_in_the_json_too() -> None:
     derivation = found("franka_panda", "--at", "home", "--explain")["derivation"]
     assert (derivation["form"], derivation["steps"]) == ("", [])

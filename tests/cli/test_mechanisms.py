@@ -20,7 +20,6 @@ REFUSED = (
     "workspace four_bar -o reach.csv",
     "trajectory four_bar home home -o motion.csv",
     "convert four_bar --to modified -o other.yaml",
-    "draw four_bar -o drawing.svg",
 )
 
 

@@ -321,6 +321,7 @@ def test_a_terminal_that_knows_few_characters_is_written_to_all_the_same(tmp_pat
     assert json.loads(dh2sim_process("info", robot, "--json").out)["description"] == "été θ 臂"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [("export", "rpr"), ("validate", "rpr"), ("rollout", "rpr", "--out", "run.zarr")])
 def test_a_missing_drawing_library_is_named(command: tuple[str, ...], tmp_path: Path) -> None:
     run = dh2sim_process(*command, cwd=tmp_path, variables={"MUJOCO_GL": "nonsense"})

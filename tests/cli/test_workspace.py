@@ -31,6 +31,7 @@ def test_json_has_numbers_alone() -> None:
     assert content["voxels"] > content["sampled_voxels"] > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["npz", "csv", "ply", "svg", "png"])
 @pytest.mark.parametrize("section", [(), ("--section",)])
 def test_files_of_all_kinds_are_written(tmp_path: Path, ending: str, section: tuple[str, ...]) -> None:

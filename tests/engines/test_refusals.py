@@ -120,6 +120,7 @@ def test_a_ball_joint_is_refused(tmp_path: Path) -> None:
     assert message("mujoco-mjcf", tmp_path) == "a joint is neither a hinge nor a slide"
 
 
+@pytest.mark.slow
 def test_pinocchio_is_not_asked_for_more_joints_than_memory_allows(tmp_path: Path) -> None:
     rows = tuple(
         Row(name=f"q{i}", type=JointType.REVOLUTE, convention=Convention.STANDARD, a=0.1) for i in range(241)

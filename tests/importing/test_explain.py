@@ -342,6 +342,7 @@ def test_the_residual_is_explained() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", [STANDARD, MODIFIED])
 @pytest.mark.parametrize("seed", range(40))
 def test_what_is_explained_of_any_robot_is_true_of_its_axes_and_rows(seed: int, convention: Convention) -> None:

@@ -42,6 +42,7 @@ def test_slides_that_are_far_out_are_told_apart_as_exactly_as_they_are_far() -> 
     assert float(np.abs(found.q[:, 0]).max()) > 9e4
 
 
+@pytest.mark.slow
 def test_an_arm_that_is_regular_by_rounding_alone_is_told_so() -> None:
     twists = (3.141593, 3.141593, 3.141593, 1.570796, 1.570796, 0.0)
     four_parallel = arm("rounded", *((0.1 + 0.05 * i, twist, 0.0, 0.0, "R") for i, twist in enumerate(twists)))

@@ -47,6 +47,7 @@ def assert_as_the_plain_loop(
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("floating", [False, True], ids=["fixed", "floating"])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("driver", ["MotorWave", "Spring"])

@@ -123,6 +123,7 @@ def speeds(tmp_path: Path) -> Path:
     return tmp_path / "speeds.npy"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("floating", [False, True], ids=["fixed", "floating"])
 @pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicit", "implicitfast"])
 @pytest.mark.parametrize("driver", ["MotorWave", "Spring"])

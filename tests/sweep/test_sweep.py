@@ -27,6 +27,7 @@ def test_each_design_has_the_measures_of_its_own_robot() -> None:
     assert best.parameters == {"a1": a[0, best.design], "a2": a[1, best.design]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".csv", ".parquet"])
 def test_the_table_has_the_same_bytes_however_it_was_interrupted_and_extended(tmp_path: Path, ending: str) -> None:
     whole, parts = tmp_path / f"whole{ending}", tmp_path / f"parts{ending}"

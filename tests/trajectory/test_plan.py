@@ -131,6 +131,7 @@ def test_random_robots_of_any_convention_keep_their_limits(spec: RobotSpec, data
     assert planned.at([p.time for p in planned.waypoints])[0][-1].tolist() == points[-1].tolist()
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(spec=robot_specs(max_rows=7), seed=st.integers(0, 10**6))
 def test_lines_of_random_robots_are_straight_or_refused(spec: RobotSpec, seed: int) -> None:

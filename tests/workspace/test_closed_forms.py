@@ -155,6 +155,7 @@ def test_pumas_manipulability_has_the_factors_of_its_determinant() -> None:
     assert found.measure == "pose"
 
 
+@pytest.mark.slow
 def test_pumas_singular_set_is_its_stretched_elbow_and_its_wrist_above_the_shoulder() -> None:
     found = workspace(Robot.load("puma560"), section=True)
     assert found.section is not None

@@ -45,6 +45,7 @@ def test_search_finds_what_more_random_configurations_find() -> None:
     assert (few.count > 0).sum() < 0.3 * len(found)
 
 
+@pytest.mark.slow
 def test_voxels_fill_the_section_turned_about_the_first_axis() -> None:
     found = Robot.load("arm_5r").workspace(samples=20000, size=0.04, section=True, threads=1)
     assert found.section is not None
@@ -73,6 +74,7 @@ def test_points_curves_and_surfaces_are_told_apart(
         assert len(found.centers) == count
 
 
+@pytest.mark.slow
 def test_a_planar_arm_that_stands_upright_and_askew_has_flat_cells() -> None:
     tilted = np.eye(4)
     tilted[:3, :3] = [[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]

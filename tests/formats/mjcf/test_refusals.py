@@ -270,6 +270,7 @@ def test_a_model_that_mujoco_cannot_cope_with_is_refused_by_name(
     assert refused(tmp_path, model_text(ARM)) == f"robot.xml:1:1: MuJoCo cannot compile the file: {reason}"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux only")
 def test_a_model_that_takes_too_much_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = model_text(ARM + IN_THE_WORLD, FIELD.format(1500))

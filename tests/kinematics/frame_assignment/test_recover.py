@@ -124,6 +124,7 @@ def test_nearly_parallel_axes_make_a_hayati_row_and_no_distant_normal() -> None:
     assert _off_by(recovery.spec, axes, T_base_tip, np.random.default_rng(0)) < 2e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", [Convention.STANDARD, Convention.MODIFIED])
 @pytest.mark.parametrize("size", [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1])
 @pytest.mark.parametrize("kind", KINDS)

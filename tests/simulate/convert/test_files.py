@@ -87,6 +87,7 @@ def test_folders_that_are_missing_are_made(run: Path, tmp_path: Path, kind: str)
     assert set(contents(tmp_path)) == {f"a/b/{file.name}" for file in files}
 
 
+@pytest.mark.slow
 @both
 @pytest.mark.parametrize(
     "file", ["qvel/c.1.0.0", "status/c.2", "time/c.0", "joint_unit/c.0", "pose/c.0", "zarr.json"]

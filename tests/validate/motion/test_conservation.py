@@ -137,6 +137,7 @@ def test_a_force_from_outside_changes_momentum() -> None:
     assert check.reason.endswith(" (tolerance 1e-09)")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["mass", "inertia", "centre of mass", "joint"])
 def test_a_simulation_of_another_robot_does_not_conserve_this_ones_momentum(how: str) -> None:
     model = built("stanford")

@@ -23,6 +23,7 @@ def runs() -> tuple[xr.Dataset, ...]:
     return recorded_rollouts(built("stanford"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", [*COSTLY_NAMES, ODD, RICH, FRICTION], ids=lambda text: text.split("\n")[0])
 def test_recorded_accelerations_take_the_recorded_torques(robot: str) -> None:
     check = check_inverse(recorded_rollouts(built(robot)))

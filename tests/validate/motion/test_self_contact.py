@@ -22,6 +22,7 @@ def checked(model: RobotModel, *, seed: int = 0) -> Check:
     return check_self_contact(model, compile_model(model), seed=seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", [*COSTLY_NAMES, ODD, snake(12)], ids=lambda text: text.split("\n")[0])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_robot_makes_no_contacts_by_construction(robot: str, seed: int) -> None:

@@ -18,6 +18,7 @@ from tests.sample_robots import COSTLY_NAMES
 from tests.validate.motion.robots import FRICTION, WEAK, built
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", [*COSTLY_NAMES, ODD, FRICTION], ids=lambda text: text.split("\n")[0])
 def test_a_robot_follows_its_reference(robot: str) -> None:
     check = check_tracking(tracking_rollouts(built(robot)))
