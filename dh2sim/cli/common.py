@@ -166,12 +166,15 @@ def guarded(command: Callable[P, int | None]) -> Callable[P, None]:
         except Dh2simError as error:
             status = complain(error)
         except BrokenPipeError:
-            # the reader of our output has closed it; a second complaint at exit is not needed either
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _drop_output()  # its reader has closed it
             status = DONE
         except OSError as error:
             where = f"{error.filename}: " if error.filename else ""
             status = complain(f"{where}{error.strerror or error}")
+            try:
+                sys.stdout.flush()
+            except OSError:
+                _drop_output()
         except MemoryError:
             status = complain("not enough memory")
         except (RuntimeError, ImportError, AttributeError) as error:
@@ -184,6 +187,11 @@ def guarded(command: Callable[P, int | None]) -> Callable[P, None]:
         raise SystemExit(status)
 
     return run
+
+
+def _drop_output() -> None:
+    """Send what is left of standard output nowhere: Python would complain at exit that it cannot be written."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _blames_drawing(error: BaseException) -> bool:
