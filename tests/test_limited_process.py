@@ -49,6 +49,7 @@ def test_an_answer_that_is_too_large_is_not_sent() -> None:
     assert stopped(f"return {MOST_BYTES + 1}") == f"it needs more than {MEMORY // 1_000_000} MB of memory"
 
 
+@pytest.mark.slow
 def test_a_request_that_computes_without_end_is_stopped() -> None:
     assert stopped("loop", seconds=1) == "it takes longer than 1 seconds"
 

@@ -98,6 +98,7 @@ def test_importing_the_package_imports_nothing_but_itself() -> None:
     assert _imported("import dh2sim") - before == {"dh2sim"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "allowed"),
     [
@@ -138,6 +139,7 @@ def test_code_is_written_without_an_engine_and_without_what_draws(tmp_path: Path
     assert not _imported(RUN.format(arguments=arguments)) & {*RUNS, *TABLES, *PICTURES, *MODELS, "mujoco", "rich"}
 
 
+@pytest.mark.slow
 def test_a_rollout_imports_neither_tables_nor_pictures(tmp_path: Path) -> None:
     arguments = ["rollout", "rpr", "--out", str(tmp_path / "run.zarr"), "--rollouts", "2", "--steps", "5"]
     found = _imported(RUN.format(arguments=arguments))

@@ -31,6 +31,7 @@ def fitted(name: str, kind: str, count: int = 50, **options: object) -> tuple[Ro
     return true, calibrate(nominal, given, noise=SIGMA, **options)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "poses", "positions"), COUNTS)
 def test_poses_tell_four_numbers_a_turning_joint_two_a_sliding_one_and_six(
     name: str, poses: int, positions: int

@@ -94,6 +94,7 @@ def test_wrong_arguments_are_told(arguments: list[str], message: str, points: Pa
     assert run.out == ""
 
 
+@pytest.mark.slow
 def test_a_report_is_one_page_that_needs_nothing_else(points: Path, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     run = dh2sim("calibrate", "stanford", points, "--report", page, "--quiet")

@@ -129,6 +129,7 @@ def test_a_pose_file_of_another_frame_is_a_goal_for_that_frame(tmp_path: Path) -
     assert found("stanford", "--pose", pose_file(tmp_path, pose))["frame"] == "dh_4"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [

@@ -23,6 +23,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_plot_is_written_beside_its_run(run: Path) -> None:
     out = run.with_name("run-1-joints.png")
     done = dh2sim("plot", run, "--rollout", "1", "--size", "700x500", "--dpi", "60")

@@ -247,6 +247,7 @@ def _completions(words: str, folder: Path) -> list[str]:
     return run.out.split()
 
 
+@pytest.mark.slow
 def test_shells_complete_commands_options_robots_and_robot_files(tmp_path: Path) -> None:
     (tmp_path / "stall.yaml").touch()
     (tmp_path / "stall.stl").touch()

@@ -87,6 +87,7 @@ def test_it_is_the_run_that_the_library_makes(folder: Path) -> None:
     assert {**found.attrs, **own} == {**made.attrs, **own}
 
 
+@pytest.mark.slow
 def test_the_command_is_kept_as_a_shell_would_take_it(tmp_path: Path) -> None:
     write(tmp_path, small(), "my robot")
     arguments = ["rollout", "my robot.yaml", "--out", "a b.zarr", *QUICK]
@@ -252,6 +253,7 @@ def test_a_seed_may_be_of_any_size(folder: Path) -> None:
     assert dh2sim("rollout", "rich.yaml", "--out", "run.zarr", *QUICK, "--seed", seed, "--resume", "-q").status == 0
 
 
+@pytest.mark.slow
 def test_no_bar_is_drawn_into_a_file(folder: Path) -> None:
     run = dh2sim_process("rollout", "rich.yaml", "--out", "run.zarr", *QUICK, cwd=folder)
     assert (run.status, run.err) == (0, "")

@@ -37,6 +37,7 @@ def run(folder: Path, arrays: Arrays) -> Path:
     return write_run(Path("run.zarr"), make_layout(), arrays)
 
 
+@pytest.mark.slow
 def test_files_of_a_conversion_stand_beside_the_run_and_are_reported(run: Path) -> None:
     printed = dh2sim("runs", run, "--to", "parquet")
     names = ["run.parquet", "run.steps.parquet", "run.rollouts.parquet"]
@@ -90,6 +91,7 @@ def test_the_run_of_the_current_folder_is_converted_beside_it(run: Path, monkeyp
     assert Path("../run.h5").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["parquet", "hdf5"])
 @pytest.mark.parametrize("out", ["", ".", ".."])
 def test_a_folder_is_no_file_to_write_to(run: Path, kind: str, out: str) -> None:

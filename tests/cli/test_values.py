@@ -78,6 +78,7 @@ def test_values_are_those_of_typer_and_so_are_its_words(
     assert outcome(PlainCommand, words) == outcome(TyperCommand, words)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments", ["symbolic planar_2r", "fk stanford home", "export planar_2r", "list", "--version"]
 )

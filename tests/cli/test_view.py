@@ -144,6 +144,7 @@ def test_it_serves_a_page_at_the_printed_address_until_it_is_stopped(
     assert is_free(port)
 
 
+@pytest.mark.slow
 def test_it_stops_at_once_with_a_page_open() -> None:
     client = pytest.importorskip("websockets.sync.client")
     import viser
@@ -177,6 +178,7 @@ def test_an_interruption_while_it_starts_makes_no_traceback() -> None:
             assert err == "dh2sim: interrupted\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "status", "message"),
     [(signal.SIGINT, 130, "dh2sim: interrupted\n"), (signal.SIGTERM, 143, "")],
@@ -218,6 +220,7 @@ def test_by_default_only_this_machine_can_reach_it() -> None:
     assert rest == ["dh2sim: interrupted"]
 
 
+@pytest.mark.slow
 def test_an_address_that_only_this_machine_can_reach_gives_no_warning() -> None:
     with serving("stanford", "--port", str(unused_port()), "--host", "localhost", "--share", "never") as process:
         first_line(process)
@@ -339,11 +342,13 @@ def test_pages_are_never_shared_over_the_internet(word: str) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_missing_run_is_refused_before_anything_is_served(tmp_path: Path) -> None:
     done = dh2sim_process("view", "stanford", "run.zarr", "--no-browser", cwd=tmp_path)
     assert (done.status, done.out, done.err) == (2, "", "dh2sim: there is no 'run.zarr'\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", builtin_robots())
 def test_every_built_in_robot_opens_at_home_where_its_table_has_it(robot: str) -> None:
     spec = load_robot(robot)

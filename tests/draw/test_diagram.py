@@ -187,6 +187,7 @@ def test_tikz_compiles(style: str, tmp_path: Path) -> None:
     assert "Missing character" not in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ending", "begins"), [(".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<svg"), (".tex", b"\\beg")]
 )
@@ -236,6 +237,7 @@ def test_wrong_arguments_are_named() -> None:
         draw_robot(spec, "hom")
 
 
+@pytest.mark.slow
 def test_the_command_writes_what_the_library_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     done = dh2sim("draw", "scara")

@@ -46,6 +46,7 @@ def changed(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return np.asarray((np.abs(a.astype(int) - b.astype(int)) > 24).any(axis=2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["rpr", "stanford", "planar_2r"])
 @pytest.mark.parametrize(
     "camera", [CameraChoice(), CameraChoice(azimuth=20.0, elevation=-60.0)], ids=["usual", "from above"]

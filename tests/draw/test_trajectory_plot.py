@@ -24,6 +24,7 @@ def test_every_joint_has_a_row_of_position_velocity_acceleration_and_jerk() -> N
         assert ax.get_ylabel() == unit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])
 def test_the_command_plots_a_trajectory_file_beside_it(tmp_path: Path, suffix: str) -> None:
     motion = tmp_path / f"motion{suffix}"

@@ -90,6 +90,7 @@ def test_an_export_cut_off_at_any_moment_leaves_whole_files(tmp_path: Path, kind
             assert [path.name for path in out.iterdir()] == ["small"], "the temporary folder is removed"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_the_program_ends_in_good_order_on_a_signal(tmp_path: Path, kind: signal.Signals, status: int) -> None:
     process = _start("-m", "dh2sim", "export", *builtin_robots(), "--out", tmp_path)

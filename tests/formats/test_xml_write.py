@@ -62,6 +62,7 @@ NAMES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", NAMES)
 def test_a_comment_is_safe_whatever_the_source_is_called(source: str) -> None:
     spec = dataclasses.replace(ODD_ROBOT, source_file=SourceFile(name=source, path=source, text="", sha256="0" * 64))

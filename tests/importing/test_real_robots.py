@@ -58,6 +58,7 @@ def file_joints(arm: Arm) -> list[str]:
     return [joint.name for joint in chain.joints]
 
 
+@pytest.mark.slow
 @every_arm
 def test_an_arm_has_a_table_within_the_tolerance(arm: Arm) -> None:
     residual = imported_arm(arm).residual
@@ -73,6 +74,7 @@ def test_an_arm_runs_from_the_named_base_to_the_named_tip(arm: Arm) -> None:
     assert [row.name for row in imported.spec.rows] == file_joints(arm)
 
 
+@pytest.mark.slow
 @every_arm
 def test_rows_are_of_the_wanted_convention_but_where_axes_are_nearly_parallel(arm: Arm) -> None:
     rows = imported_arm(arm).spec.rows
@@ -80,6 +82,7 @@ def test_rows_are_of_the_wanted_convention_but_where_axes_are_nearly_parallel(ar
     assert {row.convention for row in rows} <= {arm.convention, Convention.HAYATI}
 
 
+@pytest.mark.slow
 @every_arm
 def test_the_table_as_a_urdf_puts_the_tool_where_others_find_the_tip_in_the_file(arm: Arm, tmp_path: Path) -> None:
     spec = imported_arm(arm).spec
@@ -119,6 +122,7 @@ def weights(path: Path, base: str, joints: list[str], q: Array) -> list[Any]:
     return [(T_base_world * data.oMi[i]).act(model.inertias[i]) for i in ids]
 
 
+@pytest.mark.slow
 @every_urdf
 def test_every_link_weighs_what_it_weighs_in_the_file_and_where_it_is_there(arm: Arm, tmp_path: Path) -> None:
     rows = imported_arm(arm).spec.rows

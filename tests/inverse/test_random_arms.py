@@ -95,6 +95,7 @@ def check_random(spec: RobotSpec) -> None:
     check(spec, q, InverseSolver(spec).solve(table_tool_pose(spec, q), limits=False))
 
 
+@pytest.mark.slow
 @given(arms())
 @settings(max_examples=6)
 def test_drawn_configurations_of_random_arms_are_found(spec: RobotSpec) -> None:

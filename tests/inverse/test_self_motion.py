@@ -37,6 +37,7 @@ def whole_curves(name: str) -> Solutions:
     return solved(robot(name), in_limits(model(name), 1, seed=4)[0], limits=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["franka_panda", *(pytest.param(name, marks=pytest.mark.slow) for name in ("ssrms", "kuka_iiwa14"))]
 )

@@ -113,6 +113,7 @@ assembly: {{q: [0.9, -1.2, 1.0]}}
 """
 
 
+@pytest.mark.slow
 def test_a_slider_crank_moves_as_its_closed_form() -> None:
     spec = parse_robot(SLIDER)
     for angle in np.linspace(-7, 7, 15):

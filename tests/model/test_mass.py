@@ -114,6 +114,7 @@ def test_inertia_of_every_link_is_one_that_a_body_can_have(name: str) -> None:
     assert_bodies_are_possible(model(name))
 
 
+@pytest.mark.slow
 @settings(max_examples=min(60, settings().max_examples))
 @given(robot_specs(must_move=False))
 def test_inertia_of_every_link_of_any_robot_is_one_that_a_body_can_have(spec: RobotSpec) -> None:

@@ -183,6 +183,7 @@ def test_the_robot_read_back_has_the_same_poses(
     np.testing.assert_allclose(table_tool_pose(back, q), table_tool_pose(spec, q), rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", AngleUnit)
 @pytest.mark.parametrize("length", LengthUnit)
 @pytest.mark.parametrize("name", builtin_robots())

@@ -236,6 +236,7 @@ def test_an_existing_run_is_overwritten_only_if_that_is_said(run: Path) -> None:
     assert describe(run).complete
 
 
+@pytest.mark.slow
 def test_two_commands_do_not_write_to_one_run(run: Path) -> None:
     process = _start(run)
     try:

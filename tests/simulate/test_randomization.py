@@ -18,6 +18,7 @@ ALL = {"mass": 0.3, "friction": 0.4, "damping": 0.5, "armature": 0.2, "gain": 0.
 RECORD = ("qpos", "qvel", "ctrl", "tool_pose", "qacc", "torque", "energy", "contacts")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("floating", [False, True], ids=["fixed", "floating"])
 @pytest.mark.parametrize(
     ("controller", "what"),

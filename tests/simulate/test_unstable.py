@@ -41,6 +41,7 @@ def run_of(driver: str, value: float, **how: Any) -> xr.Dataset:
     return rollout(robots.arm(), controller=f"{DRIVERS}:{driver}:value={value}", **settings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("every", [1, 4, 5])
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e11])
 @BOTH

@@ -168,6 +168,7 @@ NONSENSE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["at first", "later"])
 @pytest.mark.parametrize("what", NONSENSE)
 def test_a_page_that_sends_nonsense_loses_only_itself(
@@ -196,6 +197,7 @@ VALUES: Final[tuple[Any, ...]] = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "widget",
     [

@@ -213,6 +213,7 @@ def test_a_robot_yields_to_a_force_as_its_jacobian_and_stiffness_predict() -> No
     assert physics.q == pytest.approx(model.home, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_force_keeps_its_direction_while_the_link_turns() -> None:
     physics = Physics(pendulum(), [0.0], gravity=False, drive="free")
     apply_force(physics, "link_1", [0.5, 0.0, 0.0], [0.0, 4.0, 0.0])

@@ -96,6 +96,7 @@ def test_a_cylindrical_arm_reaches_a_cylindrical_shell(turn: float) -> None:
     assert found.extremes["innermost"].value == pytest.approx(0.2, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_spherical_arm_reaches_a_spherical_shell_whatever_way_it_stands() -> None:
     rows = [
         Continuous(alpha=math.pi / 2),

@@ -139,6 +139,7 @@ def test_wrong_arguments_are_reported_together() -> None:
         Robot.load("puma560").workspace(frame="dh_9")
 
 
+@pytest.mark.slow
 def test_voxels_are_as_fine_as_the_arm_is_large_unless_a_size_is_given() -> None:
     def scaled(factor: float) -> Robot:
         links = [

@@ -258,6 +258,7 @@ def test_a_link_to_another_folder_is_not_included(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("request_", "reason"),
     [("loop", "it takes longer than 1 seconds"), ("abort", "it ended the process that read it (signal 6)")],

@@ -16,6 +16,7 @@ from tests.simulate.store.runs import finish, lasting, layout, make, resume
 refused = partial(refusal, RunDiffersError, RunWriter.resume)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("other", "reported"),
     [

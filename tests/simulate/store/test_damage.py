@@ -207,6 +207,7 @@ def test_metadata_that_do_not_belong_together_are_both_named(tmp_path: Path) -> 
     )
 
 
+@pytest.mark.slow
 def test_a_reader_of_any_damaged_file_gets_the_sound_numbers_or_an_error_for_users(tmp_path: Path) -> None:
     path = make(tmp_path / "run.zarr", SMALL)
     dataset = open_dataset(path).load()

@@ -83,6 +83,7 @@ def _undisturbed(folder: Path) -> dict[str, bytes]:
     return lasting(make(folder / "other.zarr", layout(rollouts=ROLLOUTS, block=BLOCK, steps=STEPS)))
 
 
+@pytest.mark.slow
 def test_a_block_that_is_too_large_for_a_file_leaves_nothing_and_can_be_written_later(tmp_path: Path) -> None:
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[1] == resource.RLIM_INFINITY
     assert _run(sys.executable, "-c", WRITE + LIMITED, tmp_path) == [
@@ -101,6 +102,7 @@ def _namespace() -> list[str]:
     return command
 
 
+@pytest.mark.slow
 def test_a_full_disk_loses_nothing_that_was_committed(tmp_path: Path) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()

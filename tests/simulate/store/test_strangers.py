@@ -88,6 +88,7 @@ def setting(path: str, value: object) -> Change:
     return change
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "reported"),
     [
@@ -182,6 +183,7 @@ def test_a_pickle_in_metadata_of_the_old_format_is_never_executed(tmp_path: Path
     assert not canary.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["zarr.json", "blocks/zarr.json", "rollout/c.0", "status/c.0", "blocks/record/c.0"])
 @pytest.mark.parametrize("kind", ["pipe", "link", "folder"])
 def test_what_is_not_a_plain_file_is_not_opened(tmp_path: Path, file: str, kind: str) -> None:

@@ -153,6 +153,7 @@ def test_a_base_of_another_mass_is_found_out() -> None:
     assert check_momentum(model, compiled).ok is False
 
 
+@pytest.mark.slow
 def test_a_link_of_another_mass_in_the_model_is_found_out() -> None:
     model = built(ODD)
     other = heavier(model, 1, 1.001)

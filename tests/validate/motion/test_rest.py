@@ -12,6 +12,7 @@ from tests.sample_robots import COSTLY_NAMES
 from tests.validate.motion.robots import FRICTION, WEAK, built
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", [*COSTLY_NAMES, ODD, FRICTION], ids=lambda text: text.split("\n")[0])
 def test_gravity_compensation_leaves_a_robot_at_rest(robot: str) -> None:
     run = resting_rollouts(built(robot))

@@ -58,6 +58,7 @@ def test_arms_with_weak_motors_follow_slower_references() -> None:
     assert not run["saturation"].values.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", COSTLY_NAMES)
 def test_assumed_motors_are_strong_enough_for_the_default_references(robot: str) -> None:
     model = built(robot)
@@ -87,6 +88,7 @@ def test_motors_that_are_too_weak_for_any_motion_are_reported() -> None:
     assert check.left_out.rollouts == 8
 
 
+@pytest.mark.slow
 def test_an_assumed_effort_that_no_motion_is_slow_enough_for_fails() -> None:
     check = check_tracking(tracking_rollouts(built(WEAK)), {"joint_1"})
     assert check.ok is False
