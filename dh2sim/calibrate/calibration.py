@@ -181,7 +181,7 @@ class _Task:
         if sizes[longest] > 0.0 and every <= set(lengths):
             self.held[longest] = "the scale: no distance between sockets is known"
             self.notes.append(
-                f"No distance between sockets is known, so that lengths are told only relative to "
+                "No distance between sockets is known, so lengths can only be determined relative to "
                 f"{self.parameters[longest].name}, which is held at {sizes[longest]:g} m."
             )
 
