@@ -13,7 +13,6 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from pathlib import Path
 from types import MappingProxyType
 
 from dh2sim.compare.comparison import Comparison, compared, require_comparable
@@ -22,10 +21,9 @@ from dh2sim.compare.matching import ObstacleKind
 from dh2sim.compare.misreadings import MisreadingKind
 from dh2sim.errors import Dh2simError
 from dh2sim.importing.sources import ImportOptions
-from dh2sim.input_files import read_input
 from dh2sim.kinematics.chain import SpecLike
 from dh2sim.messages import did_you_mean, listed, shown
-from dh2sim.robot.yaml_tree import MAX_BYTES, Node, Report, check_size, compose, decode
+from dh2sim.robot.yaml_tree import Node, Report, compose, decode, read_yaml_file
 
 TOLERANCE_OF_GRADES = 1e-3
 """rad, and m for a reach of up to 1 m, then of the reach: tables are rounded."""
@@ -135,13 +133,7 @@ def read_rubric(path: str | os.PathLike[str]) -> Rubric:
         RobotFileError: It is wrong; the error holds everything that is.
         Dh2simError: It cannot be read.
     """
-    file = os.fspath(path)
-    try:
-        data = read_input(Path(path), MAX_BYTES)
-    except OSError as error:
-        raise Dh2simError(f"{file}: cannot be read: {error.strerror or error}") from error
-    report = Report(file)
-    check_size(len(data), report)
+    data, report = read_yaml_file(path)
     root = compose(decode(data, report), report, needs="a rubric needs points, kinds or off")
     if report.problems:
         raise report.error()

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import codecs
 import functools
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Final, NamedTuple, NoReturn, TypeAlias
 
-from dh2sim.errors import Problem, RobotFileError
+from dh2sim.errors import Dh2simError, Problem, RobotFileError
+from dh2sim.input_files import read_input
 from dh2sim.messages import Loc, path_of, shown
 
 
@@ -139,6 +142,23 @@ def check_size(size: int, report: Report) -> None:
     if size > MAX_BYTES:
         report.add(1, 1, (), f"the file has {size} bytes; at most {MAX_BYTES} are allowed")
         raise report.error()
+
+
+def read_yaml_file(path: str | os.PathLike[str]) -> tuple[bytes, Report]:
+    """Return the content of a file that the user names, and a report for its problems.
+
+    Raises:
+        RobotFileError: It is too large.
+        Dh2simError: It cannot be read.
+    """
+    file = os.fspath(path)
+    try:
+        data = read_input(Path(path), MAX_BYTES)
+    except OSError as error:
+        raise Dh2simError(f"{file}: cannot be read: {error.strerror or error}") from error
+    report = Report(file)
+    check_size(len(data), report)
+    return data, report
 
 
 def decode(data: bytes, report: Report) -> str:

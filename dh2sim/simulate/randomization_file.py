@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from pathlib import Path
 
-from dh2sim.errors import Dh2simError
-from dh2sim.input_files import read_input
 from dh2sim.messages import Loc, shown
-from dh2sim.robot.yaml_tree import MAX_BYTES, Node, Report, check_size, compose, decode
+from dh2sim.robot.yaml_tree import Node, Report, compose, decode, read_yaml_file
 from dh2sim.simulate.quantities import NEEDS, Setting, checked_settings, key_parts
 
 OTHERS = "others"
@@ -26,13 +23,7 @@ def read_randomization(path: str | os.PathLike[str]) -> dict[str, Setting]:
         RobotFileError: The file is wrong; the error holds everything that is, with its place.
         Dh2simError: It cannot be read.
     """
-    name = os.fspath(path)
-    try:
-        data = read_input(Path(path), MAX_BYTES)
-    except OSError as error:
-        raise Dh2simError(f"{name}: cannot be read: {error.strerror or error}") from None
-    report = Report(name)
-    check_size(len(data), report)
+    data, report = read_yaml_file(path)
     root = compose(decode(data, report), report, needs="it maps quantities to numbers or distributions")
     found: dict[str, Setting] = {}
     for key, loc, node in _entries(root, report):

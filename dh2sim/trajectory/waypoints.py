@@ -5,14 +5,12 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Final
 
 import numpy as np
 
-from dh2sim.errors import ConfigurationError, Dh2simError, SettingsError
-from dh2sim.input_files import read_input
+from dh2sim.errors import ConfigurationError, SettingsError
 from dh2sim.inverse.goals import read_goals
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import Loc, did_you_mean, listed, path_of, shown
@@ -34,7 +32,7 @@ from dh2sim.robot.fields import (
 from dh2sim.robot.parts import Internal, Part, Parts, plain
 from dh2sim.robot.read import read_tree
 from dh2sim.robot.spec import LENGTHS, RobotSpec, Row, Units
-from dh2sim.robot.yaml_tree import MAX_BYTES, Report, check_size
+from dh2sim.robot.yaml_tree import read_yaml_file
 from dh2sim.trajectory.limits import GIVEN, LimitValue
 from dh2sim.trajectory.profiles import Profile
 from dh2sim.typing import Array, read_only
@@ -214,13 +212,7 @@ def read_waypoints(path: str | os.PathLike[str], spec: RobotSpec) -> WaypointFil
         RobotFileError: The file is wrong; the error holds everything that is, with its place.
         Dh2simError: It cannot be read.
     """
-    name = os.fspath(path)
-    try:
-        data = read_input(Path(path), MAX_BYTES)
-    except OSError as error:
-        raise Dh2simError(f"{name}: cannot be read: {error.strerror or error}") from None
-    report = Report(name)
-    check_size(len(data), report)
+    data, report = read_yaml_file(path)
     tree, places = read_tree(
         WAYPOINT_FILE,
         lambda tree, scope: _check(tree, scope, spec),
