@@ -8,30 +8,19 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Self, TypeAlias, Unpack, cast
+from typing import TYPE_CHECKING, Any, Final, Self, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.errors import ConfigurationError, Dh2simError, EngineError, OutputError, Problem, RobotError
-from dh2sim.messages import did_you_mean, listed, member, shown
-from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
-from dh2sim.robot.spec import (
-    AngleUnit,
-    BaseSpec,
-    Convention,
-    LengthUnit,
-    PayloadSpec,
-    Pose,
-    RobotSpec,
-    Row,
-    ToolSpec,
-    Units,
-)
+from dh2sim.errors import Dh2simError
+from dh2sim.kinematics.transforms import PoseLike, pose_of
+from dh2sim.messages import member
+from dh2sim.robot.spec import AngleUnit, BaseSpec, Convention, LengthUnit, PayloadSpec, RobotSpec, Row, ToolSpec
 from dh2sim.robot.table_rows import TableRow, spec_rows
 from dh2sim.robot.textbook_table import table_html, table_latex, table_text
 from dh2sim.typing import Array, read_only
@@ -51,7 +40,6 @@ if TYPE_CHECKING:
     from dh2sim.compare.comparison import Comparison
     from dh2sim.draw.diagram.drawing import DrawingStyle, RobotDrawing
     from dh2sim.export import ExportReport, Format
-    from dh2sim.importing.sources import ImportOptions
     from dh2sim.inverse.goals import Free
     from dh2sim.inverse.textbook import Explanation
     from dh2sim.kinematics.batches import BatchOptions, JacobianOptions
@@ -77,10 +65,6 @@ _READERS: Final = {
     **dict.fromkeys((".md", ".csv", ".tsv", ".tex", ".html", ".rst", ".m", ".py", ".json"), "from_table"),
 }
 """The methods that read files of other formats, by their suffix."""
-_RIGID: Final = 1e-9
-"""By which entries of R Rᵀ may differ from those of the identity."""
-PoseLike: TypeAlias = Pose | ArrayLike
-"""A pose; or a position, m, shape (3,); or a homogeneous transform, shape (4, 4)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -130,8 +114,8 @@ class Robot:
             "description": description,
             "source": source,
             "convention": convention,
-            "base": BaseSpec(pose=_pose("base", base)),
-            "tool": _pose("tool", tool),
+            "base": BaseSpec(pose=pose_of(base, "base")),
+            "tool": pose_of(tool, "tool"),
             "payload": PayloadSpec() if payload is None else payload,
             "gravity": gravity,
             "configurations": configurations,
@@ -205,19 +189,17 @@ class Robot:
         Raises:
             Dh2simError: The file is wrong or holds no serial arm; the text says what and where.
         """
-        from dh2sim.importing.sources import ImportOptions
-
-        options = ImportOptions(
+        return cls._imported(
+            path,
             base=base,
             tip=tip,
             convention=convention,
             tolerance=tolerance,
-            package_paths=[package_paths] if isinstance(package_paths, str | os.PathLike) else tuple(package_paths),
+            package_paths=package_paths,
             root=root,
             arguments=arguments or {},
             name=name,
         )
-        return cls._imported(path, options)
 
     @classmethod
     def from_mjcf(
@@ -262,17 +244,9 @@ class Robot:
         Raises:
             Dh2simError: The table is wrong or says too little; the text says what and where.
         """
-        from dh2sim.importing.sources import ImportOptions
-
-        options = ImportOptions(
-            convention=convention,
-            angle=angle,
-            length=length,
-            table=table,
-            tolerance=tolerance,
-            name=name,
+        return cls._imported(
+            path, convention=convention, angle=angle, length=length, table=table, tolerance=tolerance, name=name
         )
-        return cls._imported(path, options)
 
     @classmethod
     def from_calibration(
@@ -297,16 +271,13 @@ class Robot:
         Raises:
             Dh2simError: The file is wrong, or is another robot's; the text says what and where.
         """
-        from dh2sim.importing.sources import ImportOptions
-
-        options = ImportOptions(nominal=nominal, convention=convention, tolerance=tolerance, name=name)
-        return cls._imported(path, options)
+        return cls._imported(path, nominal=nominal, convention=convention, tolerance=tolerance, name=name)
 
     @classmethod
-    def _imported(cls, path: FilePath, options: ImportOptions) -> Self:
-        from dh2sim.importing.sources import import_robot
+    def _imported(cls, path: FilePath, **options: Any) -> Self:
+        from dh2sim.importing.sources import ImportOptions, import_robot
 
-        imported = import_robot(path, options)
+        imported = import_robot(path, ImportOptions(**options))
         return cls.from_spec(imported.spec, notes=imported.notes)
 
     @property
@@ -392,9 +363,7 @@ class Robot:
         if self.spec.is_mechanism:
             from dh2sim.kinematics.loop_motion import mechanism_pose
 
-            if options:
-                raise ConfigurationError(f"of a mechanism there is no option {listed(list(options))}")
-            return mechanism_pose(self.spec, q, frame)
+            return mechanism_pose(self.spec, q, frame, **options)
         from dh2sim.kinematics.forward import frame_pose
 
         return frame_pose(self.chain, frame, self._vectors(q), **options)
@@ -419,7 +388,7 @@ class Robot:
         if self.spec.is_mechanism:
             from dh2sim.kinematics.loop_motion import mechanism_jacobian
 
-            return mechanism_jacobian(self.spec, q, frame)
+            return mechanism_jacobian(self.spec, q, frame, **options)
         from dh2sim.kinematics.forward import geometric_jacobian
 
         return geometric_jacobian(self.chain, self._vectors(q), frame=frame, **options)
@@ -575,13 +544,7 @@ class Robot:
         return explain_inverse_kinematics(self, T)
 
     def _vectors(self, q: ArrayLike) -> ArrayLike:
-        if not isinstance(q, str):
-            return q
-        if q not in self.configurations:
-            hint = did_you_mean(q, self.configurations)
-            known = listed(self.configurations)
-            raise ConfigurationError(f"{self.name} has no configuration {shown(q)}.{hint} Configurations: {known}")
-        return self.configurations[q]
+        return self.spec.configuration(q) if isinstance(q, str) else q
 
     def random_configurations(self, count: int, *, seed: int = 0) -> Array:
         """Draw joint vectors between the limits, ±π for continuous joints; rad and m, shape (count, n)."""
@@ -611,15 +574,10 @@ class Robot:
         Warns:
             RuntimeWarning: MuJoCo finds something questionable in it.
         """
-        import mujoco
+        from dh2sim.engines.mujoco_model import compile_robot
 
-        meshes = {link.mesh.file_name: link.mesh.data for link in self._written.all_links if link.mesh is not None}
-        with mujoco_warnings() as warned:
-            try:
-                compiled = mujoco.MjModel.from_xml_string(self.mjcf(), meshes)
-            except ValueError as error:
-                raise EngineError(f"{self.name}: MuJoCo refuses the model: {' '.join(str(error).split())}") from error
-        for sentence in warning_sentences(warned, [joint.name for joint in self._written.moving_joints]):
+        compiled, sentences = compile_robot(self._written)
+        for sentence in sentences:
             warnings.warn(f"{self.name}: {sentence}", RuntimeWarning, stacklevel=2)
         return compiled
 
@@ -677,15 +635,9 @@ class Robot:
         from dh2sim.importing.sources import ImportOptions
         from dh2sim.validate.run import validate_robot
 
-        if self.spec.is_mechanism:
-            from dh2sim.validate.mechanism import validate_mechanism
-
-            if source is not None:
-                raise Dh2simError(f"{self.name}: a mechanism has no source to be compared with")
-            return validate_mechanism(self.mechanism, samples=samples, seed=seed, tolerance=tolerance)
         options = ImportOptions(base=base, tip=tip)
         return validate_robot(
-            self.model, samples=samples, seed=seed, tolerance=tolerance, source=source, source_options=options
+            self._written, samples=samples, seed=seed, tolerance=tolerance, source=source, source_options=options
         )
 
     def code(
@@ -788,10 +740,9 @@ class Robot:
         from dh2sim.calibrate.calibration import calibrate
         from dh2sim.calibrate.data_file import read_measurements
 
-        measured = (
-            read_measurements(data, self, kind=kind, groups=groups) if isinstance(data, str | os.PathLike) else data
-        )
-        return calibrate(self, measured, **options)
+        if isinstance(data, str | os.PathLike):
+            data = read_measurements(data, self, kind=kind, groups=groups)
+        return calibrate(self, data, **options)
 
     def plan_measurements(self, count: int, *, kind: str = "position", seed: int = 0) -> Plan:
         """Choose configurations to measure the robot at, inside its limits and without self-contact.
@@ -857,19 +808,9 @@ class Robot:
         Raises:
             OutputError: There is a file already, or it cannot be written.
         """
-        from dh2sim.files import atomic_file
-        from dh2sim.robot.write import robot_file_text
+        from dh2sim.robot.write import save_robot
 
-        file = Path(path)
-        if file.exists() and not overwrite:
-            raise OutputError(f"'{file}' exists already; choose another name, or pass overwrite=True")
-        header = [f"Note: {note}" for note in self.notes]
-        units = self.spec.units if self.spec.source_file else Units(angle=AngleUnit.DEG)
-        text = robot_file_text(
-            self.spec, header=header, folder=file.absolute().parent, angle=units.angle, length=units.length
-        )
-        with atomic_file(file) as draft:
-            draft.write_text(text, encoding="utf-8")
+        save_robot(self.spec, path, notes=self.notes, overwrite=overwrite)
 
     def draw(
         self,
@@ -917,27 +858,13 @@ class Robot:
         Raises:
             Dh2simError: Nobody can listen at this address.
         """
-        from dh2sim.view.initial_state import folder_of, open_state
-        from dh2sim.view.mechanism.server import MechanismViewer
-        from dh2sim.view.server import Viewer, free_port
+        from dh2sim.view.start import start_viewer
 
-        file = self.spec.source_file
-        free = free_port(host, port)
-        viewer: PageServer[Any]
-        if self.spec.is_mechanism:
-            viewer = MechanismViewer(self.mechanism, host=host, port=free, allow_hosts=allow_hosts)
-        else:
-            state = open_state(self.spec, None if file is None else folder_of(file.path))
-            viewer = Viewer(state, host=host, port=free, allow_hosts=allow_hosts)
-        if browser:
-            viewer.open_browser()
-        return viewer
+        return start_viewer(self.spec, host=host, port=port, browser=browser, allow_hosts=allow_hosts)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let a robot be pickled and deep-copied: read-only mappings cannot be."""
-        given = {field.name: getattr(self.spec, field.name) for field in fields(self.spec)}
-        plain = {key: dict(value) if isinstance(value, Mapping) else value for key, value in given.items()}
-        return _restored, (type(self), plain, self.notes)
+        """Pickle, and copy, without what was computed."""
+        return _restored, (type(self), self.spec, self.notes)
 
     def __repr__(self) -> str:
         """Return the name, the joints as letters, and the convention."""
@@ -956,31 +883,5 @@ class Robot:
         return table_latex(self.spec)
 
 
-def _restored(kind: type[Robot], given: dict[str, Any], notes: tuple[str, ...]) -> Robot:
-    return kind.from_spec(RobotSpec(**given), notes=notes)
-
-
-def _pose(name: str, pose: PoseLike) -> Pose:
-    """Return the pose of base or tool.
-
-    Raises:
-        RobotError: A matrix is given that is not a rigid transform.
-    """
-    if isinstance(pose, Pose):
-        return pose
-    try:
-        T = np.asarray(pose, dtype=np.float64)
-    except (TypeError, ValueError):
-        T = np.zeros(())
-    if T.shape in ((), (3,)):
-        return Pose(xyz=cast("Array", pose))  # what is wrong with it is for the specification to say
-    if T.shape != (4, 4):
-        message = f"expected a Pose, a position of shape (3,) or a transform of shape (4, 4), found shape {T.shape}"
-        raise RobotError([Problem(path=name, message=message)])
-    R = T[:3, :3]
-    if not (np.abs(R @ R.T - np.eye(3)).max() < _RIGID and np.linalg.det(R) > 0 and T[3].tolist() == [0, 0, 0, 1]):
-        message = "the matrix is not a rigid transform: a rotation and a position above 0, 0, 0, 1"
-        raise RobotError([Problem(path=name, message=message)])
-    from dh2sim.kinematics.transforms import rpy_from_rotation
-
-    return Pose(xyz=T[:3, 3], rpy=np.array(rpy_from_rotation(R)))
+def _restored(kind: type[Robot], spec: RobotSpec, notes: tuple[str, ...]) -> Robot:
+    return kind.from_spec(replace(spec), notes=notes)  # checked again, which makes its arrays read-only

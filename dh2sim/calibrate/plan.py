@@ -167,12 +167,11 @@ def _candidates(spec: SpecLike, count: int, seed: int) -> tuple[Array, int]:
     """Return random joint vectors inside the limits at which no links touch, and how many did."""
     import mujoco
 
-    from dh2sim.formats.mjcf.write import to_mjcf
+    from dh2sim.engines.mujoco_model import compile_robot
 
     model = build_model(spec)
     lower, upper = model.travel
-    meshes = {link.mesh.file_name: link.mesh.data for link in model.all_links if link.mesh is not None}
-    compiled = mujoco.MjModel.from_xml_string(to_mjcf(model), meshes)
+    compiled, _ = compile_robot(model)
     data = mujoco.MjData(compiled)
     rng = np.random.default_rng(seed)
     found: list[Array] = []

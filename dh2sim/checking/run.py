@@ -19,7 +19,6 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.slips import find_slips
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import RobotSpec
-from dh2sim.validate.mechanism import validate_mechanism
 from dh2sim.validate.report import Quantity, RobotReport, failure_text
 from dh2sim.validate.run import validate_robot
 
@@ -184,7 +183,8 @@ def _check(
         if CheckPart.DRIFT in parts and exported:
             findings += _drifted(model, exports)
         if CheckPart.POSES in parts:
-            report = _validate(model, folder if folder.is_dir() else None, samples, seed, tolerance)
+            written = folder if folder.is_dir() else None
+            report = validate_robot(model, samples=samples, seed=seed, tolerance=tolerance, folder=written)
             missing = any(finding.rule == "drift" for finding in findings)
             findings += _engines(report, str(entry.path), files_too=not missing)
     except Dh2simError as error:
@@ -214,12 +214,6 @@ def _drifted(model: Model, exports: Path) -> list[Finding]:
             )
         )
     return found
-
-
-def _validate(model: Model, folder: Path | None, samples: int, seed: int, tolerance: float) -> RobotReport:
-    if isinstance(model, MechanismModel):
-        return validate_mechanism(model, samples=samples, seed=seed, tolerance=tolerance, folder=folder)
-    return validate_robot(model, samples=samples, seed=seed, tolerance=tolerance, folder=folder)
 
 
 def _engines(report: RobotReport, file: str, *, files_too: bool) -> list[Finding]:

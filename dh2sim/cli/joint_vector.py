@@ -158,17 +158,12 @@ def _split_outside_parentheses(text: str, separators: str) -> list[str]:
 
 
 def _wrong_count(spec: RobotSpec, words: Sequence[str], parts: Sequence[str], units: Units) -> str:
-    from dh2sim.messages import did_you_mean, listed, shown
-
     rows = spec.moving_rows
+    if len(words) == 1 and words[0].isidentifier():
+        spec.configuration(words[0])  # refuses the name
     names = ", ".join(f"{row.name} ({_unit(row, units)})" for row in rows)
     count = "1 joint coordinate" if len(rows) == 1 else f"{len(rows) or 'no'} joint coordinates"
-    message = f"{spec.name} has {count}, got {len(parts)}" + (f": {names}" if names else "")
-    if len(words) > 1 or not words[0].isidentifier():
-        return message
-    known = spec.named_configurations
-    hint = did_you_mean(words[0], known)
-    return f"{spec.name} has no configuration {shown(words[0])}.{hint} Configurations: {listed(known)}"
+    return f"{spec.name} has {count}, got {len(parts)}" + (f": {names}" if names else "")
 
 
 def warn_open_loops(tree: KinematicTree, vector: JointVector) -> None:

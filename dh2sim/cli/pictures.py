@@ -112,7 +112,7 @@ def render(
         motion, summary = motion_of_run(data), data.label
     else:
         [robot] = build_any([source])
-        data, motion, summary = None, motion_of_robot(robot, configuration), robot.name
+        data, motion, summary = None, motion_of_robot(robot, configuration or "home"), robot.name
     if video:
         count = len(video_positions(motion, rate))
         with progress_bar("rendering", "pictures", count, quiet=quiet) as advance:

@@ -172,11 +172,7 @@ def _typed(spec: RobotSpec, words: Sequence[str]) -> list[Any]:
     for word in words:
         if word in known or (word.isidentifier() and word not in ("pi",)):
             finish()
-            if word not in known:
-                raise ConfigurationError(
-                    f"{spec.name} has no configuration {shown(word)}.{did_you_mean(word, known)} "
-                    f"Configurations: {listed(known)}"
-                )
+            spec.configuration(word)  # refuses an unknown name
             points.append(word)
             continue
         if word.startswith("--"):

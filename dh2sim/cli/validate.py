@@ -101,7 +101,6 @@ def validate(
         _require_folders(robots, models, folder)
     from dh2sim.importing.sources import ImportOptions
     from dh2sim.model.mechanism import MechanismModel
-    from dh2sim.validate.mechanism import validate_mechanism
     from dh2sim.validate.report import ValidationReport, to_junit
     from dh2sim.validate.run import engine_samples, validate_robot
 
@@ -114,11 +113,6 @@ def validate(
     with progress_bar("comparing", "poses", poses) as advance:
         reports = []
         for model in models:
-            if isinstance(model, MechanismModel):
-                where = None if folder is None else folder / model.name
-                made = validate_mechanism(model, samples=samples, seed=seed, tolerance=tolerance, folder=where)
-                reports.append(made)
-                continue
             found = validate_robot(
                 model,
                 samples=samples,
@@ -129,7 +123,9 @@ def validate(
                 source_options=ImportOptions(base=base, tip=tip),
                 advance=advance,
             )
-            reports.append(_simulated(model, found, seed) if dynamics else found)
+            if dynamics and not isinstance(model, MechanismModel):
+                found = _simulated(model, found, seed)
+            reports.append(found)
         report = ValidationReport(robots=tuple(reports))
     text = json_text(report.to_json())
     if json_file == "-":

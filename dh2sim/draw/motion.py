@@ -9,8 +9,6 @@ import mujoco
 import numpy as np
 
 from dh2sim.errors import PictureError, RunError
-from dh2sim.messages import did_you_mean, listed, shown
-from dh2sim.mujoco_warnings import mujoco_warnings
 from dh2sim.simulate.recorded_model import recorded_model
 from dh2sim.typing import Array, read_only
 
@@ -119,36 +117,22 @@ def _recorded(rollout: RolloutData, model: Any) -> Array:
     return qpos
 
 
-def motion_of_robot(robot: RobotModel | MechanismModel, configuration: str | None = None) -> Motion:
-    """Return a robot or a mechanism at rest in one of its configurations; by default at home.
+def motion_of_robot(robot: RobotModel | MechanismModel, configuration: str = "home") -> Motion:
+    """Return a robot or a mechanism at rest in one of its configurations.
 
     Raises:
-        PictureError: it has no configuration of that name.
-        AssemblyError: the mechanism's loops cannot be closed at that one.
+        ConfigurationError: It has no configuration of that name.
+        EngineError: MuJoCo refuses the model.
+        AssemblyError: The mechanism's loops cannot be closed at that one.
     """
-    from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
+    from dh2sim.engines.mujoco_model import compile_robot
     from dh2sim.formats.mjcf.scene import to_scene
-    from dh2sim.formats.mjcf.write import to_mjcf
+    from dh2sim.kinematics.loop_motion import named_configuration
     from dh2sim.model.mechanism import MechanismModel
 
-    mechanism = robot if isinstance(robot, MechanismModel) else None
-    configurations = robot.spec.named_configurations if mechanism is None else mechanism.configurations()
-    name = "home" if configuration is None else configuration
-    q = configurations.get(name)
-    if q is None:
-        hint = did_you_mean(str(configuration), configurations)
-        raise PictureError(
-            f"{robot.name} has no configuration {shown(configuration)}.{hint} Configurations: "
-            f"{listed(configurations)}"
-        )
-    meshes = {link.mesh.file_name: link.mesh.data for link in robot.all_links if link.mesh is not None}
-    mjcf = to_mechanism_mjcf(robot) if isinstance(robot, MechanismModel) else to_mjcf(robot)
-    assets = {f"{robot.name}.xml": mjcf.encode(), **meshes}
-    try:
-        with mujoco_warnings():
-            model = mujoco.MjModel.from_xml_string(to_scene(robot), assets)
-    except ValueError as error:
-        raise PictureError(f"{robot.name}: MuJoCo refuses the model: {' '.join(str(error).split())}") from error
-    if mechanism is not None:
-        q = np.array(model.key(name).qpos)  # which has the coordinates of bodies that stand for closures, too
+    is_mechanism = isinstance(robot, MechanismModel)
+    q = named_configuration(robot.spec, configuration) if is_mechanism else robot.spec.configuration(configuration)
+    model, _ = compile_robot(robot, scene=to_scene(robot))
+    if is_mechanism:  # closures have coordinates of their own
+        q = np.array(model.key(configuration).qpos)
     return Motion(model=model, qpos=read_only(np.asarray(q)[None, :]), time=read_only([0.0]))

@@ -9,7 +9,7 @@ branches nor passes one unseen.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -27,7 +27,7 @@ from dh2sim.kinematics.loop_closure import (
 )
 from dh2sim.kinematics.transforms import identity
 from dh2sim.kinematics.tree import Frame, KinematicTree, body_poses, joint_values, placed
-from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.messages import listed
 from dh2sim.robot.spec import ClosureType, RobotSpec
 from dh2sim.typing import Array, read_only
 
@@ -117,25 +117,23 @@ def named_configuration(robot: SpecLike, name: str) -> Array:
     """
     spec = spec_of(robot)
     tree, q = assembly(spec)
-    known = spec.named_configurations
-    if name not in known:
-        message = f"{spec.name} has no configuration {shown(name)}.{did_you_mean(name, known)}"
-        raise ConfigurationError(f"{message} Configurations: {listed(known)}")
+    named = spec.configuration(name)
     if name == "home" and name not in spec.configurations:
         return q
     try:
-        return close_loops(tree, known[name]) if tree.closures else known[name]
+        return close_loops(tree, named) if tree.closures else named
     except AssemblyError as error:
         raise AssemblyError(f"{spec.name}: configuration '{name}': {error}") from None
 
 
-def mechanism_pose(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0") -> Array:
+def mechanism_pose(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0", **options: object) -> Array:
     """Return the pose of a frame of a mechanism in base_link.
 
     Args:
         robot: The robot.
         q: As for ``mechanism_configuration``, or the name of a configuration.
         frame: Such as tool0, dh_1 or rocker/dh_1.
+        **options: Those that serial robots have are refused.
 
     Returns:
         Shape (4, 4).
@@ -144,19 +142,21 @@ def mechanism_pose(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0") ->
         UnknownFrameError: There is no such frame.
         Dh2simError: As for ``mechanism_configuration``.
     """
+    _refuse(options)
     tree, _ = assembly(robot)
     found = tree.frame(frame)
     vector = named_configuration(robot, q) if isinstance(q, str) else mechanism_configuration(robot, q)
     return np.array(placed(body_poses(tree, vector), found))
 
 
-def mechanism_jacobian(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0") -> Array:
+def mechanism_jacobian(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0", **options: object) -> Array:
     """Return the twist of a frame for a unit velocity of each driven joint, the passive ones following.
 
     Args:
         robot: The robot.
         q: As for ``mechanism_pose``.
         frame: Such as tool0, dh_1 or rocker/dh_1.
+        **options: Those that serial robots have are refused.
 
     Returns:
         Shape (6, k), in base_link, the driven joints in the order of a joint vector: rows 0-2 the velocity of the
@@ -168,6 +168,7 @@ def mechanism_jacobian(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0"
         UnknownFrameError: There is no such frame.
         Dh2simError: As for ``mechanism_configuration``.
     """
+    _refuse(options)
     spec = spec_of(robot)
     tree, _ = assembly(spec)
     body, T_body_frame = tree.frame(frame)
@@ -175,6 +176,11 @@ def mechanism_jacobian(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0"
     poses = body_poses(tree, vector)
     J = _twists(tree, poses, Frame(body, T_body_frame))
     return read_only(J @ _Motion(spec, tree, sorted(actuated_joints(spec))).followed(vector))
+
+
+def _refuse(options: Mapping[str, object]) -> None:
+    if options:
+        raise ConfigurationError(f"a mechanism takes none of the options of serial robots, got {listed(options)}")
 
 
 def _twists(tree: KinematicTree, poses: Sequence[Array], frame: Frame) -> Array:

@@ -8,13 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dh2sim.errors import Problem, RobotError
 from dh2sim.kinematics.trig import atan2, sin_cos
+from dh2sim.robot.spec import Pose
 from dh2sim.typing import Array, read_only
 
+PoseLike: TypeAlias = Pose | ArrayLike
+"""A pose; or a position, m, shape (3,); or a homogeneous transform, shape (4, 4)."""
+_RIGID = 1e-9
+"""By which entries of R Rᵀ may differ from those of the identity."""
 _LOCKED = 4e-16
 """Cosine of the pitch, at and below which nothing but rounding is left of roll."""
 
@@ -133,6 +140,30 @@ def rpy_from_rotation(R: Array) -> Array:
         pitch = math.copysign(math.pi / 2, -r[2][0])
     yaw = atan2(r[0][2] * sine - r[0][1] * cosine, r[1][1] * cosine - r[1][2] * sine)
     return read_only(_clean((roll, pitch, yaw)))
+
+
+def pose_of(value: PoseLike, name: str) -> Pose:
+    """Return a pose that is given in any form; ``name`` is its path for messages.
+
+    Raises:
+        RobotError: A matrix is given that is not a rigid transform.
+    """
+    if isinstance(value, Pose):
+        return value
+    try:
+        T = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        T = np.zeros(())
+    if T.shape in ((), (3,)):
+        return Pose(xyz=cast("Array", value))  # what is wrong with it is for the specification to say
+    if T.shape != (4, 4):
+        message = f"expected a Pose, a position of shape (3,) or a transform of shape (4, 4), found shape {T.shape}"
+        raise RobotError([Problem(path=name, message=message)])
+    R = T[:3, :3]
+    if not (np.abs(R @ R.T - np.eye(3)).max() < _RIGID and np.linalg.det(R) > 0 and T[3].tolist() == [0, 0, 0, 1]):
+        message = "the matrix is not a rigid transform: a rotation and a position above 0, 0, 0, 1"
+        raise RobotError([Problem(path=name, message=message)])
+    return Pose(xyz=T[:3, 3], rpy=np.array(rpy_from_rotation(R)))
 
 
 def quaternion_from_rotation(R: Array) -> Array:

@@ -14,8 +14,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Final
 
-from dh2sim.errors import Problem, RobotError
-from dh2sim.messages import Loc, path_of
+from dh2sim.errors import ConfigurationError, Problem, RobotError
+from dh2sim.messages import Loc, did_you_mean, listed, path_of, shown
 from dh2sim.robot.checks import check, default_name
 from dh2sim.robot.fields import (
     COORDINATE,
@@ -602,6 +602,20 @@ class RobotSpec:
                 {"home": home if self.assembly is None else self.assembly.q, **self.configurations}
             )
         return MappingProxyType({"home": home, "zero": read_only([0.0] * len(limits)), **self.configurations})
+
+    def configuration(self, name: str) -> Array:
+        """Return one of ``named_configurations``, rad and m, shape (n,).
+
+        Raises:
+            ConfigurationError: There is none of that name.
+        """
+        known = self.named_configurations
+        if name not in known:
+            raise ConfigurationError(
+                f"{self.name} has no configuration {shown(name)}.{did_you_mean(name, known)} "
+                f"Configurations: {listed(known)}"
+            )
+        return known[name]
 
 
 ROBOT: Final = Part("", RobotSpec, more={"actuators": Part("What drives every joint.", ActuatorSpec)})

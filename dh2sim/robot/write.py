@@ -21,7 +21,8 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from dh2sim.errors import ModelError, NotFiniteError
+from dh2sim.errors import ModelError, NotFiniteError, OutputError
+from dh2sim.files import atomic_file
 from dh2sim.robot.checks import default_name
 from dh2sim.robot.fields import Choice, Color, Dimension, Flag, Kind, MeshFile, Number, Numbers
 from dh2sim.robot.mechanism_checks import default_closure_name
@@ -410,6 +411,32 @@ def _inertia(matrix: Array) -> Tree:
 
 
 _GRAVITY: Final = [0.0, 0.0, -9.81]
+
+
+def save_robot(
+    spec: RobotSpec, path: str | os.PathLike[str], *, notes: Iterable[str] = (), overwrite: bool = False
+) -> None:
+    """Write a robot file, in the units of the file that the robot was read from, or else in deg and m.
+
+    Args:
+        spec: The robot.
+        path: The file.
+        notes: Sentences for comments at its top.
+        overwrite: Whether to replace a file.
+
+    Raises:
+        OutputError: There is a file already, or it cannot be written.
+        ModelError: As for ``robot_file_text``.
+    """
+    file = Path(path)
+    if file.exists() and not overwrite:
+        raise OutputError(f"'{file}' exists already; choose another name, or pass overwrite=True")
+    units = spec.units if spec.source_file else Units(angle=AngleUnit.DEG)
+    header = [f"Note: {note}" for note in notes]
+    folder = file.absolute().parent
+    text = robot_file_text(spec, header=header, folder=folder, angle=units.angle, length=units.length)
+    with atomic_file(file) as draft:
+        draft.write_text(text, encoding="utf-8")
 
 
 def robot_file_text(

@@ -305,12 +305,11 @@ def _check_one(entry: Tree, loc: Loc, scope: Scope, spec: RobotSpec) -> None:
     if len(goals) != 1:
         found = f"{' and '.join(goals)} exclude each other" if goals else "no place is given"
         scope.report(loc, f"{found}; give one of q, xyz and centre")
-    if isinstance(q, str) and q not in spec.named_configurations:
-        known = spec.named_configurations
-        message = (
-            f"{spec.name} has no configuration {shown(q)}.{did_you_mean(q, known)} Configurations: {listed(known)}"
-        )
-        scope.report((*loc, "q"), message)
+    if isinstance(q, str):
+        try:
+            spec.configuration(q)
+        except ConfigurationError as error:
+            scope.report((*loc, "q"), str(error))
     if isinstance(q, list) and len(q) != len(rows):
         names = listed(row.name for row in rows)
         scope.report((*loc, "q"), f"expected {len(rows)} joint coordinates ({names}), found {len(q)}")

@@ -22,6 +22,7 @@ from dh2sim.files import finish_interrupted, signals_deferred
 from dh2sim.importing.sources import ImportOptions
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.build import ModelLike, model_of
+from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.slips import find_slips
 from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
@@ -37,6 +38,7 @@ from dh2sim.validate.kinematics import (
     check_unit_quaternions,
     table_jacobian,
 )
+from dh2sim.validate.mechanism import validate_mechanism
 from dh2sim.validate.report import Check, Quantity, RobotReport
 from dh2sim.validate.source import SourceArm, check_source
 
@@ -65,7 +67,7 @@ def engine_samples(samples: int, rows: int) -> int:
 
 
 def validate_robot(
-    robot: ModelLike | str | PathLike[str],
+    robot: ModelLike | MechanismModel | str | PathLike[str],
     *,
     samples: int = 1000,
     seed: int = 0,
@@ -79,7 +81,7 @@ def validate_robot(
 
     Args:
         robot: The robot, or its file or name.
-        samples: Number of random configurations inside the limits, at least 1.
+        samples: Number of random configurations inside the limits, at least 1; of a mechanism at most 100 are used.
         seed: Seed of the configurations.
         tolerance: Allowed angle, rad, and distance as a share of max(1 m, reach).
         folder: Folder with the robot's files; None to export them to a temporary one.
@@ -98,6 +100,10 @@ def validate_robot(
     """
     if not isinstance(samples, int | np.integer) or samples < 1:
         raise Dh2simError(f"samples must be a whole number of at least 1, got {samples!r}")
+    if isinstance(robot, MechanismModel):
+        if source is not None:
+            raise Dh2simError(f"{robot.name}: a mechanism has no source to be compared with")
+        return validate_mechanism(robot, samples=samples, seed=seed, tolerance=tolerance, folder=folder)
     start_yourdfpy()
     model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
     arm = None if source is None else SourceArm.read(source, source_options or ImportOptions(), model)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dh2sim.draw.motion import MOST_POSES, Motion, motion_of_robot, motion_of_run
-from dh2sim.errors import PictureError
+from dh2sim.errors import ConfigurationError, PictureError
 from dh2sim.model.build import build_model
 from dh2sim.model.mechanism import build_mechanism
 from dh2sim.robot.read import load_robot
@@ -93,7 +93,7 @@ def test_a_robot_is_at_home_or_in_the_configuration_that_is_named() -> None:
     robot = build_model(load_robot("stanford"))
     assert motion_of_robot(robot).qpos.tolist() == [robot.home.tolist()]
     assert motion_of_robot(robot, "printed").qpos.tolist() == [list(robot.spec.configurations["printed"])]
-    with pytest.raises(PictureError) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         motion_of_robot(robot, "prnted")
     assert str(caught.value) == (
         "stanford has no configuration 'prnted'. Did you mean 'printed'? Configurations: home, zero, printed"
@@ -128,5 +128,5 @@ def test_a_mechanism_is_shown_with_its_loops_closed() -> None:
     shown.place(data, 0)
     ends = [data.site(name).xpos for name in ("dh_2", "right/dh_2")]
     assert math.dist(*ends) < 1e-12
-    with pytest.raises(PictureError, match=r"five_bar has no configuration 'hme'. Did you mean 'home'?"):
+    with pytest.raises(ConfigurationError, match=r"five_bar has no configuration 'hme'. Did you mean 'home'?"):
         motion_of_robot(mechanism, "hme")

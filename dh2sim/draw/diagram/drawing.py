@@ -17,12 +17,11 @@ from dh2sim.draw.diagram.linkage import place_mechanism
 from dh2sim.draw.diagram.sheet import Sheet, Stroke, head_of, shaft_of, subscripted, tex_text, to_svg, to_tikz
 from dh2sim.draw.diagram.stick import draw_stick
 from dh2sim.draw.plot_style import plot_style, save
-from dh2sim.errors import ConfigurationError, PictureError
+from dh2sim.errors import PictureError
 from dh2sim.extras import require_extra
 from dh2sim.files import atomic_file
 from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, spec_of
 from dh2sim.messages import did_you_mean, listed, shown
-from dh2sim.robot.spec import RobotSpec
 
 _DPI = 200
 
@@ -134,7 +133,7 @@ def draw_robot(
     if spec.is_mechanism:
         arm = place_mechanism(spec, vector)
     else:
-        named = _configuration(spec, vector) if isinstance(vector, str) else vector
+        named = spec.configuration(vector) if isinstance(vector, str) else vector
         arm = place_arm(spec, joint_vector(build_chain(spec), named))
     if kind is not DrawingStyle.STICK:
         return RobotDrawing(sheet=draw_kinematic(arm, symbols=kind is DrawingStyle.KINEMATIC))
@@ -163,16 +162,6 @@ def format_of(path: Path) -> DrawingFormat:
     if found is None:
         raise PictureError(f"cannot write {shown(path.name)} as a drawing; allowed endings: {', '.join(ENDINGS)}")
     return found
-
-
-def _configuration(spec: RobotSpec, name: str) -> ArrayLike:
-    known = spec.named_configurations
-    if name not in known:
-        hint = did_you_mean(name, known)
-        raise ConfigurationError(
-            f"{spec.name} has no configuration {shown(name)}.{hint} Configurations: {listed(known)}"
-        )
-    return known[name]
 
 
 def _choice(kind: Any, value: str, what: str) -> Any:

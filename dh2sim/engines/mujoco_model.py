@@ -1,0 +1,37 @@
+"""Robots compiled by MuJoCo from memory, with their meshes."""
+
+from __future__ import annotations
+
+import mujoco
+
+from dh2sim.errors import EngineError
+from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
+from dh2sim.formats.mjcf.write import to_mjcf
+from dh2sim.model.mechanism import MechanismModel
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
+
+
+def compile_robot(
+    robot: RobotModel | MechanismModel, *, scene: str | None = None
+) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    """Compile a robot.
+
+    Args:
+        robot: The robot.
+        scene: MJCF that includes ``<name>.xml``, the robot; by default the robot alone.
+
+    Returns:
+        The compiled model, and what MuJoCo warns of, in sentences.
+
+    Raises:
+        EngineError: MuJoCo refuses it.
+    """
+    mjcf = to_mechanism_mjcf(robot) if isinstance(robot, MechanismModel) else to_mjcf(robot)
+    files = {link.mesh.file_name: link.mesh.data for link in robot.all_links if link.mesh is not None}
+    with mujoco_warnings() as warned:
+        try:
+            compiled = mujoco.MjModel.from_xml_string(scene or mjcf, {f"{robot.name}.xml": mjcf.encode(), **files})
+        except ValueError as error:
+            raise EngineError(f"{robot.name}: MuJoCo refuses the model: {' '.join(str(error).split())}") from error
+    return compiled, warning_sentences(warned, [joint.name for joint in robot.moving_joints])
