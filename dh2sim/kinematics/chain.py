@@ -200,12 +200,13 @@ def placed_joints(rows: Iterable[Row], T_parent_dh: Array) -> tuple[Joint, ...]:
     return tuple(joints)
 
 
-def joint_vectors(chain: KinematicChain, q: ArrayLike) -> tuple[Array, tuple[int, ...]]:
+def joint_vectors(chain: KinematicChain, q: ArrayLike, *, finite: bool = True) -> tuple[Array, tuple[int, ...]]:
     """Check joint vectors and flatten their batch shape.
 
     Args:
         chain: The robot.
         q: Joint coordinates, rad and m, shape (..., n).
+        finite: Whether to check that the coordinates are finite; if not, ``require_finite`` does.
 
     Returns:
         The joint vectors, shape (count, n), and the batch shape ``...``, whose product is count.
@@ -220,13 +221,24 @@ def joint_vectors(chain: KinematicChain, q: ArrayLike) -> tuple[Array, tuple[int
         names = ", ".join(joint.name for joint in chain.moving_joints)
         expected = f"{n} joint coordinate{'' if n == 1 else 's'}" + (f" ({names})" if names else "")
         raise ConfigurationError(f"expected {expected} along the last axis, got shape {array.shape}")
-    if not _all_finite(array):
-        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        where = f" of the joint vector at index {place[:-1]}" if place[:-1] else ""
-        name = chain.moving_joints[place[-1]].name
-        raise ConfigurationError(f"coordinate of {name}{where} is {array[place]}: it must be finite")
+    if finite:
+        require_finite(chain, array)
     batch = array.shape[:-1]
     return array.reshape(math.prod(batch), n), batch
+
+
+def require_finite(chain: KinematicChain, q: Array) -> None:
+    """Check that joint vectors are finite, shape (..., n).
+
+    Raises:
+        ConfigurationError: A coordinate is not.
+    """
+    if _all_finite(q):
+        return
+    place = tuple(int(i) for i in np.argwhere(~np.isfinite(q))[0])
+    where = f" of the joint vector at index {place[:-1]}" if place[:-1] else ""
+    name = chain.moving_joints[place[-1]].name
+    raise ConfigurationError(f"coordinate of {name}{where} is {q[place]}: it must be finite")
 
 
 def joint_vector(chain: KinematicChain, q: ArrayLike) -> Array:

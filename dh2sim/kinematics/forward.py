@@ -26,7 +26,7 @@ from dh2sim.kinematics.batches import (
     in_blocks,
     require_shape,
 )
-from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vector, joint_vectors
+from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vector, joint_vectors, require_finite
 from dh2sim.kinematics.numba_kernels import numba_kernel
 from dh2sim.kinematics.straight_line import JACOBIAN, POSE, Kind, of_one
 from dh2sim.kinematics.transforms import compose, identity, joint_part
@@ -317,7 +317,10 @@ def _computed(
 ) -> Array:
     """Compute a pose or a Jacobian of a frame for joint vectors, one or a batch."""
     out, rows, threads, compiled = checked_options(kind, options)
-    vectors, batch = joint_vectors(robot, q)
+    vectors, batch = joint_vectors(robot, q, finite=False)
+    kernel = numba_kernel(kind, robot, *place, rows) if compiled and batch else None
+    if kernel is None:
+        require_finite(robot, vectors.reshape(*batch, robot.n))
     if not batch:
         result = of_one(kind, robot, *place, vectors[0])[:rows]
         if out is None:
@@ -325,8 +328,13 @@ def _computed(
         require_shape(out, result.shape)[...] = result
         return out
     shape = (rows, kind.columns or robot.n)
-    kernel = numba_kernel(kind, robot, *place, rows) if compiled else None
-    return in_blocks(vectors, batch, shape, fill, out, threads, kernel)
+
+    def fill_finite(results: Array, columns: Array) -> None:  # a kernel leaves to NumPy what is not finite, too
+        if not np.isfinite(columns).all():
+            require_finite(robot, vectors.reshape(*batch, robot.n))
+        fill(results, columns)
+
+    return in_blocks(vectors, batch, shape, fill if kernel is None else fill_finite, out, threads, kernel)
 
 
 def frame_place(chain: KinematicChain, frame: str) -> tuple[int, Array]:

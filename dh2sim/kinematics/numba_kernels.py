@@ -2,13 +2,15 @@
 
 The operations are those of :mod:`dh2sim.kinematics.straight_line`. They become a function of Python that Numba
 compiles, for 16 joint vectors at a time, so that the processor's vector instructions are used. For that sines and
-cosines must not branch: angles are reduced by Cody and Waite's method and a sum without error, and their polynomials
-are fdlibm's. They are correct to 1 ulp for angles of up to ``LARGEST``; beyond, NumPy computes.
+cosines must not branch: angles are reduced by Cody and Waite's method with sums that keep what rounding loses, and
+their polynomials are fdlibm's. They are correct to 1 ulp for angles of up to ``LARGEST``; beyond, NumPy computes.
+Dekker's sum needs its first number to be the larger; where it is not, near multiples of a quarter turn, the sums here
+are exact.
 
 Results differ from NumPy's in the last bits, and from one processor to another: nothing that reaches a file is
-computed here. Sources: W. J. Cody, W. Waite, Software Manual for the Elementary Functions, 1980; D. E. Knuth, The Art
-of Computer Programming, volume 2, section 4.2.2, theorem B; Sun Microsystems, fdlibm 5.3, k_sin.c and k_cos.c, and
-FreeBSD's form of the latter.
+computed here. Sources: W. J. Cody, W. Waite, Software Manual for the Elementary Functions, 1980; T. J. Dekker, A
+floating-point technique for extending the available precision, Numerische Mathematik 18, 1971; Sun Microsystems,
+fdlibm 5.3, k_sin.c and k_cos.c, and FreeBSD's form of the latter.
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ from dh2sim.kinematics.trace import COSINE, SINE, VARIABLE, Token, Trace, live_n
 from dh2sim.typing import Array
 
 Kernel = Callable[[Array, Array], bool]
-"""Fills results, shape (N, numbers of one), from joint vectors, shape (N, n); False where an angle is too large."""
+"""Fills results, shape (N, numbers of one), from joint vectors, shape (N, n); False where a coordinate is too large
+or not finite."""
 
 LARGEST: Final = 1.6e6
 """Angle, rad, up to which sines and cosines are correct: 2^20 quarter turns, whose products with parts of pi/2 of 33
@@ -39,47 +42,46 @@ _LANES: Final = 16
 """Joint vectors at a time: a few vector registers of each number."""
 _SOURCE: Final = '''\
 """Made by dh2sim: poses or Jacobians of a robot, for Numba. May be deleted at any time."""
-from math import floor
-
 from numba import njit
-from numpy import empty, zeros
+from numpy import empty, float64, int64, zeros
 
-OPTIONS = {{"nogil": True, "error_model": "numpy", "cache": {cache}}}
+OPTIONS = {{"nogil": True, "error_model": "numpy", "fastmath": {{"contract"}}, "cache": {cache}}}
+
+
+@njit(inline="always", **OPTIONS)
+def with_sign(x, quarter):
+    # changes the sign of x where the second bit of quarter is set
+    return int64(float64(x).view(int64) ^ ((quarter & 2) << 62)).view(float64)
 
 
 @njit(inline="always", **OPTIONS)
 def sine_and_cosine(x):
-    # x = k pi/2 + y + tail, exactly enough that the tail counts
-    k = (x * 0.6366197723675814 + 6755399441055744.0) - 6755399441055744.0
+    # x = k pi/2 + y + tail; the parts of pi/2 have 33 bits, so that products with k are exact, contracted or not
+    shifted = x * 0.6366197723675814 + 6755399441055744.0
+    quarter = float64(shifted).view(int64)  # k in its last bits
+    k = shifted - 6755399441055744.0
     r = x - k * 1.57079632673412561417
-    w = k * 6.07710050630396597660e-11
-    a = r - w
-    b = r - a
-    e = (r - (a + b)) + (b - w)
-    w = k * 2.02226624871116645580e-21 + k * 8.47842766036889956997e-32 - e
-    y = a - w
-    tail = (a - y) - w
+    a = r - k * 6.07710050630396597660e-11
+    t = ((r - a) - k * 6.07710050630396597660e-11) - k * 2.02226624871116645580e-21
+    y = a + t
+    tail = ((a - y) + t) - k * 8.47842766036889956997e-32
     z = y * y
-    p = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
-    p = -1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + z * p)
-    p = 8.33333333332248946124e-03 + z * p
-    v = z * y
-    s = y - ((z * (0.5 * tail - v * p) - tail) - v * -1.66666666666666324348e-01)
-    p = 2.08757232129817482790e-09 + z * -1.13596475577881948265e-11
-    p = 2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 + z * p)
-    p = z * (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * p))
+    p = z * 1.58969099521155010221e-10 - 2.50507602534068634195e-08
+    p = z * p + 2.75573137070700676789e-06
+    p = z * p - 1.98412698298579493134e-04
+    p = z * p + 8.33333333332248946124e-03
+    p = z * p - 1.66666666666666324348e-01
+    s = y + (p * (z * y) + tail)
+    p = z * -1.13596475577881948265e-11 + 2.08757232129817482790e-09
+    p = z * p - 2.75573143513906633035e-07
+    p = z * p + 2.48015872894767294178e-05
+    p = z * p - 1.38888888888741095749e-03
+    p = z * p + 4.16666666666666019037e-02
     half = 0.5 * z
     w = 1.0 - half
-    c = w + (((1.0 - w) - half) + (z * p - y * tail))
-    # by quarter turns
-    half = 0.5 * k
-    odd = half != floor(half)
-    quarter = 0.25 * k - floor(0.25 * k)
-    sine = c if odd else s
-    cosine = s if odd else c
-    sine = -sine if quarter >= 0.5 else sine
-    cosine = -cosine if quarter == 0.25 or quarter == 0.5 else cosine
-    return sine, cosine
+    c = w + (p * (z * z) + (((1.0 - w) - half) - y * tail))
+    odd = (quarter & 1) != 0
+    return with_sign(c if odd else s, quarter), with_sign(s if odd else c, quarter + 1)
 
 
 @njit("boolean(float64[:, ::1], float64[:, ::1])", **OPTIONS)
@@ -180,30 +182,31 @@ def _kept(source: str) -> Path:
 def _source(trace: Trace, entries: list[Any], *, cache: bool) -> str:
     """Return the text of a module with a function ``kernel``."""
     live = live_nodes(trace, entries)
-    variables = [i for i in live if trace.nodes[i].kind == VARIABLE]
+    variables = [i for i, node in enumerate(trace.nodes) if node.kind == VARIABLE]
     compute = [f"v{i} = a[i + {_LANES * k}]" for k, i in enumerate(variables)]
+    compute += [f"far |= not abs(v{i}) <= {LARGEST!r}" for i in variables]
     turned: dict[int, dict[str, str]] = {}
     for i in live:
         if trace.nodes[i].kind in (SINE, COSINE):
             turned.setdefault(trace.nodes[i].operands[0], {})[trace.nodes[i].kind] = f"v{i}"
     for angle, names in turned.items():
-        compute.append(f"far |= (v{angle} > {LARGEST!r}) | (v{angle} < -{LARGEST!r})")
         compute.append(f"{names.get(SINE, '_')}, {names.get(COSINE, '_')} = sine_and_cosine(v{angle})")
     compute += [text for _, text in statements(trace, live)]
     varying = {k: j for j, k in enumerate(k for k, entry in enumerate(entries) if isinstance(entry, Token))}
-    compute += [f"b[i + {_LANES * j}] = {number_text(entries[k])} + 0.0" for k, j in varying.items()]
-    values = [
-        f"b[i + {_LANES * varying[k]}]" if k in varying else repr(entry + 0.0) for k, entry in enumerate(entries)
-    ]
-    places = (int(trace.nodes[i].value) for i in variables)
+    # four results of one joint vector stand side by side: so they are transposed by registers, and copied as one
+    places = [f"b[4 * i + {4 * _LANES * (j // 4) + j % 4}]" for j in varying.values()]
+    compute += [f"{place} = {number_text(entries[k])} + 0.0" for place, k in zip(places, varying, strict=True)]
+    scatter = [f"r{j} = {place}" for j, place in enumerate(places)]  # all read before any is written
+    values = (f"r{varying[k]}" if k in varying else repr(entry + 0.0) for k, entry in enumerate(entries))
+    scatter += [f"out[start + i, {k}] = {value}" for k, value in enumerate(values)]
     return _SOURCE.format(
         cache=cache,
         lanes=_LANES,
         inputs=_LANES * len(variables),
-        outputs=_LANES * len(varying),
-        gather=_indented(f"a[i + {_LANES * k}] = q[start + i, {place}]" for k, place in enumerate(places)),
+        outputs=4 * _LANES * -(-len(varying) // 4),
+        gather=_indented(f"a[i + {_LANES * k}] = q[start + i, {k}]" for k in range(len(variables))),
         compute=_indented(compute),
-        scatter=_indented(f"out[start + i, {k}] = {value}" for k, value in enumerate(values)),
+        scatter=_indented(scatter),
     )
 
 

@@ -57,12 +57,26 @@ def test_sines_and_cosines_are_correct_to_one_unit_in_the_last_place() -> None:
         rng.uniform(-4, 4, 2000),
         rng.uniform(-LARGEST, LARGEST, 2000),
         np.clip(near_quarters, -LARGEST, LARGEST),
+        [-826882.8943881015, -413441.44719405076],  # nearest of all to a multiple of a quarter turn
     ]
     q = np.concatenate(parts)
     T = forward_kinematics(build_chain(TURNTABLE), q[:, None], backend="numba")
     exact = np.array([sin_cos(value) for value in q.tolist()]).T
     for found, expected in zip((T[:, 1, 0], T[:, 0, 0]), exact, strict=True):
         assert np.abs((found - expected) / np.spacing(np.abs(expected))).max() <= 1.0
+
+
+@needs_numba
+@pytest.mark.slow
+def test_a_coordinate_that_is_not_finite_is_refused_in_the_same_words(chain: KinematicChain) -> None:
+    q = np.zeros((2, 3, 5))
+    q[1, 2, 4] = math.nan
+    for frame in ("dh_1", "dh_0"):  # neither is moved by the last joint
+        with pytest.raises(ConfigurationError) as expected:
+            frame_pose(chain, frame, q)
+        with pytest.raises(ConfigurationError) as found:
+            frame_pose(chain, frame, q, backend="numba")
+        assert str(found.value) == str(expected.value)
 
 
 @needs_numba
