@@ -18,8 +18,9 @@ import re
 import stat
 from collections import deque
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
-from types import SimpleNamespace
+from types import CodeType, SimpleNamespace
 from typing import Any, Final
 from xml.dom import expatbuilder, minidom
 
@@ -31,8 +32,12 @@ from dh2sim.messages import did_you_mean, listed, shown
 MAX_FOLDERS: Final = 20_000
 """Searched for packages."""
 MAX_MESSAGES: Final = 20
+MAX_JOINTS: Final = 1500
+"""Of an expanded file, fixed ones too: xacro takes half a millisecond for each."""
 _PLACE: Final = "place"
-_PATCHED: Final = ("parse", "safe_eval", "load_yaml", "glob", "_global_symbols", "init_stacks", "process_doc")
+_PATCHED: Final = (
+    "parse", "safe_eval", "eval_all", "load_yaml", "glob", "_global_symbols", "init_stacks", "process_doc",
+)  # fmt: skip
 _PATCHED_ARGS: Final = ("ArgException", "_eval_find", "_eval_env", "_eval_optenv", "_eval_dict", "_eval")
 
 _SYNTAX: Final = (
@@ -55,7 +60,14 @@ def checked_eval(expression: str, symbols: dict[str, Any], local: Any = None) ->
     Raises:
         _ForbiddenError: It does more than expressions of xacro need.
     """
-    tree = ast.parse(expression.strip(), "<expression>", "eval")
+    symbols.update(__builtins__={})
+    return eval(_compiled(expression.strip()), symbols, local)
+
+
+@lru_cache(maxsize=4096)  # those of a macro are evaluated at each of its uses
+def _compiled(expression: str) -> CodeType:
+    """Return the code of an expression in which nothing leads out of its symbols."""
+    tree = ast.parse(expression, "<expression>", "eval")
     for node in ast.walk(tree):
         if not isinstance(node, _SYNTAX):
             raise _ForbiddenError(f"{type(node).__name__.lower()} is not allowed in an expression")
@@ -66,8 +78,7 @@ def checked_eval(expression: str, symbols: dict[str, Any], local: Any = None) ->
             text = node.value.value if isinstance(node.value, ast.Constant) else None
             if name != "format" or not isinstance(text, str) or re.search(r"\{[^{}:!]*[.\[]", text):
                 raise _ForbiddenError(f"{name}() is allowed for plain texts only")
-    symbols.update(__builtins__={})
-    return eval(compile(tree, "<expression>", "eval"), symbols, local)
+    return compile(tree, "<expression>", "eval")
 
 
 class _Files:
@@ -194,12 +205,14 @@ class _Expansion:
         self._files = files = _Files(request)
         self._known: set[str] = set()
         self._messages: dict[str, None] = {}
+        self._joints = 0
         missing = [n for n in _PATCHED if not hasattr(xacro, n)]
         missing += [n for n in _PATCHED_ARGS if not hasattr(substitution_args, n)]
         if missing:
             raise _ForbiddenError(f"this version of xacro is not supported: it has no {listed(missing)}")
         replaced: Any = xacro
         replaced.parse, replaced.safe_eval, replaced.open = self._parse, checked_eval, files.open
+        self._eval_all, replaced.eval_all = xacro.eval_all, self._bounded
         replaced.message = replaced.warning = replaced.error = self._say
         replaced.print_location = lambda: None
         xacro._global_symbols["xacro"].update(message=self._say, warning=self._say, error=self._say)
@@ -248,6 +261,14 @@ class _Expansion:
     def _say(self, *words: object, **_: object) -> str:
         self._messages[" ".join(" ".join(map(str, words)).split())[:500]] = None
         return ""
+
+    def _bounded(self, node: Any, macros: Any, symbols: Any) -> Any:
+        """Evaluate an element, as long as there are not too many joints."""
+        self._joints += node.nodeName == "joint"
+        if self._joints > MAX_JOINTS:
+            instead = "expand the file with xacro itself, and import what it writes"
+            raise _ForbiddenError(f"there are more than {MAX_JOINTS} joints; {instead}")
+        return self._eval_all(node, macros, symbols)
 
     def _parse(self, _given: object, filename: str | None = None) -> minidom.Document:
         path = filename or self._files.main

@@ -11,6 +11,10 @@ from functools import lru_cache
 
 _GUARD_BITS = 256
 """Bits behind those of the argument; a double's distance to a multiple of pi/2 takes about 62 of them."""
+_USUAL_BITS = 128
+"""As many are nearly always enough to see to which double a sine or a cosine rounds."""
+_ERROR = 1 << 10
+"""Upper bound of the error of ``scaled_sin_cos``, in its units."""
 _SNAP_TURNS = 16
 _SNAP_WIDTH = 4e-16
 
@@ -32,29 +36,35 @@ def sin_cos(angle: float) -> tuple[float, float]:
     Raises:
         ValueError: ``angle`` is NaN or infinite.
     """
+    sine, cosine, bits = scaled_sin_cos(angle, _USUAL_BITS)
+    one = 1 << bits
+    rounded = (sine + _ERROR) / one, (cosine + _ERROR) / one
+    if rounded == ((sine - _ERROR) / one, (cosine - _ERROR) / one):  # whatever the error is
+        return rounded
     sine, cosine, bits = scaled_sin_cos(angle)
     return sine / (1 << bits), cosine / (1 << bits)
 
 
-def scaled_sin_cos(angle: float) -> tuple[int, int, int]:
+def scaled_sin_cos(angle: float, guard_bits: int = _GUARD_BITS) -> tuple[int, int, int]:
     """Return the sine and the cosine of ``angle`` before they are rounded to doubles; angles are taken as there.
 
     Args:
         angle: rad, finite.
+        guard_bits: Bits behind those of the angle.
 
     Returns:
-        Sine and cosine in units of 2**-bits, good to more than 70 digits, and bits.
+        Sine and cosine in units of 2**-bits, and bits; good to more than 70 digits with the usual guard bits.
 
     Raises:
         ValueError: ``angle`` is NaN or infinite.
     """
     if not math.isfinite(angle):
         raise ValueError(f"the angle must be finite, got {angle!r}")
-    bits = _GUARD_BITS + abs(math.frexp(angle)[1])
+    bits = guard_bits + abs(math.frexp(angle)[1])
     quadrant, rest = _reduce(angle, bits)
     if abs(quadrant) <= _SNAP_TURNS and abs(rest / (1 << bits)) <= _SNAP_WIDTH * max(1, abs(quadrant)):
         rest = 0
-    return *_turn(quadrant, *_taylor(rest, bits)), bits
+    return *_turn(quadrant, *_sin_cos_of_rest(rest, bits)), bits
 
 
 def atan2(y: float, x: float) -> float:
@@ -84,7 +94,7 @@ def atan2(y: float, x: float) -> float:
         return 0.0
     bits = _GUARD_BITS + abs(math.frexp(guess)[1])
     quadrant, rest = _reduce(guess, bits)
-    sine, cosine = _turn(quadrant, *_taylor(rest, bits))
+    sine, cosine = _turn(quadrant, *_sin_cos_of_rest(rest, bits))
     (y_over, y_under), (x_over, x_under) = y.as_integer_ratio(), x.as_integer_ratio()
     y_whole, x_whole = y_over * x_under, x_over * y_under
     tangent = ((y_whole * cosine - x_whole * sine) << bits) // (x_whole * cosine + y_whole * sine)
@@ -94,8 +104,8 @@ def atan2(y: float, x: float) -> float:
 
 def _fixed(value: float, bits: int) -> int:
     """``value`` in units of 2**-bits, rounded down."""
-    numerator, denominator = value.as_integer_ratio()
-    return (numerator << bits) // denominator
+    numerator, denominator = value.as_integer_ratio()  # a power of two
+    return (numerator << bits) >> (denominator.bit_length() - 1)
 
 
 @lru_cache(maxsize=64)
@@ -122,6 +132,25 @@ def _reduce(angle: float, bits: int) -> tuple[int, int]:
     half_pi = _pi(finer) >> 1
     quadrant = ((scaled << (finer - bits)) + (half_pi >> 1)) // half_pi
     return quadrant, scaled - (quadrant * half_pi >> (finer - bits))
+
+
+def _sin_cos_of_rest(rest: int, bits: int) -> tuple[int, int]:
+    """Sine and cosine of ``rest``, at most pi/4, all in units of 2**-bits: those of the nearest 1/32, turned on."""
+    step = ((rest >> (bits - 6)) + 1) >> 1
+    if step == 0:
+        return _taylor(rest, bits)
+    sine, cosine = _taylor(rest - (step << (bits - 5)), bits)
+    sine_before, cosine_before = _node(step, bits)
+    return (
+        (sine_before * cosine + cosine_before * sine) >> bits,
+        (cosine_before * cosine - sine_before * sine) >> bits,
+    )
+
+
+@lru_cache(maxsize=1024)
+def _node(step: int, bits: int) -> tuple[int, int]:
+    """Sine and cosine of step/32 in units of 2**-bits."""
+    return _taylor(step << (bits - 5), bits)
 
 
 def _taylor(rest: int, bits: int) -> tuple[int, int]:

@@ -109,7 +109,7 @@ def build_model(spec: SpecLike) -> RobotModel:
     seen = iter(seen_inertias(chain, loaded, home))
     own = duties(
         [row.type for row in spec.rows],
-        [duty_bounds(i, skeleton, loaded, spec.gravity) for i in range(len(spec.rows))],
+        duty_bounds(skeleton, loaded, spec.gravity),
         [next(seen) if row.type.moves else 0.0 for row in spec.rows],
     )
     joints = []

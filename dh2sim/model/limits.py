@@ -118,33 +118,35 @@ def filled_limits(row: Row, position: Range | None, duty: Duty) -> tuple[Limits,
 
 
 def duty_bounds(
-    i: int, skeleton: Skeleton, bodies: Sequence[MassProperties | None], gravity: Array
-) -> tuple[float, float]:
-    """Return upper bounds, in any pose, of what gravity asks of joint ``i`` and of the inertia that it moves.
+    skeleton: Skeleton, bodies: Sequence[MassProperties | None], gravity: Array
+) -> list[tuple[float, float]]:
+    """Return upper bounds, in any pose, of what gravity asks of each joint and of the inertia that it moves.
 
     Args:
-        i: The joint, counted from 0.
         skeleton: Of the arm, n rows.
         bodies: Mass properties of the n links in their joint frames; None for a massless one.
         gravity: m/s² in base_link, shape (3,); where it is zero, the earth's counts.
 
     Returns:
-        N·m and kg·m², or N and kg.
+        n pairs of N·m and kg·m², or N and kg.
     """
     g = _length(gravity) or 9.81
-    turns = skeleton.slides[i] is None
-    loads, inertias, distance = [], [], 0.0
-    steps = skeleton.steps  # computed anew at every access
-    for k, body in enumerate(bodies[i:], start=i):
-        if k > i:
-            distance += steps[k]
-        if body is not None:
-            arm = distance + math.dist(body.com, skeleton.leaving(k + 1)) if turns else 1.0
-            # no principal moment is more than half of their sum
-            own = 0.5 * math.fsum(float(body.inertia[j, j]) for j in range(3)) if turns else 0.0
-            loads.append(body.mass * g * arm)
-            inertias.append(body.mass * arm * arm + own)
-    return math.fsum(loads), math.fsum(inertias)
+    steps = skeleton.steps
+    arms = [0.0 if body is None else math.dist(body.com, skeleton.leaving(k + 1)) for k, body in enumerate(bodies)]
+    # no principal moment is more than half of their sum
+    own = [0.0 if body is None else 0.5 * math.fsum(float(body.inertia[j, j]) for j in range(3)) for body in bodies]
+    bounds = []
+    for i, slide in enumerate(skeleton.slides):
+        loads, inertias, distance = [], [], 0.0
+        for k, body in enumerate(bodies[i:], start=i):
+            if k > i:
+                distance += steps[k]
+            if body is not None:
+                arm = distance + arms[k] if slide is None else 1.0
+                loads.append(body.mass * g * arm)
+                inertias.append(body.mass * arm * arm + (own[k] if slide is None else 0.0))
+        bounds.append((math.fsum(loads), math.fsum(inertias)))
+    return bounds
 
 
 def _length(vector: Iterable[float]) -> float:

@@ -223,7 +223,10 @@ class Number(Kind):
 
     def size_problem(self, number: float, scope: Scope) -> str | None:
         """Return what is wrong with how large or small a number is, in the units that it is given in."""
-        bounds, (unit, si) = self.magnitude(turns=scope.turns), self._unit(scope)
+        bounds = self.magnitude(turns=scope.turns)
+        if bounds is ANY:
+            return None
+        unit, si = self._unit(scope)
         most, least = bounds.most / si, bounds.least / si
         size, positive = abs(number), self.above is not None
         if math.isnan(size) or (size <= most * _SLACK and (size * _SLACK >= least or size == 0 or not self.unsigned)):

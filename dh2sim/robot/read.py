@@ -19,7 +19,17 @@ from dh2sim.robot.checks import placed_rows
 from dh2sim.robot.expressions import NumberError, is_name, names_in, parameter_name_problem, to_number
 from dh2sim.robot.fields import WRONG, Scope, Tree
 from dh2sim.robot.parts import Part
-from dh2sim.robot.spec import ROBOT, AngleUnit, LengthUnit, RobotSpec, SourceFile, Units, check_robot, robot_fields
+from dh2sim.robot.spec import (
+    ROBOT,
+    AngleUnit,
+    LengthUnit,
+    RobotSpec,
+    SourceFile,
+    Units,
+    check_robot,
+    robot_fields,
+    robot_of_checked,
+)
 from dh2sim.robot.yaml_tree import MAX_BYTES, Entry, Node, Report, check_size, compose, decode
 
 
@@ -65,8 +75,12 @@ def parse_robot(
     folder = directory or Path.cwd()
     tree, places = read_tree(ROBOT, check_robot, data, report, folder if mesh_files else None)
     _locate(tree, places)
+    units = units_of(tree)
+    fields = robot_fields(tree, units)
+    if units == Units():
+        return robot_of_checked(fields)
     try:
-        return RobotSpec(**robot_fields(tree, units_of(tree)))
+        return RobotSpec(**fields)
     except RobotError as error:  # right in the file's units alone, such as a radius that is too small in m
         for problem in error.problems:
             places(loc_of(problem.path), f"{problem.message} once converted to SI units")

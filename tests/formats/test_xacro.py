@@ -290,6 +290,12 @@ def test_a_file_that_grows_without_bound_is_stopped(package: Path) -> None:
     assert "too much memory" in _refused(package, "<link name=\"${'a' * 10**10}\"/>")
 
 
+def test_very_many_joints_are_refused_before_all_of_them_are_expanded(package: Path) -> None:
+    joints = "".join(f'<joint name="j{number}"/>' for number in range(1501))
+    told = _refused(package, f'<xacro:macro name="all">{joints}</xacro:macro><xacro:all/>')
+    assert "xacro: there are more than 1500 joints; expand the file with xacro itself" in told
+
+
 @pytest.mark.slow
 def test_a_file_that_never_ends_is_stopped(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xacro_module, "TIME_LIMIT", 2)
