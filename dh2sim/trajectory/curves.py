@@ -129,6 +129,10 @@ DEGREE: Final = 16
 """Of the pieces of a :class:`ChebyshevCurve`."""
 _NARROWEST: Final = 1e-7
 """Width of pieces, as a share of the whole, below which a curve is not smooth."""
+_MOST_PIECES: Final = 1024
+"""That are divided at a time: a smooth function needs fewer."""
+_OPEN: Final = 50.0
+"""Times as large terms are rounding where values at an end are extrapolated."""
 _SPLIT: Final = 0.4871
 """Where pieces are divided: an odd number, as singularities like to be halfway."""
 NODES: Final = read_only(-np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE))
@@ -205,7 +209,11 @@ class NotSmoothError(Exception):
 
 
 def fit(
-    function: Callable[[Array], tuple[Array, NDArray[np.bool_]]], breaks: Array, units: Array, tail: float
+    function: Callable[[Array], tuple[Array, NDArray[np.bool_]]],
+    breaks: Array,
+    units: Array,
+    tail: float,
+    open_ends: tuple[bool, bool] = (False, False),
 ) -> ChebyshevCurve:
     """Return a function as Chebyshev series: pieces are divided until the last terms of each vanish.
 
@@ -214,6 +222,8 @@ def fit(
         breaks: Pieces to begin with, increasing, shape (k + 1,).
         units: What the values are measured in, shape (n,).
         tail: Size of the last terms from which on a series is accurate.
+        open_ends: Whether the values at the first, and at the last, parameter are to be extrapolated: where the
+            function has a limit, and no accurate value.
 
     Raises:
         NotSmoothError: Pieces become too narrow.
@@ -222,15 +232,26 @@ def fit(
     narrowest = _NARROWEST * (breaks[-1] - breaks[0])
     done: list[tuple[float, float, Array]] = []
     while pieces:
+        if len(pieces) > _MOST_PIECES:
+            raise NotSmoothError(min(pieces, key=lambda piece: piece[1] - piece[0])[0])
         low, high = np.array(pieces).T
         x = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * NODES
-        values, valid = function(x.ravel())
-        terms = np.einsum("kj,pjn->pkn", _FIT, values.reshape(*x.shape, -1) / units)
-        tails = np.where(valid.reshape(x.shape).all(axis=1), np.abs(terms[:, -3:]).max(axis=(1, 2)), np.inf)
+        found, valid = function(x.ravel())
+        values, good = found.reshape(*x.shape, -1) / units, valid.reshape(x.shape)
+        allowed = np.full(len(low), tail)
+        for node, at_end in ((0, low == breaks[0]), (-1, high == breaks[-1])):
+            if open_ends[node]:  # the value that leaves the last term zero: the series through the other nodes
+                others = np.delete(np.arange(DEGREE + 1), node)
+                values[at_end, node] = -np.einsum("j,pjn->pn", _FIT[-1, others], values[at_end][:, others])
+                values[at_end, node] /= _FIT[-1, node]
+                good[at_end, node] = True
+                allowed[at_end] = _OPEN * tail
+        allowed[high - low <= 1e3 * narrowest] = 1e3 * tail  # there rounding is larger than what is left out
+        terms = np.einsum("kj,pjn->pkn", _FIT, values)
+        enough = good.all(axis=1) & (np.abs(terms[:, -3:]).max(axis=(1, 2)) <= allowed)
         pieces = []
-        for a, b, series, rest in zip(low.tolist(), high.tolist(), terms * units, tails.tolist(), strict=True):
-            # in narrow pieces rounding is larger than what is left out
-            if rest <= tail or (b - a <= 1e3 * narrowest and rest <= 1e3 * tail):
+        for a, b, series, accurate in zip(low.tolist(), high.tolist(), terms * units, enough.tolist(), strict=True):
+            if accurate:
                 done.append((a, b, series))
             elif b - a > narrowest:
                 middle = a + _SPLIT * (b - a)

@@ -28,6 +28,7 @@ from dh2sim.trajectory.waypoints import MoveKind, Waypoint, waypoints_of
 from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:
+    from dh2sim.inverse.solutions import Solutions
     from dh2sim.inverse.solver import InverseSolver
 
 _STILL: Final = 1e-12
@@ -235,20 +236,25 @@ class _Planner:
         if point.q is not None:
             goal = np.array(point.q, dtype=np.float64)
         else:
-            from dh2sim.inverse.solver import InverseSolver
-
-            self._solver = self._solver or InverseSolver(self._model.spec)
             T, orientation = np.eye(4), point.orientation
             T[:3, 3] = point.position
             if orientation is not None:
                 T[:3, :3] = orientation
             free = self._options.free if orientation is not None else "rotation"
-            found = self._solver.solve(T, q, True, None, free)
+            found = self._solved(T, q, free)
             if found.best is None:
                 raise TrajectoryError(f"no configuration reaches the pose: {found.reason or 'none is found'}")
             goal = np.array(found.best)
         self._require_inside(goal)
         return goal
+
+    def _solved(self, T: Array, q: Array, free: Free | None) -> Solutions:
+        """Return the configurations inside the limits that reach a pose, those near ``q`` first."""
+        from dh2sim.inverse.solver import InverseSolver
+
+        self._solver = self._solver or InverseSolver(self._model.spec)
+        found: Solutions = self._solver.solve(T, q, True, None, free)
+        return found
 
     def _require_inside(self, q: Array) -> None:
         limits, spec = self._limits, self._model.spec
@@ -338,6 +344,7 @@ class _Planner:
                     free=free,
                     through=self._options.through,
                     limits=self._limits,
+                    solutions=lambda T, free=free: self._solved(T, q, free).q,  # type: ignore[misc]
                 )
             except CannotFollowError as error:
                 if not error.constrained or free is tries[-1]:
@@ -348,6 +355,11 @@ class _Planner:
                 joints = "1 joint" if count == 1 else f"{count} joints"
                 self._notes[f"Along the {kind}, {_LEFT_OPEN[free]}: {joints} cannot follow it."] = None
             break
+        if any(followed.singular):
+            where = listed(
+                [word for word, yes in zip(("starts", "ends"), followed.singular, strict=True) if yes], " and "
+            )
+            self._notes[f"The {kind} {where} in a singularity: the tool is slow near it."] = None
         if followed.near:
             note = (
                 f"A singularity is passed closely at {followed.near}, and the whole {kind} is as slow as that takes"

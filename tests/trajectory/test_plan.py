@@ -17,6 +17,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import parse_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.trajectory.plan import plan_trajectory
+from dh2sim.trajectory.trajectory import Trajectory
 from dh2sim.typing import Array
 from tests.sample_robots import COSTLY_NAMES, NAMES, model, robot
 from tests.strategies import robot_specs
@@ -272,6 +273,50 @@ def test_a_line_that_passes_near_a_singularity_is_slowed_down_there_alone() -> N
     chord = ends[1] - ends[0]
     along = (poses[:, :3, 3] - ends[0]) @ chord / (chord @ chord)
     assert np.linalg.norm(poses[:, :3, 3] - ends[0] - along[:, None] * chord, axis=1).max() <= 1e-9
+
+
+def assert_straight(spec: RobotSpec, planned: Trajectory) -> None:
+    ends = table_tool_pose(spec, np.stack([planned.waypoints[0].q, planned.waypoints[-1].q]))[:, :3, 3]
+    _, poses = tool_poses(spec, planned)
+    chord = ends[1] - ends[0]
+    along = (poses[:, :3, 3] - ends[0]) @ chord / (chord @ chord)
+    off = poses[:, :3, 3] - ends[0] - along[:, None] * chord
+    assert np.linalg.norm(off, axis=1).max() <= 1e-9 * np.abs(ends).max()
+
+
+@pytest.mark.parametrize("points", [[[0.3, 0.8], [0.5, 0.0]], [[0.5, 0.0], [0.3, 0.8]]])
+@pytest.mark.parametrize("through", [False, True])
+def test_lines_to_and_from_the_stretched_arm_stop_there_exactly(points: list[list[float]], through: bool) -> None:
+    planned = plan_trajectory(
+        model("planar_2r"), points, kind="line", profile="jerk", through=through, free="rotation"
+    )
+    assert_limits_are_kept(planned)
+    assert_straight(robot("planar_2r"), planned)
+    q, qd, *_ = planned.at([0.0, planned.duration])
+    np.testing.assert_allclose(q, points, atol=1e-12)
+    np.testing.assert_allclose(qd, 0.0, atol=1e-9)
+    word = "ends" if points[1][1] == 0.0 else "starts"
+    assert f"The line {word} in a singularity: the tool is slow near it." in planned.notes
+
+
+def test_lines_end_where_wrist_axes_coincide_and_leave_there_only_the_way_they_must() -> None:
+    start, end = STRAIGHT_WRIST + np.array([-0.1, -0.2, -0.1, 0.05, 0.5, -0.1]), STRAIGHT_WRIST
+    T = table_tool_pose(robot("puma560"), end[None])[0]
+    planned = plan_trajectory(model("puma560"), [start, T], kind="line")
+    assert_limits_are_kept(planned)
+    assert_straight(robot("puma560"), planned)
+    arrived = planned.waypoints[1].q
+    np.testing.assert_allclose(table_tool_pose(robot("puma560"), arrived[None])[0], T, atol=1e-10)
+    with pytest.raises(
+        TrajectoryError, match=r"starts in a singularity, 0 m .* which it can leave only with"
+    ) as refused:
+        plan_trajectory(model("puma560"), [end, start], kind="line")
+    for joint in (4, 6):
+        said = float(str(refused.value).split(f"joint_{joint} at ")[1].split(",")[0].split(":")[0])
+        assert math.radians(said) == pytest.approx(arrived[joint - 1], abs=1e-8)
+    back = plan_trajectory(model("puma560"), [arrived, start], kind="line")
+    assert_limits_are_kept(back)
+    np.testing.assert_allclose(back.at(0.3 * back.duration)[0], planned.at(0.7 * planned.duration)[0], atol=1e-6)
 
 
 def test_a_line_to_a_pose_in_another_branch_says_which_joints_differ() -> None:
