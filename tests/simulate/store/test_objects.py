@@ -21,7 +21,7 @@ from tests.simulate.store.runs import SECONDS, block_of, finish, layout, make
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(find_spec("obstore") is None, reason="needs the extra 's3'"),
-    pytest.mark.skipif(find_spec("moto") is None, reason="needs moto[server]"),
+    pytest.mark.skipif(find_spec("moto") is None, reason="needs moto and flask"),
     pytest.mark.filterwarnings("ignore"),  # of the server's libraries
 ]
 
