@@ -632,10 +632,13 @@ class Robot:
         Returns:
             The report; ``ok`` says whether everything matches.
         """
-        from dh2sim.importing.sources import ImportOptions
         from dh2sim.validate.run import validate_robot
 
-        options = ImportOptions(base=base, tip=tip)
+        options = None
+        if source is not None:
+            from dh2sim.importing.sources import ImportOptions
+
+            options = ImportOptions(base=base, tip=tip)
         return validate_robot(
             self._written, samples=samples, seed=seed, tolerance=tolerance, source=source, source_options=options
         )

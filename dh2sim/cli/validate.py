@@ -99,7 +99,6 @@ def validate(
     models = build_any(robots, strict=strict)
     if folder is not None:
         _require_folders(robots, models, folder)
-    from dh2sim.importing.sources import ImportOptions
     from dh2sim.model.mechanism import MechanismModel
     from dh2sim.validate.report import ValidationReport, to_junit
     from dh2sim.validate.run import engine_samples, validate_robot
@@ -108,6 +107,11 @@ def validate(
         if isinstance(model, MechanismModel) and (dynamics or source is not None):
             option = "--dynamics" if dynamics else "--source"
             raise Dh2simError(f"{model.name}: {option} is for serial robots; this one is a mechanism")
+    source_options = None
+    if source is not None:
+        from dh2sim.importing.sources import ImportOptions
+
+        source_options = ImportOptions(base=base, tip=tip)
     serial = [model for model in models if not isinstance(model, MechanismModel)]
     poses = sum(engine_samples(samples, len(model.joints)) for model in serial)
     with progress_bar("comparing", "poses", poses) as advance:
@@ -120,7 +124,7 @@ def validate(
                 tolerance=tolerance,
                 folder=None if folder is None else folder / model.name,
                 source=source,
-                source_options=ImportOptions(base=base, tip=tip),
+                source_options=source_options,
                 advance=advance,
             )
             if dynamics and not isinstance(model, MechanismModel):

@@ -8,7 +8,7 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from dh2sim.engines.yourdfpy_engine import YourdfpyEngine, start_yourdfpy
 from dh2sim.errors import Dh2simError, EngineCapacityError, EngineError
 from dh2sim.export import export_robot, mixture
 from dh2sim.files import finish_interrupted, signals_deferred
-from dh2sim.importing.sources import ImportOptions
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.mechanism import MechanismModel
@@ -40,7 +39,10 @@ from dh2sim.validate.kinematics import (
 )
 from dh2sim.validate.mechanism import validate_mechanism
 from dh2sim.validate.report import Check, Quantity, RobotReport
-from dh2sim.validate.source import SourceArm, check_source
+
+if TYPE_CHECKING:  # what reads sources takes a tenth of the time to start, and is seldom asked for
+    from dh2sim.importing.sources import ImportOptions
+    from dh2sim.validate.source import SourceArm
 
 SLOW_ROWS = 8000
 """Most table rows that engines looping in Python compute: 1000 configurations of 8 rows."""
@@ -106,7 +108,7 @@ def validate_robot(
         return validate_mechanism(robot, samples=samples, seed=seed, tolerance=tolerance, folder=folder)
     start_yourdfpy()
     model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
-    arm = None if source is None else SourceArm.read(source, source_options or ImportOptions(), model)
+    arm = None if source is None else _source_arm(source, source_options, model)
     with mujoco_warnings() as warned:
         if folder is not None:
             finish_interrupted(folder.parent, folder.name)
@@ -245,8 +247,17 @@ def _dynamics(model: RobotModel, engines: list[Mover], q: Array, seed: int) -> l
     return checks
 
 
+def _source_arm(source: str | PathLike[str], options: ImportOptions | None, model: RobotModel) -> SourceArm:
+    from dh2sim.importing.sources import ImportOptions
+    from dh2sim.validate.source import SourceArm
+
+    return SourceArm.read(source, options or ImportOptions(), model)
+
+
 def _masses(model: RobotModel, engines: list[Mover], source: SourceArm, q: Array) -> list[Check]:
     """Compare the exported MJCF with the source; one that was not read has failed already."""
+    from dh2sim.validate.source import check_source
+
     checks: list[Check] = []
     for engine in engines:
         if isinstance(engine, MujocoEngine) and engine.name == "mujoco-mjcf":
