@@ -87,7 +87,7 @@ def calibrate(
     before, whole = task.solve(measured)
     dropped: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
     if robust:
-        whole, dropped = task.withoutfind_outliers(whole)
+        whole, dropped = task.without_outliers(whole)
     result = task.result(before, whole, dropped)
     if not held_out:
         return result
@@ -219,7 +219,7 @@ class _Task:
     def _columns(self, observations: Observations) -> list[int]:
         return [k for k, each in enumerate(observations.unknowns) if each.group is None or k in self.free]
 
-    def withoutfind_outliers(self, whole: Fit) -> tuple[Fit, NDArray[np.intp]]:
+    def without_outliers(self, whole: Fit) -> tuple[Fit, NDArray[np.intp]]:
         """Return the least-squares fit without the rows that a robust fit finds far off, and those rows."""
         dropped: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
         for _ in range(10):
