@@ -19,6 +19,7 @@ from dh2sim.messages import printable
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dh2sim.model.mechanism import MechanismModel
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.robot.spec import RobotSpec
     from dh2sim.trajectory.files import SampledTrajectory
@@ -94,10 +95,8 @@ def view(
 
     state = open_state(spec, folder_of(robot))
     report_slips([state.model], strict=strict)
-    motion = None if run is None else _trajectory(run, state.model)
+    motion = _motion(run, rollout, state.model)
     if motion is not None:
-        if rollout != 0:
-            raise typer.BadParameter("does not apply to a trajectory file", param_hint="--rollout")
         from dh2sim.view.page_export import tool_path
 
         state = replace(state, planned=tool_path(state.model, motion), q=tuple(motion.q[0].tolist()))
@@ -130,25 +129,23 @@ def _view_mechanism(
 ) -> None:
     """Show a mechanism, or write a page of it."""
     from dh2sim.model.mechanism import build_mechanism
-    from dh2sim.trajectory.files import is_trajectory_file
 
-    if run is not None and (export is None or is_trajectory_file(run)):
-        what = "a mechanism's page plays no trajectory file" if is_trajectory_file(run) else "needs --export"
-        raise typer.BadParameter(f"{what}: {spec.name} is a mechanism", param_hint="RUN.zarr|MOTION")
     model = build_mechanism(spec)
+    motion = _motion(run, rollout, model)
     if export is None:
         from dh2sim.view.mechanism.server import MechanismViewer
 
         def serve(chosen: int) -> MechanismViewer:
-            return MechanismViewer(model, host=host, port=chosen, allow_hosts=allow_hosts)
+            return MechanismViewer(model, host=host, port=chosen, run=run, allow_hosts=allow_hosts)
 
         _serve_pages(spec.name, serve, host=host, port=port, browser=browser)
         return
     from dh2sim.draw.rollout_data import open_rollout
     from dh2sim.view.mechanism.scene import export_mechanism_page
 
-    export_mechanism_page(model, model.q, export, rollout=None if run is None else open_rollout(run, rollout))
-    print(printable(f"{export}: {spec.name}{'' if run is None else f', rollout {rollout} of {run}'}"))
+    data = None if run is None or motion is not None else open_rollout(run, rollout)
+    export_mechanism_page(model, model.q, export, rollout=data, trajectory=motion)
+    print(printable(f"{export}: {spec.name}{_what(run, rollout, motion)}"))
 
 
 def _serve(
@@ -197,12 +194,21 @@ def _use_one_arena() -> None:
         set_option(arena_max, 1)
 
 
-def _trajectory(path: Path, model: RobotModel) -> SampledTrajectory | None:
+def _motion(path: Path | None, rollout: int, model: RobotModel | MechanismModel) -> SampledTrajectory | None:
     """Return a trajectory file's content, in the order of the robot's joints; None for the path of a run."""
     from dh2sim.trajectory.files import is_trajectory_file, read_trajectory
     from dh2sim.view.motion.replay import trajectory_of
 
-    return trajectory_of(read_trajectory(path), path, model) if is_trajectory_file(path) else None
+    if path is None or not is_trajectory_file(path):
+        return None
+    if rollout != 0:
+        raise typer.BadParameter("does not apply to a trajectory file", param_hint="--rollout")
+    return trajectory_of(read_trajectory(path), path, model)
+
+
+def _what(run: Path | None, rollout: int, motion: SampledTrajectory | None) -> str:
+    """Return what else than the robot a page shows."""
+    return "" if run is None else f", {run}" if motion is not None else f", rollout {rollout} of {run}"
 
 
 def _export(state: ViewState, run: Path | None, rollout: int, page: Path, motion: SampledTrajectory | None) -> None:
@@ -215,5 +221,4 @@ def _export(state: ViewState, run: Path | None, rollout: int, page: Path, motion
 
         data = open_rollout(run, rollout)
     export_page(state.model, state.q, page, rollout=data, trajectory=motion)
-    what = "" if run is None else f", {run}" if motion is not None else f", rollout {rollout} of {run}"
-    print(printable(f"{page}: {state.spec.name}{what}"))
+    print(printable(f"{page}: {state.spec.name}{_what(run, rollout, motion)}"))

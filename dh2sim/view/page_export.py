@@ -73,7 +73,7 @@ def _box(item: Item, boxes: dict[int, Array]) -> Array:
         case Solid():
             if id(item.vertices) not in boxes:  # scenes share them
                 boxes[id(item.vertices)] = _corners(np.array(item.vertices))
-            return boxes[id(item.vertices)]
+            return boxes[id(item.vertices)] * item.scale
         case Polyline():
             return _corners(np.array(item.points))
         case Arrow():

@@ -11,13 +11,16 @@ import pytest
 
 from dh2sim.errors import SingularPositionError
 from dh2sim.kinematics.loop_closure import closure_gaps
+from dh2sim.kinematics.loop_motion import mechanism_configuration
 from dh2sim.kinematics.table_oracle import table_mechanism_frames
 from dh2sim.model.mechanism import build_mechanism
 from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.simulate import rollout
+from dh2sim.trajectory.files import SampledTrajectory
 from dh2sim.view.mechanism.motion import MechanismMotion
-from dh2sim.view.mechanism.scene import mechanism_scene
+from dh2sim.view.mechanism.scene import frame_path, mechanism_scene
 from dh2sim.view.mechanism.server import MechanismViewer
+from dh2sim.view.motion.replay import open_replay
 from dh2sim.view.scene.items import Placed
 from dh2sim.view.scene.solids import rotation_matrix
 from tests.program import dh2sim
@@ -61,13 +64,13 @@ def _pose(item: Placed) -> np.ndarray:
 
 def test_the_simulation_holds_the_loops_and_ends_closed() -> None:
     motion = MechanismMotion(build_mechanism(load_robot("five_bar")))
-    motion.simulate(True)
+    motion.simulate()
     motion.move({0: motion.wanted[0] + 0.2})
     gap = 0.0
     for _ in range(20):
         gap = max(gap, motion.tick() or 0.0)
     assert gap < 1e-3 * motion.model.size
-    motion.simulate(False)
+    motion.stop()
     assert max(each.position for each in closure_gaps(motion.model.tree, motion.q)) < 1e-11
 
 
@@ -80,9 +83,34 @@ def test_a_page_of_a_mechanism_and_of_its_run_is_written(tmp_path: Path, monkeyp
     )
     assert (still.out, moving.out) == ("a.html: four_bar\n", "b.html: four_bar, rollout 0 of run.zarr\n")
     assert (tmp_path / "a.html").stat().st_size < (tmp_path / "b.html").stat().st_size
-    refused = dh2sim("view", "four_bar", "run.zarr")
+    motion = MechanismMotion(build_mechanism(load_robot("four_bar")))
+    replay = open_replay(tmp_path / "run.zarr", motion.model)
+    motion.play(replay, 0)
+    motion.step()
+    gap = motion.tick()
+    assert motion.q.tolist() == replay.positions(0)[1].tolist()
+    assert gap is not None
+    assert 0.0 < gap < 1e-3
+    motion.move({0: 2.0})  # the recording moves it
+    assert motion.wanted == [replay.positions(0)[1, 0]]
+    motion.stop()
+    assert max(each.position for each in closure_gaps(motion.model.tree, motion.q)) < 1e-12
+    assert np.abs(motion.q - replay.positions(0)[1]).max() < 1e-3
+
+
+def test_a_trajectory_file_of_all_joints_is_played_with_the_path_of_a_frame(tmp_path: Path) -> None:
+    model = build_mechanism(load_robot("four_bar"))
+    q = np.array([mechanism_configuration(model.spec, [angle]) for angle in (1.2, 1.5, 1.8)])
+    SampledTrajectory.of([joint.name for joint in model.moving_joints], [0, 0.1, 0.2], q).save(tmp_path / "a.csv")
+    path = frame_path(model, q, "tool0")
+    table = [table_mechanism_frames(model.spec, each)["tool0"][:3, 3] for each in q]
+    assert np.array(path.points) == pytest.approx(np.array(table), abs=1e-12)
+    done = dh2sim("view", "four_bar", tmp_path / "a.csv", "--export", tmp_path / "a.html")
+    assert done.out == f"{tmp_path / 'a.html'}: four_bar, {tmp_path / 'a.csv'}\n"
+    (tmp_path / "b.csv").write_text("time,joint_1\n0,1\n1,2\n", encoding="utf-8")
+    refused = dh2sim("view", "four_bar", tmp_path / "b.csv", "--no-browser")
     assert refused.status == 2
-    assert "needs --export: four_bar is a mechanism" in refused.err
+    assert "its joints are joint_1; the robot has joint_1, joint_2, rocker_joint_1" in refused.err
 
 
 def test_sliders_move_the_passive_joints_in_the_browser(browser: Browser) -> None:
@@ -101,7 +129,7 @@ def test_sliders_move_the_passive_joints_in_the_browser(browser: Browser) -> Non
         xyz = re.search(r"xyz \[m\]\s+(\S+) (\S+) (\S+)", shown(page, "readout"))
         assert xyz is not None
         assert [float(x) for x in xyz.groups()] == pytest.approx(T[:3, 3], abs=1e-6)
-        page.get_by_label("Simulate with MuJoCo").first.click(force=True)
+        served.send(lambda: served._start("physics"))
         wait_until(lambda: "loops open by" in shown(page, "readout"), "it is not simulated")
         assert "its file" in shown(page, "not-here")
         page.close()

@@ -1,22 +1,27 @@
-"""How a mechanism on a page moves: driven joints by continuation, or everything by MuJoCo in real time."""
+"""How a mechanism on a page moves: driven joints by continuation, by MuJoCo in real time, or as recorded."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import mujoco
 import numpy as np
 
-from dh2sim.errors import SingularPositionError
+from dh2sim.errors import AssemblyError, SingularPositionError
 from dh2sim.formats.mjcf.mechanism import joint_coordinates, to_mechanism_mjcf
+from dh2sim.kinematics.loop_closure import close_loops, closure_gaps
 from dh2sim.kinematics.loop_motion import actuated_joints, driven_motion
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.variants import with_actuators, without_meshes
 from dh2sim.mujoco_warnings import mujoco_warnings
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.typing import Array, read_only
+from dh2sim.view.motion.motion_source import Recording
+
+if TYPE_CHECKING:
+    from dh2sim.view.motion.replay import Replay
 
 MOST_STEPS: Final = 200
 """Of the simulation at a time; a slow machine falls behind."""
@@ -34,14 +39,21 @@ class MechanismMotion:
         self.q: Array = model.q
         self.wanted = [float(model.q[k]) for k in self.driven]
         """Of the driven joints, rad and m."""
+        self.recording: Recording | None = None
+        """What is played, if anything."""
+        self.paused = False
+        """Whether the recording is."""
+        self._steps = 0
         self._simulation: _Simulation | None = None
 
     def move(self, values: Mapping[int, float]) -> None:
-        """Move driven joints, counted among them; the passive ones follow.
+        """Move driven joints, counted among them; the passive ones follow. What is recorded is not moved.
 
         Raises:
             SingularPositionError: A dead or singular position is in the way; nothing has moved then.
         """
+        if self.recording is not None:
+            return
         wanted = [values.get(place, value) for place, value in enumerate(self.wanted)]
         if self._simulation is None:
             self.q = driven_motion(self.model.spec, self.q, wanted)
@@ -55,41 +67,61 @@ class MechanismMotion:
             self._simulation.start(self.q)
 
     @property
-    def simulates(self) -> bool:
-        """Whether MuJoCo moves it."""
-        return self._simulation is not None
+    def is_moving(self) -> bool:
+        """Whether time goes on: MuJoCo or a recording moves it."""
+        return self._simulation is not None or self.recording is not None
 
-    def simulate(self, on: bool) -> None:
-        """Begin to simulate, with position actuators that hold the driven joints where they are wanted; or end.
+    def stop(self) -> None:
+        """Give the driven joints back to the user, where they are.
 
-        What is simulated is nearly closed; afterwards the driven joints stay where they were wanted last, if they
-        can be brought there.
+        What is simulated is nearly closed; it is closed then, or where that fails put at the assembly.
         """
-        if on and self._simulation is None:
-            self._simulation = _Simulation(self.model)
-            self._simulation.start(self.q)
-        elif not on and self._simulation is not None:
-            self._simulation = None
+        if self.is_moving:
+            self._simulation, self.recording, self.paused = None, None, False
             try:
-                q = driven_motion(self.model.spec, self.model.q, self.wanted)
-            except SingularPositionError:
-                q = self.model.q
-            self.place(q)
+                self.place(close_loops(self.model.tree, self.q))
+            except AssemblyError:
+                self.place(self.model.q)
+
+    def simulate(self) -> None:
+        """Begin to simulate, with position actuators that hold the driven joints where they are wanted."""
+        self.stop()
+        self._simulation = _Simulation(self.model)
+        self._simulation.start(self.q)
+
+    def play(self, replay: Replay, rollout: int) -> None:
+        """Play a rollout of a run, or a trajectory, in a loop.
+
+        Raises:
+            PictureError: Positions were not recorded.
+            RunError: The run cannot be read.
+        """
+        self.stop()
+        self.recording, self.paused, self._steps = Recording(replay, rollout), False, 0
+
+    def step(self) -> None:
+        """Go on to the next recorded time; a recording that plays is paused there."""
+        self.paused = True
+        self._steps += 1
 
     def tick(self) -> float | None:
-        """Advance the simulation to the present; return how far the loops are open, m, or None without one.
+        """Advance what moves it to the present; return how far the loops are open, m, or None if nothing does.
 
         Raises:
             SingularPositionError: The simulation became unstable; it is at the assembly again.
         """
-        if self._simulation is None:
+        if self.recording is not None:
+            q = self.recording.advance(time.monotonic(), paused=self.paused, steps=self._steps)
+            self.q, self.wanted = read_only(q), [float(q[k]) for k in self.driven]
+        elif self._simulation is not None:
+            simulated = self._simulation.advance(self.wanted)
+            if simulated is None:
+                self.place(self.model.q)
+                raise SingularPositionError("the simulation became unstable, and starts at the assembly again")
+            self.q = simulated
+        else:
             return None
-        q = self._simulation.advance(self.wanted)
-        if q is None:
-            self.place(self.model.q)
-            raise SingularPositionError("the simulation became unstable, and starts at the assembly again")
-        self.q = q
-        return self._simulation.gap
+        return max((gap.position for gap in closure_gaps(self.model.tree, self.q)), default=0.0)
 
 
 class _Simulation:
@@ -121,9 +153,3 @@ class _Simulation:
                 mujoco.mj_step(self._model, self._data)
         fast = not (np.abs(self._data.qvel) < FASTEST).all()  # NaN compares false
         return None if fast else read_only(self._data.qpos[self._places])
-
-    @property
-    def gap(self) -> float:
-        """The widest gap of the loops, m or rad."""
-        closed = self._data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
-        return float(np.abs(self._data.efc_pos[closed]).max(initial=0.0))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 import numpy as np
 
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.typing import Array
 from dh2sim.view.events import Event, Follow, Notify, SetMode
 from dh2sim.view.initial_state import is_same_file
 from dh2sim.view.state import LinkDrag, Matrix, Mode, ViewState
@@ -164,15 +165,19 @@ class Recording:
 
     def tick(self, now: float, state: ViewState) -> tuple[float, ...]:
         """Advance the recording, unless paused, and return its joint positions, rad and m."""
+        return tuple(self.advance(now, paused=state.paused, steps=state.steps).tolist())
+
+    def advance(self, now: float, *, paused: bool, steps: int) -> Array:
+        """Advance to a reading of the clock, s, or by the steps that were requested since; return positions."""
         before = self.time
-        if state.paused:
-            for _ in range(state.steps - self._steps):
+        if paused:
+            for _ in range(steps - self._steps):
                 self.time = self._next_time()
         elif self._last is not None and self.duration > 0.0:
             self.time = (self.time + (now - self._last) * self.speed) % self.duration
         self.jumps, self._sought = self._sought or self.time < before, False
-        self._last, self._steps = now, state.steps
-        return tuple(self._replay.q_at(self._rollout, self.time).tolist())
+        self._last, self._steps = now, steps
+        return self._replay.q_at(self._rollout, self.time)
 
     def _next_time(self) -> float:
         """Return the next recorded time, s; the first one after the last."""

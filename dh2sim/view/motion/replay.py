@@ -13,6 +13,7 @@ from dh2sim.draw.motion import Motion
 from dh2sim.errors import RunError, TrajectoryError
 from dh2sim.kinematics.transforms import identity
 from dh2sim.messages import listed
+from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.simulate.dataset_layout import FINISHED, NOT_RUN
 from dh2sim.trajectory.files import SampledTrajectory, is_trajectory_file, read_trajectory
@@ -80,6 +81,10 @@ class Replay:
         recorded = self._recorded(rollout)
         return np.asarray(recorded.q[recorded.motion.nearest(t)])
 
+    def positions(self, rollout: int) -> Array:
+        """Return all recorded joint positions, rad and m, shape (N, n)."""
+        return self._recorded(rollout).q
+
     def base_at(self, rollout: int, t: float) -> Array | None:
         """Return base_link's pose in the world nearest to time ``t``, s, shape (4, 4); None if it does not float."""
         recorded = self._recorded(rollout)
@@ -120,7 +125,7 @@ class _TrajectoryReplay(Replay):
         return _Recorded(motion=motion, q=trajectory.q, base=None, stopped="")
 
 
-def open_replay(path: Path, model: RobotModel | None) -> Replay:
+def open_replay(path: Path, model: RobotModel | MechanismModel | None) -> Replay:
     """Open a run, finished or not, or a trajectory file.
 
     Args:
@@ -164,7 +169,7 @@ def open_replay(path: Path, model: RobotModel | None) -> Replay:
     return Replay(path, joints=joints, rollouts=rollouts, note=note)
 
 
-def trajectory_of(read: SampledTrajectory, path: Path, model: RobotModel) -> SampledTrajectory:
+def trajectory_of(read: SampledTrajectory, path: Path, model: RobotModel | MechanismModel) -> SampledTrajectory:
     """Return a trajectory with its joints in a robot's order.
 
     Raises:
