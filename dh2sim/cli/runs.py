@@ -227,14 +227,21 @@ def _sections(description: RunDescription, *, verified: bool) -> Iterator[tuple[
     yield "size", [_sizes(description)]
     if description.steps_per_second is not None:
         yield "speed", [f"{description.steps_per_second:,.0f} steps/s over {description.seconds:,.3g} s"]
-    packages = {"dh2sim": "dh2sim", "mujoco": "MuJoCo", "numpy": "NumPy", "python": "Python"}
-    versions = ", ".join(f"{packages.get(name, name)} {version}" for name, version in description.versions.items())
-    yield "made", [_moment(description.created), f"with {versions}"]
+    yield "made", [_moment(description.created), f"with {', '.join(_versions(description))}"]
     if description.command:
         yield "command", [description.command]
     if not description.complete:
         again = description.resume_command
         yield "carry on", [again or "with the same call and resume=True; it was made by the library"]
+
+
+def _versions(description: RunDescription) -> Iterator[str]:
+    packages = {"dh2sim": "dh2sim", "mujoco": "MuJoCo", "numpy": "NumPy", "python": "Python"}
+    source = description.versions.get("mujoco_package", "")
+    for name, version in description.versions.items():
+        if name != "mujoco_package":
+            other = f" ({source})" if name == "mujoco" and source not in ("", "mujoco") else ""
+            yield f"{packages.get(name, name)} {version}{other}"
 
 
 def _moment(created: str) -> str:

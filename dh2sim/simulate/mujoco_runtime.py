@@ -7,8 +7,9 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import mujoco
 import numpy as np
@@ -83,6 +84,19 @@ def set_models(batch: Batch, plant: Plant, *, as_fields: bool = False) -> None:
         values = batch.expand(name)
         for i, model in enumerate(plant.models):  # of bvh_aabb a batch holds the beginning
             values[i] = np.ravel(_field(model, name))[: values[i].size].reshape(values[i].shape)
+
+
+_PACKAGES: Final = ("mujoco-core", "mujoco")
+"""Since 4.0 the second only names the first; of two versions that were both installed, the last one is there."""
+
+
+def mujoco_package() -> str:
+    """Return the package that MuJoCo was installed from; empty if it was from none of that version."""
+    for name in _PACKAGES:
+        with suppress(PackageNotFoundError):
+            if version(name) == mujoco.__version__:
+                return name
+    return ""
 
 
 def _field(model: mujoco.MjModel, name: str) -> Any:

@@ -25,6 +25,7 @@ from dh2sim.simulate.dataset_layout import FORMAT, TAKEN, design_variables, roll
 from dh2sim.simulate.design_plants import DesignPlants, PlantRecipe
 from dh2sim.simulate.designs import Designs
 from dh2sim.simulate.initial_states import InitialStates, read_initial_states, reference_start
+from dh2sim.simulate.mujoco_runtime import mujoco_package
 from dh2sim.simulate.options import AUTO, REFERENCE, RolloutOptions
 from dh2sim.simulate.plant import Plant, compile_plant
 from dh2sim.simulate.quantities import randomized, unknown_labels
@@ -302,7 +303,8 @@ def _attributes(
         "integrator": options.integrator,
         "versions": {
             "dh2sim": version("dh2sim"),
-            "mujoco": mujoco.__version__,  # of whichever package: mujoco, or mujoco-core
+            "mujoco": mujoco.__version__,
+            "mujoco_package": mujoco_package(),
             "numpy": np.__version__,
             "python": platform.python_version(),
         },

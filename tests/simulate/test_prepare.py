@@ -97,8 +97,9 @@ def test_attributes_tell_where_a_run_comes_from(tmp_path: Path) -> None:
     assert attributes["randomize"] == {"mass": 0.25}
     assert attributes["timestep"] == 0.002
     assert attributes["integrator"] == "implicitfast"
-    assert attributes["versions"]["mujoco"] == version("mujoco")
-    assert set(attributes["versions"]) == {"dh2sim", "mujoco", "numpy", "python"}
+    versions = attributes["versions"]
+    assert set(versions) == {"dh2sim", "mujoco", "mujoco_package", "numpy", "python"}
+    assert versions["mujoco"] == version(versions["mujoco_package"]) == mujoco.__version__
     made = datetime.fromisoformat(attributes["created"])
     assert timedelta(0) <= datetime.now(UTC) - made < timedelta(minutes=1)
     assert json.loads(json.dumps(dict(attributes))) == attributes

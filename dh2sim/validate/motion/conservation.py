@@ -65,10 +65,10 @@ def check_energy(model: RobotModel, compiled: mujoco.MjModel, *, seed: int = 0) 
 def check_momentum(model: RobotModel, compiled: mujoco.MjModel, *, seed: int = 0) -> Check:
     """Require linear and angular momentum of the robot to be constant while its motors work.
 
-    Its base floats without gravity, and has the mass of its shapes. MuJoCo's RK4 is only of second order for a body
-    that rotates freely: it adds angular velocities along axes that have rotated meanwhile. So the momentum is
-    extrapolated to timestep zero from two timesteps (Richardson), which are halved until the error is well below the
-    tolerance; errors from other sources remain. Momenta are computed from the table and the masses, not by MuJoCo.
+    Its base floats without gravity, and has the mass of its shapes. Before 4.0 MuJoCo's RK4 is only of second order
+    for a body that rotates freely: it adds angular velocities along axes that have rotated meanwhile. So the momentum
+    is extrapolated to timestep zero from two timesteps (Richardson), which are halved until the error is well below
+    the tolerance; other errors remain. Momenta are computed from the table and the masses, not by MuJoCo.
 
     Args:
         model: The robot.
