@@ -297,7 +297,7 @@ class ExportReport:
     assumptions: tuple[FilledIn, ...]
     """Limits that were assumed."""
     warnings: tuple[str, ...] = ()
-    """What MuJoCo finds questionable in the files, a sentence each."""
+    """What MuJoCo finds questionable in the files, one sentence each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

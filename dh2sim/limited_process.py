@@ -208,7 +208,7 @@ def _receive(stream: IO[bytes]) -> tuple[bytes, tuple[int, int], bytes]:
 def serve(module: str) -> NoReturn:
     """Answer requests on standard input, each within its limits; runs in the worker's process."""
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what libraries print is no answer
+    os.dup2(2, 1)  # what libraries print is not an answer
     function = _function(module)
     _limit({"FSIZE": 0, "CORE": 0})
     while True:

@@ -1,4 +1,4 @@
-"""Locks on folders and files, and hidden folders of processes, told by their locks from those of dead ones."""
+"""Locks on folders and files, and hidden folders of processes; the locks tell live processes from dead ones."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def lock_folder(
         BlockingIOError: It is locked, and ``wait`` is False.
         OSError: It cannot be opened.
     """
-    begin, told = time.monotonic(), False
+    begin, reported = time.monotonic(), False
     while True:
         with suppress(*((BlockingIOError,) if wait else ())):
             lock = FolderLock(folder, shared=shared)
@@ -119,8 +119,8 @@ def lock_folder(
                 return lock
             lock.release()
             continue
-        if not told and waiting is not None and time.monotonic() - begin > _A_MOMENT:
-            told = True
+        if not reported and waiting is not None and time.monotonic() - begin > _A_MOMENT:
+            reported = True
             waiting(folder)
         time.sleep(_POLL)
 

@@ -51,5 +51,5 @@ def _shares(membership: Path, groups: Path) -> Iterator[float]:
                     period = (folder / "cpu.cfs_period_us").read_text()
                 else:
                     quota, period = (folder / "cpu.max").read_text().split()
-                if float(period) > 0.0 and float(quota) > 0.0:  # "max" is no number, -1 no limit
+                if float(period) > 0.0 and float(quota) > 0.0:  # "max" is not a number, -1 no limit
                     yield float(quota) / float(period)

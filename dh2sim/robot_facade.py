@@ -74,7 +74,7 @@ class Robot:
     spec: RobotSpec
     """The table, and everything else that a robot file holds, in SI units."""
     notes: tuple[str, ...]
-    """What an import or a conversion chose, changed or left out, a sentence each."""
+    """What an import or a conversion chose, changed or left out, one sentence each."""
 
     def __init__(
         self,
@@ -479,7 +479,7 @@ class Robot:
             ``nearest`` where there are none.
 
         Raises:
-            ConfigurationError: A pose is no rigid transform, ``q0`` has the wrong shape, or a joint is unknown.
+            ConfigurationError: A pose is not a rigid transform, ``q0`` has the wrong shape, or a joint is unknown.
         """
         from dh2sim.inverse.solver import inverse_kinematics
 
@@ -537,7 +537,7 @@ class Robot:
             The :class:`Explanation`: it prints as text, and is false where textbooks have no closed form for the arm.
 
         Raises:
-            ConfigurationError: ``T`` is no pose.
+            ConfigurationError: ``T`` is not a pose.
         """
         from dh2sim.inverse.textbook import explain_inverse_kinematics
 
@@ -681,7 +681,7 @@ class Robot:
             rollouts: Number of rollouts, 256 by default.
             out: Folder to write the run to, by convention named ``….zarr``, or ``s3://BUCKET/NAME``; None to keep it
                 in memory.
-            threads: Number of threads, 0 for one a processor. The result does not depend on it.
+            threads: Number of threads; 0: one for each processor. The result does not depend on it.
             resume: Whether to continue the run at ``out``, if there is one.
             overwrite: Whether to replace the run at ``out``.
             share: ``(i, n)``: simulate the i-th of n shares of the run's blocks, beside other processes.
@@ -837,8 +837,8 @@ class Robot:
             The drawing: ``svg`` and ``tikz`` are texts, ``save("arm.pdf")`` writes a file.
 
         Raises:
-            PictureError: The style is unknown, or the workspace is no box.
-            ConfigurationError: ``q`` is no joint vector or configuration of the robot.
+            PictureError: The style is unknown, or the workspace is not a box.
+            ConfigurationError: ``q`` is neither a joint vector nor a configuration of the robot.
         """
         from dh2sim.draw.diagram.drawing import draw_robot
 

@@ -74,7 +74,7 @@ PEERS: dict[str, tuple[str, Callable[[dict[str, Any]], Solve]]] = {
 def main() -> None:
     """Read the arm, solve, print the answers."""
     out = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # what a library prints is no answer
+    os.dup2(2, 1)  # what a library prints is not an answer
     peer, build = PEERS[sys.argv[1]]
     arm = json.load(sys.stdin)
     poses = [np.array(pose) for pose in arm["poses"]]

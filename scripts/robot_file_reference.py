@@ -136,7 +136,7 @@ the control ranges of its velocity actuators and motors.
 
 ## Errors
 
-Everything that is wrong in a file is reported at once, a line each: `file:line:column: path: what was found and
+Everything that is wrong in a file is reported at once, one line each: `file:line:column: path: what was found and
 what is allowed`. Unknown keys, duplicate names, limits the wrong way round, inertias that no body can have, vectors
 of the wrong length, cycles in `parameters` and the like are errors, never warnings. A file may have at most 1 MB.
 """

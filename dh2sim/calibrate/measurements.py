@@ -35,7 +35,7 @@ OTHER_KINDS: Final = {"point": "position", "points": "position", "poses": "pose"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Measurements:
-    """Measurements, one a row; made by ``measurements`` and ``read_measurements``, which check them."""
+    """Measurements, one in each row; made by ``measurements`` and ``read_measurements``, which check them."""
 
     kind: Kind
     q: Array
@@ -123,7 +123,7 @@ def measurements(
     pairs: Sequence[object] | None = None,
     groups: Sequence[object] | None = None,
 ) -> Measurements:
-    """Return measurements that are given as arrays, one a row.
+    """Return measurements that are given as arrays, one in each row.
 
     Args:
         robot: That was measured.

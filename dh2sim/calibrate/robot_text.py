@@ -26,7 +26,7 @@ def calibrated_text(calibration: Calibration, *, header: Sequence[str] = (), fol
     """Return the text of the calibrated robot's file.
 
     Where only numbers change, and rows become Hayati's, comments, parameters and the order of keys are those of the
-    file that the robot was read from; else it is written anew below the comments that it began with.
+    file that the robot was read from; else a new text is written below the comments that it began with.
 
     Args:
         calibration: Of the robot.
@@ -36,7 +36,7 @@ def calibrated_text(calibration: Calibration, *, header: Sequence[str] = (), fol
     robot, original = calibration.robot, calibration.original
     source = original.source_file
     units = original.units if source is not None else Units(angle=AngleUnit.DEG)
-    anew = robot_file_text(
+    new = robot_file_text(
         robot,
         header=[*header, *_first_comments("" if source is None else source.text)],
         folder=folder,
@@ -44,16 +44,16 @@ def calibrated_text(calibration: Calibration, *, header: Sequence[str] = (), fol
         length=units.length,
     )
     if source is None:
-        return anew
+        return new
     meshes = [robot.base.mesh, robot.tool.mesh, *(row.link.mesh for row in robot.rows)]
     if any(mesh is not None for mesh in meshes):
-        return anew  # whose paths are relative to where the file will stand
+        return new  # whose paths are relative to where the file will stand
     try:
         edited = "".join(f"{line}\n" for line in comment_lines(header)) + _edited(source.text, robot, original)
         same = _plain(parse_robot(edited)) == _plain(robot)
     except (Dh2simError, KeyError, ValueError):
-        return anew
-    return edited if same else anew
+        return new
+    return edited if same else new
 
 
 def _plain(spec: RobotSpec) -> str:

@@ -181,7 +181,7 @@ class Baseline:
         """Read a file that ``text`` made.
 
         Raises:
-            Dh2simError: It cannot be read, or is no baseline.
+            Dh2simError: It cannot be read, or is not a baseline.
         """
         try:
             data = read_input(path, MAX_BYTES)

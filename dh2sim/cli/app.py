@@ -7,7 +7,7 @@ from itertools import takewhile
 from typing import Annotated, Any, Final, NamedTuple
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperArgument, TyperCommand, TyperGroup
 
 from dh2sim.cli.common import MANY, guarded
 from dh2sim.cli.values import PlainValues
@@ -55,7 +55,7 @@ COMMANDS: Final = {
     "convert": Command("importing", "convert", "Write a table in the other convention."),
     "diff": Command("diff", "diff", "Say whether two robots are the same mechanism."),
     "grade": Command("grade", "grade", "Grade students' tables against a solution."),
-    "exercise": Command("exercise", "exercise", "Make a random arm whose table is asked for."),
+    "exercise": Command("exercise", "exercise", "Make a random arm as an exercise."),
     "frames": Command("importing", "frames", "Assign DH frames to joint axes, step by step."),
     "calibrate": Command("calibrate", "calibrate", "Fit a table to measurements of the real robot."),
     "rollout": Command("rollout", "rollout", "Simulate many rollouts into a dataset."),
@@ -84,7 +84,7 @@ Examples:
   dh2sim info stanford               its table, frames, mass and reach
   dh2sim export stanford             write URDF and MJCF to generated/stanford/
   dh2sim validate stanford           check every engine against the table
-  dh2sim check my_arm.yaml           its file, its exports and all poses; or those of a folder
+  dh2sim check robots                all files, exports and poses of a folder
   dh2sim fk stanford 17 -40 0.5 63 34 -23
   dh2sim jacobian stanford home
   dh2sim ik puma560 --at home        all ways to get there
@@ -155,6 +155,18 @@ class LazyGroup(PlainValues, TyperGroup):
 
 class PlainCommand(PlainValues, TyperCommand):
     """A command."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the parameters; the help shows no Python types of arguments, such as ``<list[str]>``."""
+        parameters = super().get_params(ctx)
+        for parameter in parameters:
+            if isinstance(parameter, TyperArgument):
+                parameter.display_type_rich = _no_type  # type: ignore[method-assign]
+        return parameters
+
+
+def _no_type(ctx: Any) -> str:  # noqa: ARG001
+    return ""
 
 
 def _taking_many(options: tuple[str, ...], bare: tuple[str, ...] = ()) -> type[TyperCommand]:

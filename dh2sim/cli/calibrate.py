@@ -34,7 +34,7 @@ def calibrate(
     data: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[DATA]",
+            metavar="DATA",
             help="Measurements, a CSV file: a column for each joint by name, and x, y, z with an orientation, or "
             "distance, or socket; units in the header, as in 'joint_1 [deg]'.",
         ),
@@ -74,8 +74,8 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="SIGMA",
-            help="Of a component of the measurements: '5e-5' (m, and rad), '0.05mm', '0.05mm,0.1mrad'. "
-            "[default: estimated]",
+            help="Standard deviation of a component of the measurements: '5e-5' (m, and rad), '0.05mm', "
+            "'0.05mm,0.1mrad'. [default: estimated]",
         ),
     ] = None,
     from_run: Annotated[
@@ -282,7 +282,7 @@ def _quantity(text: str, option: str, *, angle: bool | None = None) -> tuple[flo
     """Return a number in SI units, and whether it is an angle; None where no unit says.
 
     Raises:
-        BadParameter: It is no positive number with a unit that is known.
+        BadParameter: It is not a positive number with a unit that is known.
     """
     word = text.strip()
     unit = next((unit for unit in sorted(_UNITS, key=len, reverse=True) if word.endswith(unit)), "")

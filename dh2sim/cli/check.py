@@ -16,7 +16,7 @@ from dh2sim.messages import printable
 def check(
     paths: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[PATH]...", help="Robot files, and folders that are searched for them. [default: .]"),
+        typer.Argument(metavar="PATH", help="Robot files, and folders that are searched for them. [default: .]"),
     ] = None,
     exports: Annotated[
         Path | None,

@@ -60,9 +60,9 @@ def diff(
 ) -> int:
     """Compare two robots: are they the same?
 
-    Kinematics are the same up to base, tool, zeros and senses of the joints, and names; what of these differs is
-    told, and limits, masses and gains that both give differently. Otherwise: where the mechanisms first differ, and
-    which single misreading of the table explains it.
+    Mechanisms are the same if they differ at most in base, tool, zeros and senses of the joints, and names. These
+    differences are listed, and limits, masses and gains that both give differently. For others it is printed where
+    the mechanisms first differ, and which single misreading of the table explains it.
 
     Exit status: 0 the same mechanism, with the same limits, masses and gains; 1 different; 2 bad input.
 

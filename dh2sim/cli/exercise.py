@@ -15,25 +15,25 @@ TEXT, DRAWING, SOLUTION = "exercise.md", "arm.svg", "solution.yaml"
 
 
 def exercise(
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the random numbers.")] = 0,
-    level: Annotated[int, typer.Option(metavar="1-4", min=1, max=4, help="How hard it is.")] = 1,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the random number generator.")] = 0,
+    level: Annotated[int, typer.Option(metavar="1-4", min=1, max=4, help="Difficulty.")] = 1,
     out: Annotated[
         Path | None,
         typer.Option(
             "--out",
             "-o",
             metavar="FOLDER",
-            help="Folder for the text, a drawing and the solution; made if it is new.",
+            help="Folder for the text, a drawing and the solution.",
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, with the solution.")] = False,
 ) -> None:
-    """Make a random arm as an exercise: its axes in words and numbers, whose table is asked for.
+    """Make a random arm as an exercise: its axes are described, students find the table.
 
     Level 1: a planar arm. 2: right angles, offsets and a slide. 3: odd angles. 4: six joints with a wrist.
-    With --out the folder gets exercise.md, arm.svg and solution.yaml, with which 'dh2sim grade' grades; without, the
-    text is printed. The same seed and level give the same arm, and the same bytes.
+    --out writes exercise.md, arm.svg and solution.yaml, which 'dh2sim grade' takes; otherwise the text is printed.
+    The same seed and level give the same arm, and the same bytes.
 
     \b
     Examples:

@@ -126,7 +126,7 @@ def _number(node: Node, loc: Loc, report: Report) -> float:
 
 
 def pose_problem(T: Array) -> str:
-    """Return why a matrix of finite numbers, shape (4, 4), is no pose; empty if it is one."""
+    """Return why a matrix of finite numbers, shape (4, 4), is not a pose; empty if it is one."""
     import numpy as np
 
     if np.abs(T[3] - [0.0, 0.0, 0.0, 1.0]).max() > _RIGID:

@@ -335,8 +335,8 @@ def convert(
     """Write a robot's table in the other convention, or with every frame within reach of the arm.
 
     standard, modified: a and alpha move by one row; what is left over at the ends goes to base and tool.
-    compact: rows that lead far out and back, as those of a calibrated robot do (d = 574 m), are cut anew, as
-    Hayati's rows where axes are nearly parallel; the other rows keep their numbers.
+    compact: rows that lead far out and back, as those of a calibrated robot do (d = 574 m), are rewritten, as
+    Hayati rows where axes are nearly parallel; the other rows keep their numbers.
 
     The arm stays the same, which is checked at random configurations. Its DH frames change; masses and meshes are
     moved with them.

@@ -151,8 +151,8 @@ def rollout(
     """Simulate many rollouts in MuJoCo and write them as a dataset.
 
     The same seed gives the same bits, with any number of threads and after any interruption: Ctrl-C finishes the
-    rollouts in progress, and --resume continues. Unstable rollouts are stopped one by one, and marked. At the end it
-    says in how many rollouts links of the robot touched, or a controller wanted more than an actuator can do.
+    rollouts in progress, and --resume continues. Unstable rollouts are stopped one by one, and marked. At the end
+    the number of rollouts is printed in which links of the robot touched, or an actuator was at its limit.
 
     With --share a run is made by many processes, in any order and on any machines that see the same folder: each
     simulates its share of the blocks of rollouts, and one that dies is started again. See docs/scale.md.

@@ -57,9 +57,9 @@ def sweep(
     ] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random number generator.")] = 0,
     jobs: Annotated[
-        int, typer.Option(metavar="N", help="Number of processes, 0 for one a processor; changes no result.")
+        int, typer.Option(metavar="N", help="Number of processes; 0: one for each processor; changes no result.")
     ] = 1,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Measure anew what is there.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Measure everything again.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, alone.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:

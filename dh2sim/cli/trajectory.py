@@ -51,7 +51,8 @@ def trajectory(
         ),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(metavar="S", help="Of the whole, s. [default: as short as limits allow]")
+        float | None,
+        typer.Option(metavar="S", help="Duration of the whole motion, s. [default: as short as limits allow]"),
     ] = None,
     limits: Annotated[
         str | None,

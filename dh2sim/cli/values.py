@@ -60,7 +60,7 @@ def _processing(parameter: Any, convert: Convert) -> Callable[[Any, Any], Any]:
 
 def _conversion(annotation: Any, settings: Any) -> Convert:
     """Return how values of a kind are converted."""
-    if get_origin(annotation) is UnionType:  # with None, which is no value
+    if get_origin(annotation) is UnionType:  # with None, which is not a value
         annotation = get_args(annotation)[0]
     collection = get_origin(annotation)
     if collection in (list, tuple):

@@ -41,7 +41,7 @@ def workspace(
         typer.Option("--dexterity", help="Find in which share of orientations each voxel is reached; takes minutes."),
     ] = False,
     orientations: Annotated[
-        int | None, typer.Option(metavar="N", help="Orientations that --dexterity asks for. [default: 24]")
+        int | None, typer.Option(metavar="N", help="Orientations that --dexterity tries. [default: 24]")
     ] = None,
     size: Annotated[
         float | None,
@@ -50,7 +50,7 @@ def workspace(
     samples: Annotated[int, typer.Option(metavar="N", help="Random configurations.")] = 200_000,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random number generator.")] = 0,
     threads: Annotated[
-        int, typer.Option(metavar="N", help="Number of threads, 0 for one a processor; changes no result.")
+        int, typer.Option(metavar="N", help="Number of threads; 0: one for each processor; changes no result.")
     ] = 0,
     out: Annotated[
         Path | None,

@@ -171,7 +171,7 @@ def _header(spec: RobotSpec, model: RobotModel | None) -> list[str]:
             "Inverse dynamics: links, tool, gravity and armature; no friction, damping or payload. Constants such as "
             "XX2, MX2 are base parameters of what row 2 moves: inertia and first moment about its joint, with all "
             "that may be regrouped from links after it. They contain masses and lengths of the robot file: make this "
-            "file anew after changing one.",
+            "file again after changing one.",
             *(entry.sentence for entry in model.estimates),
         ]
     return _wrapped(lines)

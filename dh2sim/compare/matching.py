@@ -10,7 +10,7 @@ zero of joint i. Then q_B = s q_A + o, and
 Links that sliding joints connect share a rotation. It follows from the directions of the axes at such a group, and
 from the common normal of its first and last axis (Kabsch, Acta Cryst. A32, 1976); up to eight ways, as axes may be
 taken with either sense. With the rotations known all places are linear: how far each axis is shifted along itself,
-and the zeros of slides. Parallel, coincident and concurrent axes leave something free, which is no special case: a
+and the zeros of slides. Parallel, coincident and concurrent axes leave something free, which is not a special case: a
 least-squares solution of least norm.
 """
 

@@ -1,7 +1,7 @@
 """Limits, masses, inertias, gains of two robots, compared where both give them.
 
 Position limits of B are compared as A counts the coordinate; centres of mass and inertias where link i of A is taken
-to that of B. What one of them leaves open is no difference: dh2sim would estimate it.
+to that of B. What one of them leaves open is not a difference: dh2sim would estimate it.
 """
 
 from __future__ import annotations

@@ -350,7 +350,7 @@ def plot_tracking(rollout: RolloutData, size: tuple[float, float] | None = None)
 
 
 def _range(error: Any) -> tuple[float, float]:
-    """An error may be as small as it likes: it is no noise."""
+    """An error may be as small as it likes: it is not noise."""
     greatest = float(np.abs(error).max())
     low, high = value_range(error / greatest) if greatest > 0.0 else (-1e-9, 1e-9)
     return (low * greatest, high * greatest) if greatest > 0.0 else (low, high)

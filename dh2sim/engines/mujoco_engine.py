@@ -163,7 +163,7 @@ def keep_centers_of_mass(model: mujoco.MjModel) -> None:
 
     Otherwise it takes one that is within 1 µm of its body's origin for the origin, a shortcut whose error is larger
     than the tolerances of ours, and has computed the inertia of a body that turns alone in advance with it.
-    ``mj_setConst`` introduces both anew.
+    ``mj_setConst`` introduces both again.
     """
     model.dof_simplenum[:] = 0
     model.body_sameframe[:] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)

@@ -126,7 +126,7 @@ class SerialRobot:
     mechanics: Mechanics | None = field(default=None, repr=False)
     """By the file's own masses, whatever was read of them; None where it has none."""
     notes: tuple[str, ...] = ()
-    """What was chosen, changed or left out, a sentence each, for the user to read."""
+    """What was chosen, changed or left out, one sentence each, for the user to read."""
 
 
 def possible_inertial(whole: MassProperties, name: str, notes: Notes) -> Inertial:

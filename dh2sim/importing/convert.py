@@ -54,7 +54,7 @@ class Converted:
     spec: RobotSpec
     """The robot, read back from the text."""
     notes: tuple[str, ...]
-    """What could not be converted; of a compact table, what was changed and why; a sentence each."""
+    """What could not be converted; of a compact table, what was changed and why; one sentence each."""
     position_error: float
     """Greatest distance of tool0 from where it was, m."""
     rotation_error: float

@@ -27,7 +27,7 @@ class Imported:
     spec: RobotSpec
     """The robot, read back from the text."""
     notes: tuple[str, ...]
-    """What was chosen, changed or left out, a sentence each."""
+    """What was chosen, changed or left out, one sentence each."""
     residual: Residual | None = None
     """Measured on the text; None where there is no other kinematics to compare with."""
     mechanics: MechanicsResidual | None = None

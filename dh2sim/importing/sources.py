@@ -184,7 +184,7 @@ def _shift(offset: Array) -> Array:
 
 
 STDIN = "-"
-_NO_HAYATI = "a table is made in the standard or the modified convention; Hayati's rows come by themselves"
+_NO_HAYATI = "a table is made in the standard or the modified convention; Hayati rows are used where they are needed"
 MAX_BYTES = 50_000_000
 _ROOT = re.compile(rb"<\s*([A-Za-z_][\w:.-]*)")
 _XML_NAMES = (".xml", ".urdf", ".xacro", ".sdf", ".mjcf", ".dae")
@@ -340,7 +340,7 @@ def _refuse_yaml(data: bytes, file: str) -> None:
 
 
 def _root_element(data: bytes, file: str) -> str | None:
-    """Return the name of an XML file's outermost element; None for what is no XML, such as Markdown after HTML."""
+    """Return the name of an XML file's outermost element; None for what is not XML, such as Markdown after HTML."""
     text = data.lstrip(b"\xef\xbb\xbf \t\r\n")
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = data.decode("utf-16", "replace").encode().lstrip(b"\xef\xbb\xbf \t\r\n")
@@ -392,7 +392,7 @@ def _root(file: str, options: ImportOptions) -> Path | None:
     """Return the folder outside of which no file is read, where the options name one.
 
     Raises:
-        Dh2simError: It is no folder, or does not hold the file.
+        Dh2simError: It is not a folder, or does not hold the file.
     """
     if options.root is None:
         return None

@@ -115,7 +115,7 @@ def curves_and_nearest(
 
     Args:
         arm: The arm.
-        paths: Its self-motions; one that stands still is no curve, but its configuration is returned.
+        paths: Its self-motions; one that stands still is not a curve, but its configuration is returned.
         kinds: What each is called.
         lower: Lowest joint coordinates, rad and m, shape (n,) of the arm's own joints; -inf where there is no limit.
         upper: Highest ones.

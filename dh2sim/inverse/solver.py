@@ -133,8 +133,8 @@ class InverseSolver:
             and how far a pose is out of reach is found out.
 
         Raises:
-            ConfigurationError: A pose is no rigid transform, ``q0`` has the wrong shape, a joint to lock is unknown,
-                or more than ``MOST_JOINTS`` joints move and ``numeric`` is not given.
+            ConfigurationError: A pose is not a rigid transform, ``q0`` has the wrong shape, a joint to lock is
+                unknown, or more than ``MOST_JOINTS`` joints move and ``numeric`` is not given.
         """
         goals = read_goals(T)
         poses = goals.reshape(-1, 4, 4)

@@ -66,7 +66,7 @@ def thread_count(threads: int) -> int:
     """Return a number of threads: that of the processors this process may use in place of 0.
 
     Raises:
-        ConfigurationError: It is no whole number, or negative.
+        ConfigurationError: It is not a whole number, or negative.
     """
     if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 0:
         raise ConfigurationError(f"threads must be a whole number, 0 for all processors, got {threads!r}")
@@ -79,7 +79,7 @@ def require_shape(out: Array, shape: tuple[int, ...]) -> Array:
     """Return an array that is to take a result.
 
     Raises:
-        ConfigurationError: It is no array of doubles of this shape, or cannot be written to.
+        ConfigurationError: It is not an array of doubles of this shape, or cannot be written to.
     """
     if not isinstance(out, np.ndarray):
         raise ConfigurationError(f"out must be an array of float64 of shape {shape}, got {type(out).__name__}")

@@ -1,8 +1,8 @@
-"""A table rewritten so that every frame stands within reach of the arm; arm, links and joint coordinates stay.
+"""A table rewritten so that every frame is within reach of the arm; arm, links and joint coordinates stay.
 
 Between the joint parts Z = Rz(theta) Tz(d) of a table the axes are fixed in the links, and a frame can slide along
 its axis and turn about it: what one row then gains in theta and d the next one loses. Nearly parallel axes have
-their common normal far away, and rows that go there lead hundreds of metres out and back. Such a row is cut anew, as
+their common normal far away, and rows that go there lead hundreds of metres out and back. Such a row is rewritten, as
 Hayati's, from where its axis already has a frame to where the next axis crosses the plane there. Rows within reach
 keep every number.
 """
@@ -57,7 +57,7 @@ _NOWHERE: Final[Vector] = (ZERO, ZERO, ZERO)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FarFrame:
-    """A DH frame that stands far from the arm."""
+    """A DH frame that is far from the arm."""
 
     frame: int
     """0 … number of rows."""
@@ -129,7 +129,7 @@ class _Survey:
             self.far.append(self._leads_far(i))
 
     def is_far(self, i: int) -> bool:
-        """Whether frame i stands far out."""
+        """Whether frame i is far out."""
         return self.far[i] or self.beside[i] or (i < self.n and self.beside[i + 1])
 
     def distance(self, i: int) -> float:
@@ -196,7 +196,7 @@ def _tail(row: Row) -> Matrix:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Cut:
-    """A row cut anew."""
+    """A row that was rewritten."""
 
     numbers: dict[str, Any] = field(default_factory=dict)
     """theta, d, a, alpha and beta."""
@@ -208,7 +208,7 @@ class _Cut:
 
 
 def compact_rows(spec: RobotSpec) -> Conversion:
-    """Rewrite a robot's table so that every frame stands within reach of the arm.
+    """Rewrite a robot's table so that every frame is within reach of the arm.
 
     Rows between nearly parallel axes whose common normal is far away become Hayati's. Where axes are exactly parallel
     frames slide along them; the axis of a prismatic joint that runs out of reach is put through the arm. The other
@@ -231,7 +231,7 @@ def compact_rows(spec: RobotSpec) -> Conversion:
     with exact_arithmetic():
         hayati: frozenset[int] = frozenset()
         while True:
-            compact, moved, notes = _cut_anew(distal, hayati)
+            compact, moved, notes = _rewritten(distal, hayati)
             # a row that starts where a frame was left, far from the way, may end too far out: the row before goes too
             more = hayati | _Survey(compact).nearly_parallel_up_to_far()
             if more == hayati:
@@ -260,7 +260,7 @@ def compact_rows(spec: RobotSpec) -> Conversion:
     return Conversion(spec=compact, notes=tuple(notes))
 
 
-def _cut_anew(spec: RobotSpec, hayati: Set[int]) -> tuple[RobotSpec, list[Matrix | None], list[str]]:
+def _rewritten(spec: RobotSpec, hayati: Set[int]) -> tuple[RobotSpec, list[Matrix | None], list[str]]:
     """Return a distal table made compact, where its Z now end in their links' old frames, and what changed.
 
     Args:
@@ -269,12 +269,12 @@ def _cut_anew(spec: RobotSpec, hayati: Set[int]) -> tuple[RobotSpec, list[Matrix
     """
     survey = _Survey(spec)
     rows, n = spec.rows, len(spec.rows)
-    anew = [survey.is_far(i) or i in hayati for i in range(n + 1)]
+    rewritten = [survey.is_far(i) or i in hayati for i in range(n + 1)]
     for i in range(n - 1, 0, -1):  # a row that is to end with its X cannot begin with one
-        anew[i] = anew[i] or (anew[i + 1] and _begins_with_link(rows[i]))
+        rewritten[i] = rewritten[i] or (rewritten[i + 1] and _begins_with_link(rows[i]))
     base, shift = spec.base, None
     notes = _Notes(survey)
-    if anew[0]:
+    if rewritten[0]:
         base, shift = _moved_base(spec.base, survey)
         notes.end(0)
     tool = spec.tool
@@ -283,10 +283,10 @@ def _cut_anew(spec: RobotSpec, hayati: Set[int]) -> tuple[RobotSpec, list[Matrix
     for i, row in enumerate(rows, start=1):
         begins = exact_inverse(exact_joint_part(row.theta, row.d))
         begins = begins if shift is None else exact_product(begins, shift)
-        if anew[i - 1] and row.convention is Convention.MODIFIED:
+        if rewritten[i - 1] and row.convention is Convention.MODIFIED:
             row = replace(row, a=0.0, alpha=0.0)
         has_no_d = row.convention is Convention.HAYATI and row.type is not JointType.PRISMATIC
-        if not anew[i] and not (shift is not None and has_no_d):
+        if not rewritten[i] and not (shift is not None and has_no_d):
             if shift is not None:
                 row = replace(row, **_joint_numbers(exact_inverse(begins)))
                 notes.row(row)
@@ -352,7 +352,7 @@ def _last(begins: Matrix, survey: _Survey, spec: RobotSpec) -> tuple[_Cut, ToolS
 
 
 def _lead(begins: Matrix, survey: _Survey, i: int, *, hayati: bool) -> _Cut:
-    """Cut row i anew: from where it begins, in link i's frame, to the next axis, as near to the arm as it can."""
+    """Rewrite row i: from where it begins, in link i's frame, to the next axis, as near to the arm as it can."""
     origin, z = column(begins, 3), column(begins, 2)
     T = survey.links[i]
     direction = column(T, 2)
@@ -492,7 +492,7 @@ class _Notes:
         self.sentences.append(f"{row.name} begins at the frame that was moved: its theta and d changed.")
 
     def cut(self, i: int, row: Row) -> None:
-        """Note a row that was cut anew."""
+        """Note a row that was rewritten."""
         survey = self._survey
         if i == survey.n:
             if survey.is_far(i):
@@ -514,4 +514,4 @@ class _Notes:
                 f"{row.name} ends beside the arm now: the axis of {sliding}, which may be anywhere, was out of reach."
             )
         else:
-            self.sentences.append(f"{row.name} was cut anew, for a row beside it to end beside the arm.")
+            self.sentences.append(f"{row.name} was rewritten, so that a row next to it ends beside the arm.")

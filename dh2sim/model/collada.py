@@ -191,7 +191,7 @@ class _File:
         url = element.get(attribute, "")
         found = self._ids.get(url.removeprefix("#"))
         if found is None or found.tag != tag:
-            raise ValueError(f"<{element.tag}> refers to {shown(url)}, which is no <{tag}> of the file")
+            raise ValueError(f"<{element.tag}> refers to {shown(url)}, which is not a <{tag}> of the file")
         return found
 
     def triangles(self, geometry: ElementTree.Element) -> Triangles:
@@ -293,7 +293,7 @@ def _indices(element: ElementTree.Element | None) -> _Indices:
     numbers = _numbers(element)
     whole = numbers.astype(np.int64)
     if not np.array_equal(whole, numbers):
-        raise ValueError(f"<{'' if element is None else element.tag}> holds what is no index")
+        raise ValueError(f"<{'' if element is None else element.tag}> holds what is not an index")
     return whole
 
 

@@ -85,11 +85,13 @@ def _stl(data: bytes) -> str | None:
             return f"it ends in line {last} without 'endsolid', so that a part is missing: {_AGAIN}"
         return None
     if len(data) < _STL_HEADER:
-        return f"it has {len(data)} bytes, and is no STL file: a binary one has at least {_STL_HEADER}"
+        return f"it has {len(data)} bytes, and is not an STL file: a binary one has at least {_STL_HEADER}"
     faces = _faces_of(data)
     size = _STL_HEADER + _STL_FACE * faces
     what = (
-        "is only a part of an STL file, or none" if size > len(data) else "is no STL file, or has more behind its end"
+        "is only a part of an STL file, or none"
+        if size > len(data)
+        else "is not an STL file, or has more after its end"
     )
     return (
         f"as an STL file it announces {faces} faces in {size} bytes, but has {len(data)} bytes: it {what}; {_AGAIN}"
@@ -139,7 +141,7 @@ def _obj(data: bytes) -> str | None:
 
 def _ply(data: bytes) -> str | None:
     if re.match(rb"ply\s", data) is None:
-        return "it does not begin with 'ply', and is no PLY file"
+        return "it does not begin with 'ply', and is not a PLY file"
     end = re.search(rb"^end_header[ \t]*\r?\n?", data[:1_000_000], re.MULTILINE)
     if end is None:
         return f"it has no line 'end_header', so that a part is missing: {_AGAIN}"
@@ -154,7 +156,7 @@ def _ply(data: bytes) -> str | None:
         lines = sum(1 for line in data[end.end() :].splitlines() if line.strip())
         if lines < sum(counts):
             return (
-                f"it announces {sum(counts)} elements, a line each, but has {lines} lines behind 'end_header', "
+                f"it announces {sum(counts)} elements, one line each, but has {lines} lines behind 'end_header', "
                 f"so that a part is missing: {_AGAIN}"
             )
     return None
@@ -164,7 +166,7 @@ def _glb(data: bytes) -> str | None:
     if data[:4] != b"glTF":
         if data.lstrip()[:1] == b"{":
             return "it is a glTF file in text, which keeps its corners in other files: export it as GLB"
-        return "it does not begin with 'glTF', and is no GLB file"
+        return "it does not begin with 'glTF', and is not a GLB file"
     if len(data) < _GLB_HEADER:
         return f"it has {len(data)} bytes, so that a part is missing: {_AGAIN}"
     version, size, described = struct.unpack_from("<III", data, 4)
@@ -175,9 +177,9 @@ def _glb(data: bytes) -> str | None:
     try:
         tree = json.loads(data[_GLB_HEADER : _GLB_HEADER + described])
     except (ValueError, RecursionError):
-        return f"its description is no JSON: {_AGAIN}"
+        return f"its description is not JSON: {_AGAIN}"
     if not isinstance(tree, dict):
-        return f"its description is no JSON object: {_AGAIN}"
+        return f"its description is not a JSON object: {_AGAIN}"
     needed = tree.get("extensionsRequired")
     compressed = [name for name in needed if "compression" in str(name)] if isinstance(needed, list) else []
     if compressed:

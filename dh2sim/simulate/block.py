@@ -71,7 +71,7 @@ def simulate_block(
     Args:
         job: The run.
         rollouts: Which of its rollouts.
-        threads: Number of threads, 0 for one a processor that this process may use; the result does not depend on it.
+        threads: Number of threads; 0: one for each processor of this process. The result does not depend on it.
         advance: Called with the number of rollouts that have been simulated since the last call.
 
     Returns:

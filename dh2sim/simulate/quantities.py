@@ -129,7 +129,7 @@ NEEDS: Final[Mapping[str, str]] = MappingProxyType(
 )
 """What has no meaning without another quantity."""
 USUAL: Final[Mapping[str, float]] = MappingProxyType({"push_interval": 0.5, "push_duration": 0.1})
-"""s; what pushes have unless told otherwise."""
+"""s; what pushes have by default."""
 _KEY: Final = re.compile(r"([a-z_]+)\[([^\[\]]+)\]")
 _SHAPES: Final = "X, uniform:LOW:HIGH, loguniform:LOW:HIGH, normal:SIGMA, normal:MEAN:SIGMA or fixed:X"
 

@@ -33,7 +33,7 @@ class Models(Protocol):
         ...
 
     def set_const(self) -> None:
-        """Compute anew what follows from fields."""
+        """Compute again what follows from fields."""
         ...
 
 
@@ -90,7 +90,7 @@ class _Part:
         return self._models.expand(field)[self._part]
 
     def set_const(self) -> None:
-        """Compute anew what follows from fields, of all models."""
+        """Compute again what follows from fields, of all models."""
         self._models.set_const()
 
 

@@ -82,7 +82,7 @@ def rollout(
         robot: The robot, or its file or name.
         out: Folder to write the run to, by convention named ``….zarr``, or ``s3://BUCKET/NAME.zarr``; None to keep
             it in memory.
-        threads: Number of threads, 0 for one a processor that this process may use. The result does not depend on it.
+        threads: Number of threads; 0: one for each processor of this process. The result does not depend on it.
         resume: Whether to continue the run at ``out``, if there is one.
         overwrite: Whether to replace the run at ``out``.
         share: ``(i, n)``: simulate only the i-th of n shares of the run's blocks, i from 1 to n, beside any number of
@@ -274,7 +274,7 @@ def fill(
         writer: Writes to the run.
         job: The run.
         blocks: Those to look at; None: all.
-        threads: Number of threads, 0 for one a processor.
+        threads: Number of threads; 0: one for each processor.
         workers: Simulate and commit the blocks in place of this process; see ``rollout``.
         advance: Called with the number of rollouts that are done; those of an earlier run count at once.
         stopping: Called before every block; the run stops there if it returns True.

@@ -159,10 +159,10 @@ def sweep(
         samples: Configurations of each design that are looked at.
         voxel: Edge of the voxels of the workspace, m; by default an eighth of the reach of the robot file.
         seed: Of the draws.
-        jobs: Number of processes, 0 for one a processor; the result does not depend on it.
+        jobs: Number of processes; 0: one for each processor; the result does not depend on it.
         out: File to write, .parquet or .csv; None to keep the table in memory. What was measured is kept beside it,
             and the same call continues it.
-        overwrite: Whether to measure anew what is there.
+        overwrite: Whether to measure again what is there.
         advance: Called with the number of designs that are done since the last call.
         wrap: Makes what functions of one's own are given of the model of a design.
 

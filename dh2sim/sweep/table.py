@@ -143,7 +143,7 @@ class Journal:
                     self._places[value["chunk"]] = whole, len(value["rows"])
             except (ValueError, KeyError, TypeError) as error:
                 raise RunDamagedError(
-                    f"'{path}' is damaged, or no journal of a sweep; --overwrite begins anew"
+                    f"'{path}' is damaged, or no journal of a sweep; --overwrite starts again"
                 ) from error
             first = False
             whole += len(line)

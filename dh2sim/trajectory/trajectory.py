@@ -53,7 +53,7 @@ class Trajectory:
     profile: Profile
     limits: MotionLimits = field(repr=False)
     notes: tuple[str, ...] = ()
-    """What was chosen, a sentence each."""
+    """What was chosen, one sentence each."""
 
     @cached_property
     def starts(self) -> Array:

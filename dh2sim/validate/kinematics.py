@@ -104,7 +104,7 @@ def check_poses(
         q: Joint vectors, rad and m, shape (N, n).
         tolerance: Allowed angle, rad, and distance as a share of max(1 m, extent).
         extent: Of the frames from base_link, m.
-        threads: Number of chunks that are compared at once, 0 for one a processor; the engine must allow it.
+        threads: Number of chunks that are compared at once; 0: one for each processor; the engine must allow it.
         advance: Called after each chunk with the number of configurations in it.
 
     Returns:

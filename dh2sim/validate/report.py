@@ -127,7 +127,7 @@ class RobotReport:
     slips: tuple[Slip, ...] = ()
     """What looks like a slip in the robot; it fails nothing."""
     warnings: tuple[str, ...] = ()
-    """What MuJoCo finds questionable in the files, a sentence each; it fails nothing."""
+    """What MuJoCo finds questionable in the files, one sentence each; it fails nothing."""
 
     @property
     def ok(self) -> bool:

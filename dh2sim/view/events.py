@@ -65,7 +65,7 @@ class Follow:
     T_world_base_link: Matrix | None = None
     """Pose of base_link in a recording; None if it does not move."""
     jumps: bool = False
-    """Whether it is no motion from where the joints were: a recording starts, starts again or is searched."""
+    """Whether it is not a motion from where the joints were: a recording starts, starts again or is searched."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

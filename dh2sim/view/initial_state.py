@@ -152,7 +152,7 @@ def _read(text: str | bytes, source: Source) -> tuple[str, RobotModel] | Invalid
 
 
 def _problems(invalid: Invalid) -> str:
-    """Return all problems of a file, or the first of many, a line each."""
+    """Return all problems of a file, or the first of many, one line each."""
     lines = invalid.text.split("\n")
     more = len(lines) - MAX_PROBLEMS
     return "\n".join(lines if more <= 0 else [*lines[:MAX_PROBLEMS], f"… and {more} more."])

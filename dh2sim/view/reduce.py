@@ -31,7 +31,7 @@ MAX_UNDO_LENGTH: Final = 4_000_000
 def with_undo(before: ViewState, event: Event, after: ViewState) -> ViewState:
     """Return the state ``after`` an event, in which the edit can be undone.
 
-    All typing into one cell is one edit. Opening a file is no edit.
+    All typing into one cell is one edit. Opening a file is not an edit.
     """
     if isinstance(event, Undo | OpenText) or after.text == before.text:
         return after

@@ -270,7 +270,7 @@ class Viewer(PageServer[Page]):
 
 
 def give_back_memory() -> None:
-    """Give memory that is free back to the system, where the C library needs to be told (glibc)."""
+    """Give memory that is free back to the system, where the C library does so on request only (glibc)."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
     if trim is not None:
         trim(0)

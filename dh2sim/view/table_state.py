@@ -52,7 +52,7 @@ class Invalid:
 
     @property
     def text(self) -> str:
-        """All messages, a line each."""
+        """All messages, one line each."""
         return "\n".join(self.lines) or self.first
 
     @property

@@ -95,7 +95,7 @@ class Workspace:
     dexterity: Dexterity | None
     """Shares for the voxels, in their order."""
     notes: tuple[str, ...]
-    """What was assumed, a sentence each."""
+    """What was assumed, one sentence each."""
 
     @property
     def volume(self) -> float | None:
@@ -139,7 +139,7 @@ def compute_workspace(
             most 100 000 voxels, and 100 along each side: 0.04 for an arm that reaches 0.9 m.
         samples: Number of random configurations.
         seed: Of them.
-        threads: Number of threads, 0 for one a processor.
+        threads: Number of threads; 0: one for each processor.
         section: Whether to find the section and its boundary: in r and z of an arm whose first joint turns, in its
             plane of a planar arm.
         dexterity: Whether to find the share of orientations in which each voxel's centre is reached.

@@ -47,7 +47,7 @@ def spoiled(folder: Path, *changes: tuple[str, str]) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in ENGINES if name != "pybullet"])
-@pytest.mark.parametrize("content", ["this is no XML", "", "<robot", "<mujoco><nonsense/></mujoco>", None])
+@pytest.mark.parametrize("content", ["this is not XML", "", "<robot", "<mujoco><nonsense/></mujoco>", None])
 def test_a_file_that_an_engine_cannot_read_is_refused_in_its_words(
     name: str, content: str | None, tmp_path: Path
 ) -> None:

@@ -306,7 +306,7 @@ def test_what_is_no_options_and_a_convention_that_is_not_made_are_refused() -> N
         refusal(Dh2simError, import_robot, "arm.urdf", "modified") == "options must be ImportOptions, got 'modified'"
     )
     assert _refused(ARM, ImportOptions(convention="hayati")) == (
-        "a table is made in the standard or the modified convention; Hayati's rows come by themselves"
+        "a table is made in the standard or the modified convention; Hayati rows are used where they are needed"
     )
 
 

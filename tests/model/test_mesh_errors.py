@@ -85,7 +85,7 @@ def test_a_mesh_file_that_is_malformed_is_refused_in_plain_words(
     ("suffix", "data", "reason"),
     [
         (".stl", b"", "it is empty"),
-        (".stl", b"hello world", "it has 11 bytes, and is no STL file: a binary one has at least 84"),
+        (".stl", b"hello world", "it has 11 bytes, and is not an STL file: a binary one has at least 84"),
         (
             ".stl",
             BOX[:300],
@@ -116,7 +116,7 @@ def test_a_mesh_file_that_is_malformed_is_refused_in_plain_words(
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n",
             "line 4: a face refers to corner 0; corners count from 1",
         ),
-        (".ply", b"hello", "it does not begin with 'ply', and is no PLY file"),
+        (".ply", b"hello", "it does not begin with 'ply', and is not a PLY file"),
         (
             ".ply",
             b"ply\nformat ascii 1.0\nelement vertex 8\n",
@@ -130,7 +130,7 @@ def test_a_mesh_file_that_is_malformed_is_refused_in_plain_words(
         (
             ".ply",
             b"ply\nformat ascii 1.0\nelement vertex 2\nend_header\n0 0 0\n",
-            "it announces 2 elements, a line each, but has 1 lines behind 'end_header', so that a part is missing: "
+            "it announces 2 elements, one line each, but has 1 lines behind 'end_header', so that a part is missing: "
             "copy or export it again",
         ),
         (".glb", b"glTF1234", "it has 8 bytes, so that a part is missing: copy or export it again"),

@@ -80,7 +80,7 @@ def validated(robot: Path, folder: Path | None = None, *options: str, samples: i
 
 
 def _refuse(constant: str) -> None:
-    raise AssertionError(f"{constant} is no JSON")
+    raise AssertionError(f"{constant} is not JSON")
 
 
 def failures(report: dict[str, Any]) -> Failures:

@@ -120,8 +120,8 @@ def draw_robot(
         The drawing: ``svg`` and ``tikz`` are texts, ``save`` writes a file, a notebook shows it.
 
     Raises:
-        PictureError: The style is unknown, or the workspace is no box.
-        ConfigurationError: ``q`` is no joint vector or configuration of the robot.
+        PictureError: The style is unknown, or the workspace is not a box.
+        ConfigurationError: ``q`` is neither a joint vector nor a configuration of the robot.
         AssemblyError: The loops of a mechanism cannot be closed.
         SingularPositionError: A mechanism cannot be moved to ``q`` from its assembly.
     """

@@ -327,7 +327,7 @@ def _records(text: str, places: TextPlaces) -> Iterator[Table]:
 
 
 def _record(text: str, start: int, end: int, places: TextPlaces) -> dict[str, Cell] | None:
-    """Return the cells of a record by their headings; None where it is no row of DH parameters."""
+    """Return the cells of a record by their headings; None where it is not a row of DH parameters."""
     record: dict[str, Cell] = {}
     for a, b in _items(text, start, end, spaced=False):
         pair = _PAIR.fullmatch(text[a:b])

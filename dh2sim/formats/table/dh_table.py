@@ -42,7 +42,7 @@ class Table:
     rows: tuple[Cells, ...] = field(repr=False)
     grid: Grid = field(repr=False)
     notes: tuple[str, ...] = ()
-    """What was done to its rows, a sentence each."""
+    """What was done to its rows, one sentence each."""
     problems: tuple[tuple[int, int, str], ...] = ()
     """Line, column and what is wrong with what it was made of."""
     extent: range | None = None

@@ -211,7 +211,7 @@ def variable_in(text: str) -> Quantity | None:
 
     Returns:
         Theta or d where it is one of them, such as ``θ1`` or ``d``; ``VARIABLE`` for a coordinate such as ``q3``,
-        which may be either; None where it is no variable's name.
+        which may be either; None where it is not the name of a variable.
     """
     name = plain(text).casefold().strip(" *()")
     return next((quantity for quantity, pattern in _VARIABLES if pattern.fullmatch(name)), None)
@@ -276,8 +276,8 @@ def _names_d(cells: Sequence[str]) -> bool:
 def _says_variables(cells: Sequence[str]) -> bool:
     """Whether a column says which parameter is variable, or that a row has no variable."""
     found = [variable_in(text) for text in cells if not is_no_variable(text)]
-    told = len(found) < len(cells) or any(quantity is not Quantity.VARIABLE for quantity in found)
-    return bool(found) and None not in found and told
+    says = len(found) < len(cells) or any(quantity is not Quantity.VARIABLE for quantity in found)
+    return bool(found) and None not in found and says
 
 
 _OTHER: Final = re.compile(

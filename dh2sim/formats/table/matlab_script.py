@@ -107,7 +107,7 @@ class _MatlabScript:
         try:
             self._statement(tokens)
         except ScriptError as error:
-            if self._concerns_robots(tokens) and not error.told:
+            if self._concerns_robots(tokens) and not error.reported:
                 first = next((t for t in tokens if t.text in LINKS or t.text in ROBOTS), tokens[0])
                 self.problems.append(ScriptError(str(error), error.line or first.line, error.column or first.column))
         except RecursionError:
@@ -126,7 +126,7 @@ class _MatlabScript:
                 what = "a condition" if first.text in ("if", "switch") else "a loop"
                 message = f"links that are made or changed in {what} are not read: write them one after the other"
                 self.problems.append(ScriptError(message, place.line, place.column))
-            self._forget(tokens, first, told=bool(self.problems))
+            self._forget(tokens, first, reported=bool(self.problems))
             index += 1
             if depth <= 0:
                 break
@@ -160,7 +160,7 @@ class _MatlabScript:
             return changes and bool(names_in_tokens(tokens) & {"base", "tool", "links", "offset", "qlim"})
         return changes and (isinstance(held, ToolboxLink) or (isinstance(held, list) and _is_links(held)))
 
-    def _forget(self, tokens: Sequence[Token], first: Token, *, told: bool) -> None:
+    def _forget(self, tokens: Sequence[Token], first: Token, *, reported: bool) -> None:
         """Make unknown what a statement that is passed over may assign."""
         what = "condition" if first.text in ("if", "switch") else "loop"
         if not any(token.text == "=" for token in tokens):
@@ -169,7 +169,8 @@ class _MatlabScript:
             kept = isinstance(self.values.get(token.text), ToolboxLink | ToolboxRobot | list)
             if token.kind == "name" and (following.text == "=" or token is tokens[0]) and not kept:
                 self.values[token.text] = Unknown(
-                    f"{shown(token.text)} is set in the {what} on line {first.line}, which is not followed", told=told
+                    f"{shown(token.text)} is set in the {what} on line {first.line}, which is not followed",
+                    reported=reported,
                 )
 
     def _statement(self, tokens: Sequence[Token]) -> None:
@@ -187,7 +188,7 @@ class _MatlabScript:
         except ScriptError as error:
             if self._concerns_robots(tokens):
                 with contextlib.suppress(ScriptError):
-                    self._assign(target, Unknown(str(error), told=True))
+                    self._assign(target, Unknown(str(error), reported=True))
                 raise
             value = Unknown(f"{shown(target[0].text)} on line {target[0].line} cannot be read: {error}")
         if isinstance(value, ToolboxLink):
@@ -322,7 +323,7 @@ def _link(token: Token, arguments: Sequence[object]) -> ToolboxLink:
                     set_property(link, key, rest.pop(0))
     except ScriptError as error:
         raise ScriptError(
-            str(error), error.line or token.line, error.column or token.column, told=error.told
+            str(error), error.line or token.line, error.column or token.column, reported=error.reported
         ) from None
     return link
 
@@ -372,7 +373,7 @@ def _set_on_robot(robot: ToolboxRobot, key: str, value: object) -> None:
             try:
                 T = transform(value)
             except ScriptError as error:
-                raise ScriptError(f"{key}: {error}", told=error.told) from None
+                raise ScriptError(f"{key}: {error}", reported=error.reported) from None
             if key == "base":
                 robot.base = None if T == IDENTITY else T
             else:

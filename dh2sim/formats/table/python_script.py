@@ -120,7 +120,7 @@ class _PythonScript:
             try:
                 self._statement(statement)
             except ScriptError as error:
-                if self._concerns_robots(statement) and not error.told:
+                if self._concerns_robots(statement) and not error.reported:
                     line, column = _place(statement)
                     self.problems.append(ScriptError(str(error), error.line or line, error.column or column))
 
@@ -132,7 +132,7 @@ class _PythonScript:
                 except ScriptError as error:
                     with contextlib.suppress(ScriptError):
                         for target in targets:
-                            self._assign(target, Unknown(str(error), told=True))
+                            self._assign(target, Unknown(str(error), reported=True))
                     raise
                 for target in targets:
                     self._assign(target, result)
@@ -206,8 +206,8 @@ class _PythonScript:
 
     def _pass_over(self, node: ast.stmt, what: str) -> None:
         """Pass over statements whose values are not known then."""
-        told = self._concerns_robots(node)
-        if told:
+        reported = self._concerns_robots(node)
+        if reported:
             place = next((n for n in ast.walk(node) if n is not node and self._makes_links(n)), node)
             line, column = _place(place)
             message = f"links that are made or changed in {what} are not read: write them one after the other"
@@ -215,7 +215,8 @@ class _PythonScript:
         for inner in ast.walk(node):
             if isinstance(inner, ast.Name) and isinstance(inner.ctx, ast.Store):
                 self.scopes[-1][inner.id] = Unknown(
-                    f"{shown(inner.id)} is set in {what} on line {node.lineno}, which is not followed", told=told
+                    f"{shown(inner.id)} is set in {what} on line {node.lineno}, which is not followed",
+                    reported=reported,
                 )
 
     def _concerns_robots(self, node: ast.AST) -> bool:
@@ -417,7 +418,7 @@ class _PythonScript:
             try:
                 set_property(link, key, value)
             except ScriptError as error:
-                raise ScriptError(str(error), line, column, told=error.told) from None
+                raise ScriptError(str(error), line, column, reported=error.reported) from None
         if len(self._links) == MAX_ITEMS:
             raise ScriptError(f"more than {MAX_ITEMS} links", line, column)
         self._links.append(link)
@@ -433,7 +434,7 @@ class _PythonScript:
                 if given.get(key) is not None:
                     _set_on_robot(robot, key, given[key])
         except ScriptError as error:
-            raise ScriptError(str(error), line, column, told=error.told) from None
+            raise ScriptError(str(error), line, column, reported=error.reported) from None
         if own:
             self._own = robot
         self.robots.append(robot)
@@ -487,5 +488,5 @@ def _set_on_robot(robot: ToolboxRobot, key: str, value: object) -> None:
         try:
             T = transform(value)
         except ScriptError as error:
-            raise ScriptError(f"{key}: {error}", told=error.told) from None
+            raise ScriptError(f"{key}: {error}", reported=error.reported) from None
         setattr(robot, key, None if T == IDENTITY else T)

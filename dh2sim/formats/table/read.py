@@ -109,7 +109,7 @@ class TableImport:
     units: Units
     """Of the numbers that carry no unit of their own."""
     notes: tuple[str, ...]
-    """What was chosen, assumed or left out, a sentence each, for the user to read."""
+    """What was chosen, assumed or left out, one sentence each, for the user to read."""
 
 
 def read_table(

@@ -214,7 +214,7 @@ def read_types(rows: Sequence[TableRow], cells: Sequence[Cells], columns: Column
             row.type, row.no_type = kind, is_no_variable(cell.text)
         elif kind is not None and kind.turns is not row.type.turns:
             findings.wrong(
-                cell, f"row {row.number}, variable", f"{shown(cell.text)} is no variable of a {row.type} joint"
+                cell, f"row {row.number}, variable", f"{shown(cell.text)} is not a variable of a {row.type} joint"
             )
 
 

@@ -30,19 +30,19 @@ Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 class ScriptError(ValueError):
     """Something in a script cannot be read; the message is for the user."""
 
-    def __init__(self, message: str, line: int = 0, column: int = 0, *, told: bool = False) -> None:
+    def __init__(self, message: str, line: int = 0, column: int = 0, *, reported: bool = False) -> None:
         """Keep the message and its place; line 0 where the place is not known yet.
 
         Args:
             message: What is wrong.
             line: From 1.
             column: From 1.
-            told: It follows from a problem that is reported already.
+            reported: It follows from a problem that is reported already.
         """
         super().__init__(message)
         self.line = line
         self.column = column
-        self.told = told
+        self.reported = reported
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Unknown:
     """A value that cannot be computed, which matters only where a robot needs it."""
 
     why: str
-    told: bool = False
+    reported: bool = False
     """That is reported already."""
 
 
@@ -148,7 +148,7 @@ def number(value: object) -> float:
         if isinstance(value, list) and len(value) == 1:
             value = value[0]
     if isinstance(value, Unknown):
-        raise ScriptError(value.why, told=value.told)
+        raise ScriptError(value.why, reported=value.reported)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ScriptError(f"a number is wanted, found {described(value)}")
     return float(value)
@@ -161,7 +161,7 @@ def numbers_of(value: object) -> list[float]:
         ScriptError: It is none.
     """
     if isinstance(value, Unknown):
-        raise ScriptError(value.why, told=value.told)
+        raise ScriptError(value.why, reported=value.reported)
     if not isinstance(value, list):
         raise ScriptError(f"a list of numbers is wanted, found {described(value)}")
     if len(value) == 1 and isinstance(value[0], list):
@@ -229,7 +229,7 @@ def transform(value: object) -> Matrix:
         ScriptError: It is none.
     """
     if isinstance(value, Unknown):
-        raise ScriptError(value.why, told=value.told)
+        raise ScriptError(value.why, reported=value.reported)
     if isinstance(value, list) and len(value) == 4 and all(isinstance(row, list) and len(row) == 4 for row in value):
         rows = tuple(tuple(number(item) for item in row) for row in value)
         _check_rotation(rows)
@@ -246,16 +246,16 @@ def _check_rotation(T: Matrix) -> None:
         for k in range(3):
             dot = sum(T[i][j] * T[k][j] for j in range(3))
             if abs(dot - float(i == k)) > 1e-3:
-                raise ScriptError("the matrix is no pose: its first three rows and columns are no rotation")
+                raise ScriptError("the matrix is not a pose: its first three rows and columns are not a rotation")
     if any(abs(T[3][k] - float(k == 3)) > 1e-9 for k in range(4)):
-        raise ScriptError("the matrix is no pose: its last row is not 0 0 0 1")
+        raise ScriptError("the matrix is not a pose: its last row is not 0 0 0 1")
 
 
 _ANGLES: Final = ("trotx", "troty", "trotz", "Rx", "Ry", "Rz")
 
 
 def pose_function(name: str, arguments: Sequence[object], keywords: Mapping[str, object]) -> object:
-    """Return what a toolbox's function of poses gives; None where ``name`` is no such function.
+    """Return what a toolbox's function of poses gives; None where ``name`` is not such a function.
 
     Raises:
         ScriptError: The arguments are wrong.
@@ -356,7 +356,7 @@ def links_in(value: object, *, depth: int = 0) -> list[ToolboxLink]:
                 raise ScriptError(f"more than {MAX_ITEMS} links")
             return links
         case Unknown():
-            raise ScriptError(f"the links cannot be read: {value.why}", told=value.told)
+            raise ScriptError(f"the links cannot be read: {value.why}", reported=value.reported)
         case _:
             raise ScriptError(f"links are wanted, found {described(value)}")
 

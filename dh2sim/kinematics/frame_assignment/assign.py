@@ -166,7 +166,7 @@ def _height(chain: SerialChain, index: int, T: Array, path: ArmPath) -> float | 
 
     At the base, so that the column's height is in the first row; and before a sliding joint, so that its coordinate
     is all there is of d. Everywhere else d is zero where it can be, and the last of parallel axes takes it all. A
-    file may put a joint far along its axis; that is no place for a frame.
+    file may put a joint far along its axis; that is not a place for a frame.
     """
     joint, following = chain.joints[index], chain.joints[index + 1]
     if not joint.type.turns or (index > 0 and following.type.turns):

@@ -142,4 +142,4 @@ class Prepared:
     follows: bool = False
     """Whether the controller has a ``reference``."""
     first: Mapping[str, float] | None = None
-    """Where a reference from a file begins, rad and m, by joint: rollouts start there, unless told otherwise."""
+    """Where a reference from a file begins, rad and m, by joint: rollouts start there, by default."""

@@ -89,7 +89,7 @@ class LocalStore:
                 yield piece
 
     def list(self, folder: str) -> dict[str, int]:
-        """Return the names in a folder, which is no link, with their sizes; -1 for what is not a plain file."""
+        """Return the names in a folder, which is not a link, with their sizes; -1 for what is not a plain file."""
         if folder and (self.path / folder).is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), self.file(folder))
         sizes = {}

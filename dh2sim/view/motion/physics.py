@@ -256,8 +256,8 @@ class Physics:
             time_budget_s: Longest computing time, s; some time steps are always made.
 
         Returns:
-            Simulated time, s: less than ``duration`` if that is no whole number of time steps, time ran out, or the
-            simulation stopped.
+            Simulated time, s: less than ``duration`` if that is not a whole number of time steps, time ran out,
+            or the simulation stopped.
         """
         deadline = time.perf_counter() + time_budget_s
         steps = int(duration / self.timestep + 1e-6)  # 0.006 / 0.002 is a little less than 3

@@ -135,7 +135,7 @@ def open_replay(path: Path, model: RobotModel | MechanismModel | None) -> Replay
     Raises:
         RunError: There is no run, it is damaged, none of its rollouts has been run, or it is of a robot with other
             joints.
-        TrajectoryError: The file is no trajectory, or one of a robot with other joints.
+        TrajectoryError: The file is not a trajectory, or one of a robot with other joints.
     """
     if is_trajectory_file(path):
         read = read_trajectory(path)

@@ -111,8 +111,8 @@ def ghost_configuration(ghost: RobotModel, robot: RobotModel, q: ArrayLike) -> G
 def misread(spec: RobotSpec) -> RobotSpec:
     """Return the robot that the same numbers describe in the other convention: the classic mistake.
 
-    Standard rows become modified ones and the other way round, every number unchanged; this is no conversion. Hayati
-    rows have no other reading and stay.
+    Standard rows become modified ones and the other way round, every number unchanged; this is not a
+    conversion. Hayati rows have no other reading and stay.
     """
     rows = tuple(replace(row, convention=_OTHER.get(row.convention, row.convention)) for row in spec.rows)
     convention = _OTHER.get(spec.convention, spec.convention)

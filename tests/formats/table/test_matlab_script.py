@@ -192,7 +192,7 @@ def test_two_robots_of_a_script_are_two_tables() -> None:
         ("L(1) = Link([0 1 0 0]);\nr = SerialLink(L, 'tool', tool0());",
          ["arm.m:2:5: tool: the function 'tool0' on line 2 is not known"]),
         ("L(1) = Link([0 1 0 0]);\nr = SerialLink(L);\nr.tool = [1 0 0 0; 0 1 0 0; 0 0 2 0; 0 0 0 1];",
-         ["arm.m:3:1: tool: the matrix is no pose: its first three rows and columns are no rotation"]),
+         ["arm.m:3:1: tool: the matrix is not a pose: its first three rows and columns are not a rotation"]),
         ("L(1) = Link([0 1 0 0]);\nr = SerialLink(L);\nr.base = rpy2tr(0, 0, 1);",
          ["arm.m:3:1: roll, pitch and yaw are in an order that differs between toolboxes: write 'zyx' or "
           "'xyz' there"]),

@@ -280,7 +280,7 @@ def test_a_column_that_names_the_variable_may_stand_for_theta_too() -> None:
 def test_a_variable_that_is_not_of_the_rows_type_is_refused() -> None:
     text = "type,theta,d,a,alpha,variable\nR,0,0.1,0,0,d1\nP,0,0.1,0,0,d2\n"
     assert complaints(text, "t.csv", **STANDARD) == [
-        "t.csv:2:13: row 1, variable: 'd1' is no variable of a revolute joint"
+        "t.csv:2:13: row 1, variable: 'd1' is not a variable of a revolute joint"
     ]
 
 
