@@ -41,7 +41,7 @@ def render(robot: str, width: int, height: int) -> np.ndarray:
 
 
 def render_mechanism(name: str, width: int, height: int) -> np.ndarray:
-    """Return a mechanism in its assembly; ``generated/`` has none of them."""
+    """Return a mechanism in its assembly."""
     robot = Robot.load(name)
     motion = motion_of_robot(robot.mechanism if robot.spec.is_mechanism else robot.model)
     with open_motion(motion, PictureOptions(width=width, height=height)) as renderer:

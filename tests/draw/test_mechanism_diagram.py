@@ -19,9 +19,20 @@ from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.loop_motion import mechanism_configuration
 from dh2sim.kinematics.table_oracle import table_mechanism_frames
 from dh2sim.robot.catalog import builtin_mechanisms
+from dh2sim.robot.read import parse_robot
 from tests.program import dh2sim
 
 PLANAR = {"four_bar", "parallel_four_bar", "stretched_four_bar", "slider_crank", "five_bar"}
+LENGTHS = {
+    "four_bar": ["crank", "coupler", "rocker"],
+    "parallel_four_bar": 3 * ["crank"] + ["span"],
+    "stretched_four_bar": ["crank", "coupler", "rocker"],
+    "slider_crank": ["crank", "rod"],
+    "five_bar": 2 * ["crank", "rod"],
+    "bennett": 2 * ["long", "short"],
+    "sarrus": 4 * ["leg"] + ["side"],
+}
+"""Parameters that are lengths in the tables."""
 COSTLY = [name if name == "four_bar" else pytest.param(name, marks=pytest.mark.slow) for name in builtin_mechanisms()]
 
 
@@ -51,6 +62,7 @@ def test_every_joint_and_closure_is_named_once_and_labels_are_apart(name: str) -
     rows = spec.moving_rows
     expected = [f"{'θ' if row.type.turns else 'd'}_{k}" for k, row in enumerate(rows, start=1)]
     expected += [closure.name for closure in spec.closures]
+    expected += LENGTHS.get(name, ())
     assert sorted(text.text for text in texts) == sorted([*expected, "tool0"])
     boxes = [(text.centre, 0.5 * np.array(text_box(text.text, text.size))) for text in texts]
     for (a, half), (b, other) in itertools.combinations(boxes, 2):
@@ -84,6 +96,17 @@ def test_joints_are_where_the_table_has_them_and_the_driven_ones_are_known() -> 
 def test_frames_of_all_branches_are_named_where_they_are() -> None:
     texts = {text.text for text in draw_robot(Robot.load("four_bar"), style="frames").sheet.texts}
     assert texts == {"dh_0", "dh_1", "dh_2, rocker/dh_1", "rocker/dh_0"}
+
+
+def test_lengths_without_a_name_are_those_of_the_joint_vector() -> None:
+    text = Path("robots/mechanisms/four_bar.yaml").read_text(encoding="utf-8")
+    text = text.replace("a: crank", "a: 600").replace("a: coupler", "a: -coupler").replace("length: m", "length: mm")
+    text = text.replace("{ground: 2, crank: 0.6, coupler: 1.8, rocker: 1.4}", "{ground: 2000, coupler: -1800}")
+    spec = parse_robot(text.replace("a: rocker", "a: 0.7 * ground"))
+    texts = {text.text for text in draw_robot(spec).sheet.texts}
+    assert texts == {"θ_1", "θ_2", "θ_3", "C", "tool0", "a_1", "coupler", "a_3"}
+    longer = dataclasses.replace(spec, parameters={"ground": 2000.0, "coupler": -1700.0})
+    assert "a_2" in {text.text for text in draw_robot(longer).sheet.texts}, "the file says it no longer"
 
 
 def test_an_open_loop_is_drawn_open_and_the_command_says_so(tmp_path: Path) -> None:

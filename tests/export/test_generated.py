@@ -8,6 +8,9 @@ import pytest
 
 from dh2sim import build_model
 from dh2sim.export import drift
+from dh2sim.model.mechanism import build_mechanism
+from dh2sim.robot.catalog import builtin_mechanisms
+from dh2sim.robot.read import load_robot
 from tests.sample_robots import NAMES, robot
 
 GENERATED = Path(__file__).parents[2] / "generated"
@@ -17,10 +20,12 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, *builtin_mechanisms()])
 def test_the_committed_export_is_what_the_robot_file_says(name: str) -> None:
-    assert drift(build_model(robot(name)), GENERATED) == []
+    spec = robot(name) if name in NAMES else load_robot(name)
+    assert drift(build_mechanism(spec) if spec.is_mechanism else build_model(spec), GENERATED) == []
 
 
 def test_every_committed_folder_belongs_to_a_robot() -> None:
-    assert {path.name for path in GENERATED.iterdir() if path.is_dir()} == {robot(name).name for name in NAMES}
+    names = {robot(name).name for name in NAMES} | set(builtin_mechanisms())
+    assert {path.name for path in GENERATED.iterdir() if path.is_dir()} == names

@@ -11,7 +11,7 @@ from dh2sim.draw.diagram.linkage import plane_view
 from dh2sim.draw.diagram.sheet import Sheet, subscripted, text_box
 from dh2sim.draw.diagram.symbols import ball, box, cylinder, gripper, ground, hull, towards_viewer
 from dh2sim.draw.frame_figure.paper import A_COLOR, D_COLOR, X_COLOR, Y_COLOR, Z_COLOR
-from dh2sim.draw.frame_figure.scene import SAME
+from dh2sim.draw.frame_figure.scene import SAME, Segment
 from dh2sim.draw.frame_figure.view import best_view
 from dh2sim.draw.labels import Label, place_labels
 from dh2sim.draw.plot_style import GREY, INK
@@ -32,6 +32,8 @@ _LETTERS, _SMALL_LETTERS = 12.0, 9.0
 _SHORT_NAME = 2
 """Most characters of a name in letters of the usual size."""
 _PLATE, DRIVEN, OPEN = "#e9ecf0", "#f6d98b", "#c62828"
+_FEW = 8
+"""Most joints of a mechanism whose lengths are named; more names would hide it."""
 _SHIFTS = (0, -1, 1, -2, 2, -3, 3, -4, 4)
 """Places that are tried for a symbol, in ``_APART``."""
 
@@ -64,6 +66,8 @@ class _Diagram:
         self._draw_arm(places)
         if not self._arm.spec.is_mechanism:
             self._draw_lengths()
+        elif self._symbols and len(self._arm.spec.moving_rows) <= _FEW:
+            self._name_lengths()
         for joint in sorted(self._arm.joints, key=lambda joint: self._depth(joint, places)):
             if joint.index in places:
                 self._draw_joint(joint, places[joint.index])
@@ -181,17 +185,21 @@ class _Diagram:
 
     def _draw_lengths(self) -> None:
         for segment in self._arm.segments:
-            start, end = self._at(segment.start), self._at(segment.end)
             color = A_COLOR if segment.letter == "a" else D_COLOR
-            self._sheet.line([start, end], color, 1.6)
-            way = end - start
-            self._label(
-                f"{segment.letter}_{segment.index}",
-                color,
-                0.5 * (start + end),
-                np.array([-way[1], way[0]]) if np.linalg.norm(way) > 1e-6 else np.array([1.0, 0.0]),
-                either=True,
-            )
+            self._sheet.line([self._at(segment.start), self._at(segment.end)], color, 1.6)
+            self._name_length(segment, f"{segment.letter}_{segment.index}", color)
+
+    def _name_lengths(self) -> None:
+        """Name the lengths of a mechanism as its file does; a bar along a line is seen already."""
+        for segment in self._arm.segments:
+            color = A_COLOR if segment.letter == "a" else D_COLOR
+            self._name_length(segment, segment.name or f"{segment.letter}_{segment.index}", color)
+
+    def _name_length(self, segment: Segment, text: str, color: str) -> None:
+        start, end = self._at(segment.start), self._at(segment.end)
+        way = end - start
+        aside = np.array([-way[1], way[0]]) if np.linalg.norm(way) > 1e-6 else np.array([1.0, 0.0])
+        self._label(text, color, 0.5 * (start + end), aside, either=True)
 
     def _draw_frames(self) -> None:
         for pointer in self._arm.pointers:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.draw.diagram.arm import Arm, ClosurePlace, JointPlace, Path, lengths_of, place_joints
-from dh2sim.draw.frame_figure.scene import SAME, distinct
+from dh2sim.draw.frame_figure.scene import SAME, Segment, distinct
 from dh2sim.draw.projection import ParallelView
 from dh2sim.kinematics.loop_motion import actuated_joints, mechanism_configuration, named_configuration
 from dh2sim.kinematics.tree import BASE, KinematicTree, build_tree, tree_frames
-from dh2sim.robot.spec import ClosureType, JointType, RobotSpec
+from dh2sim.robot.spec import ClosureType, JointType, RobotSpec, Row
+from dh2sim.robot.yaml_tree import Node, Report, compose
 from dh2sim.typing import Array, read_only
 
 _UNTURNED = 1e-6
@@ -60,8 +63,8 @@ def place_mechanism(spec: RobotSpec, q: ArrayLike | str) -> Arm:
     )
     segments = [
         segment
-        for rows, path in zip(chains.values(), paths, strict=True)
-        for segment in lengths_of(rows, path.joints, SAME * reach)
+        for (prefix, rows), path in zip(chains.items(), paths, strict=True)
+        for segment in _lengths(spec, prefix[:-1], rows, path.joints, SAME * reach)
     ]
     grounds = [poses[f"{prefix}dh_0"][:3, 3] for prefix in chains if tree.frame(f"{prefix}dh_0").body == BASE]
     grounds += [poses[name][:3, 3] for each in tree.closures for name in (each.a, each.b) if _is_base(tree, name)]
@@ -78,6 +81,34 @@ def place_mechanism(spec: RobotSpec, q: ArrayLike | str) -> Arm:
         closures=closures,
         plates=tuple(_plates(tree, bodies, poses, SAME * reach)),
     )
+
+
+def _lengths(
+    spec: RobotSpec, branch: str, rows: Sequence[Row], joints: Sequence[JointPlace], least: float
+) -> Iterator[Segment]:
+    """Yield the lengths of a chain that no joint changes, with the names of parameters that the file writes there.
+
+    Without a name they are a and d of the coordinate that the row has in the joint vector; those of fixed rows, and
+    of modified ones, whose a is of the joint before, are left out then.
+    """
+    source = spec.source_file
+    tree = None if source is None else compose(source.text, Report(source.name))
+    table = ("branches", branch, "joints") if branch else ("joints",)
+    for k, (row, joint) in enumerate(zip(rows, joints, strict=True)):
+        for segment in lengths_of([row], [joint], least):
+            if segment.letter == "d" and row.type is JointType.PRISMATIC:
+                continue
+            length = float(np.linalg.norm(segment.end - segment.start))
+            name = _parameter(spec, None if tree is None else tree.at(*table, k, segment.letter), length)
+            if name or segment.index == joint.index > 0:
+                yield replace(segment, name=name)
+
+
+def _parameter(spec: RobotSpec, cell: Node | None, length: float) -> str:
+    """Return the name of the parameter that a cell is, with either sign, or the empty text."""
+    name = "" if cell is None else cell.text.strip().lstrip("-").strip()
+    known = abs(spec.parameters.get(name, math.inf)) * spec.units.coordinate(1.0, turns=False)
+    return name if math.isclose(known, length, rel_tol=1e-9) else ""
 
 
 def plane_view(arm: Arm) -> ParallelView | None:

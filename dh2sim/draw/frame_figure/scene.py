@@ -28,6 +28,8 @@ class Segment:
     """m, shape (3,)."""
     end: Array
     """m, shape (3,)."""
+    name: str = ""
+    """Of the parameter that it is, if any."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
