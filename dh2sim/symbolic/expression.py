@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple, TypeAlias
 
 from dh2sim.symbolic.angles import rate_row, slide_row, trig_of
-from dh2sim.symbolic.polynomial import ROOTS, Atom, Monomial, Polynomial, Rational
+from dh2sim.symbolic.polynomial import ROOTS, Atom, Monomial, Polynomial, Rational, magnitude
 
 
 class Style(StrEnum):
@@ -132,8 +132,9 @@ class Nesting:
         if self._lengths is Lengths.LAST:
             return _collected(polynomial, self._groups)
         return _joined(
-            _times(monomial, _collected(rest, self._groups))
-            for monomial, rest in _by(polynomial, lambda atom: not _is_angle(atom))
+            _times(monomial, _collected(rest, self._groups), size)
+            for monomial, part in _by(polynomial, lambda atom: trig_of(atom) is None)
+            for size, rest in _by_magnitude(part)
         )
 
 
@@ -178,17 +179,25 @@ def _by(polynomial: Polynomial, chosen: Any) -> list[tuple[Monomial, Polynomial]
     return [(monomial, Polynomial(parts[monomial])) for monomial in order]
 
 
-def _times(monomial: Monomial, rest: Sum) -> Sum:
+def _by_magnitude(polynomial: Polynomial) -> list[tuple[Rational, Polynomial]]:
+    """Split a polynomial by the magnitudes of its coefficients, which are lengths where those are plain numbers."""
+    parts: dict[Rational, dict[Monomial, Rational]] = {}
+    for monomial, number in polynomial.terms.items():
+        parts.setdefault(magnitude(number), {})[monomial] = 1 if number > 0 else -1
+    return [(size, Polynomial(parts[size])) for size in sorted(parts)]
+
+
+def _times(monomial: Monomial, rest: Sum, number: Rational = 1) -> Sum:
     """Return a product; a single term is multiplied in, and a sum that starts with a minus gives its sign up."""
-    if not monomial:
+    if not monomial and number == 1:
         return rest
     factors = _ordered(monomial)
     if len(rest.terms) == 1:
         term = rest.terms[0]
-        return Sum((Term(term.number, (*factors, *term.factors)),))
+        return Sum((Term(term.number * number, (*factors, *term.factors)),))
     if all(term.number < 0 for term in rest.terms):
-        return Sum((Term(-1, (*factors, Factor(-rest))),))
-    return Sum((Term(1, (*factors, Factor(rest))),))
+        return Sum((Term(-number, (*factors, Factor(-rest))),))
+    return Sum((Term(number, (*factors, Factor(rest))),))
 
 
 def tidied(sum_: Sum) -> Sum:
@@ -226,11 +235,6 @@ def _printing_order(term: Term) -> tuple[Any, ...]:
     """Order terms of a sum: positive ones first, then by their factors; a number comes last."""
     atoms = [_atom_order(base) for base, _ in term.factors if isinstance(base, str)]
     return (term.number < 0, not term.factors, atoms)
-
-
-def _is_angle(atom: Atom) -> bool:
-    trig = trig_of(atom)
-    return trig is not None and not trig.angle.is_constant
 
 
 def _place(atom: Atom) -> Any:

@@ -150,6 +150,20 @@ def test_a_turned_base_or_tool_costs_no_more_than_its_own_three_rotations(style:
     assert found[1] <= plain[1] + 3 * 4 * 2
 
 
+def test_numbers_go_outside_as_letters_do_where_lengths_are_first() -> None:
+    """And odd twists stay inside, or nothing would be left to nest."""
+    rows = tuple(row(f"j{i}", a=0.1 * i, alpha=0.3 * i, d=0.07 * i) for i in range(1, 5))
+    spec = RobotSpec(name="odd_4r", rows=rows)
+
+    def operations(style: str, *, letters: bool) -> tuple[int, int]:
+        form = symbolic_form(spec, style=style, letters=letters).form
+        return operation_count([*form.sums, *form.named.values()])
+
+    numbers, letters = operations("tool", letters=False), operations("tool", letters=True)
+    assert numbers[0] <= 1.3 * letters[0]
+    assert letters <= operations("base", letters=True)
+
+
 def test_evaluation_uses_names() -> None:
     named = {"#1": Sum((Term(2, (Factor("x"),)),))}
     assert evaluated([Sum((Term(3, (Factor("#1", 2),)),))], named, {"x": 5.0}) == [300.0]
