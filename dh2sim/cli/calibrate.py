@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, load_all, refuse_options
+from dh2sim.cli.common import ForceOption, JsonOption, QuietOption, RobotArgument, load_all, refuse_options
 from dh2sim.cli.output import json_text, require_free, table_lines
 from dh2sim.messages import counted, listed, printable, shown
 
@@ -104,9 +104,9 @@ def calibrate(
         Path | None, typer.Option(metavar="FILE", help="Write a report as HTML, one file with all plots.")
     ] = None,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the random number generator.")] = 0,
-    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in rad and m.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Fit a robot's table, base and tool to measurements, and say how far to trust it.
 

@@ -75,9 +75,10 @@ RobotsArgument = Annotated[
         autocompletion=complete_robot,
     ),
 ]
-
-
 StrictOption = Annotated[bool, typer.Option("--strict", help="Treat notes, which point out likely slips, as errors.")]
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite existing files.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON alone, in m, rad, kg and s.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 
 def choice(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, choice, complete_robot, other_format, tolerance_of
+from dh2sim.cli.common import DONE, FELL_SHORT, JsonOption, choice, complete_robot, other_format, tolerance_of
 from dh2sim.cli.importing import errors_with_options
 from dh2sim.cli.output import json_text, table_lines
 from dh2sim.messages import printable
@@ -56,7 +56,7 @@ def diff(
     kinematics: Annotated[
         bool, typer.Option("--kinematics", help="Compare the mechanisms alone: no limits, masses and gains.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Compare two robots: are they the same?
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from dh2sim.cli.common import ForceOption
 from dh2sim.cli.output import json_text
 from dh2sim.errors import OutputError
 from dh2sim.messages import printable
@@ -26,7 +27,7 @@ def exercise(
             help="Folder for the text, a drawing and the solution.",
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
+    force: ForceOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, with the solution.")] = False,
 ) -> None:
     """Make a random arm as an exercise: its axes are described, students find the table.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, load_all
+from dh2sim.cli.common import JsonOption, RobotArgument, load_all
 from dh2sim.cli.joint_vector import (
     DegreesOption,
     JointVector,
@@ -45,7 +45,7 @@ def fk(
     every: Annotated[bool, typer.Option("--all", help="Print A_i of every row and T_0_i of every DH frame.")] = False,
     degrees: DegreesOption = False,
     radians: RadiansOption = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone; Q and the pose in rad and m.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Print the pose of a frame: as matrix, as position with roll, pitch, yaw, and as quaternion.
 
@@ -166,7 +166,7 @@ def jacobian(
     frame: Annotated[str, typer.Option(metavar="FRAME", help=FRAMES)] = "tool0",
     degrees: DegreesOption = False,
     radians: RadiansOption = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in rad and m.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Print the Jacobian of a frame in base_link, and how close it is to singular.
 

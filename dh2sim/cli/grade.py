@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, choice, complete_robot, tolerance_of
+from dh2sim.cli.common import DONE, FELL_SHORT, ForceOption, JsonOption, choice, complete_robot, tolerance_of
 from dh2sim.cli.diff import print_item
 from dh2sim.cli.output import json_text, require_free, table_lines
 from dh2sim.errors import Dh2simError
@@ -51,8 +51,8 @@ def grade(
     ] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV, a line for each submission.")] = False,
     out: Annotated[Path | None, typer.Option("--out", "-o", metavar="CLASS.csv", help="Write CSV to a file.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Grade students' tables against a solution.
 

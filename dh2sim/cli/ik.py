@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, MANY, RobotArgument, complain, load_all
+from dh2sim.cli.common import DONE, FELL_SHORT, MANY, JsonOption, RobotArgument, complain, load_all
 from dh2sim.cli.output import json_text
 from dh2sim.errors import ConfigurationError, Dh2simError, SettingsError
 from dh2sim.messages import did_you_mean, listed, shown
@@ -87,7 +87,7 @@ def ik(
     explain: Annotated[
         bool, typer.Option("--explain", help="Print the textbook's steps, where it has some.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in rad and m.")] = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Print all joint vectors that reach a pose, each verified against the table.
 

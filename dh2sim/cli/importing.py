@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, choice, complete_robot, load_all, other_format, tolerance_of
+from dh2sim.cli.common import ForceOption, RobotArgument, choice, complete_robot, load_all, other_format, tolerance_of
 from dh2sim.cli.output import hand_over, json_text, require_free
 from dh2sim.errors import Dh2simError, ImportedFileError, MissingExtraError
 from dh2sim.messages import printable
@@ -29,7 +29,7 @@ ToleranceOption = Annotated[
 OutOption = Annotated[
     Path | None, typer.Option("--out", "-o", metavar="ROBOT.yaml", help="File to write. [default: print it]")
 ]
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but the robot file and errors.")]
+_QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but the robot file and errors.")]
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print JSON: the robot file as a text, its notes, how far it is off.")
 ]
@@ -90,8 +90,8 @@ def import_robot(
     ] = None,
     name: Annotated[str | None, typer.Option(metavar="NAME", help="Name of the robot. [default: the file's]")] = None,
     out: OutOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
-    quiet: QuietOption = False,
+    force: ForceOption = False,
+    quiet: _QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Make a robot file from a URDF, an MJCF, a table, or a maker's calibration file.
@@ -261,8 +261,8 @@ def frames(
     ] = None,
     tolerance: ToleranceOption = 1e-9,
     out: OutOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
-    quiet: QuietOption = False,
+    force: ForceOption = False,
+    quiet: _QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Assign DH frames to joint axes, step by step as in a textbook.
@@ -328,8 +328,8 @@ def convert(
     robot: RobotArgument,
     to: Annotated[str, typer.Option(metavar="standard|modified|compact", help="Form of the table to convert to.")],
     out: OutOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
-    quiet: QuietOption = False,
+    force: ForceOption = False,
+    quiet: _QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write a robot's table in the other convention, or with every frame within reach of the arm.

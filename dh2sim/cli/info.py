@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, StrictOption, build_any
+from dh2sim.cli.common import JsonOption, RobotArgument, StrictOption, build_any
 from dh2sim.cli.output import json_text, table_lines
 from dh2sim.messages import printable
 
@@ -26,7 +26,7 @@ WIDTH = 80
 
 def info(
     robot: RobotArgument,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in m, rad, kg.")] = False,
+    as_json: JsonOption = False,
     srdf: Annotated[
         bool, typer.Option("--srdf", help="Also print the pairs of links that do not collide, as in an SRDF.")
     ] = False,

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 import textwrap
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from dh2sim.cli.common import RobotArgument, load_all
+from dh2sim.cli.common import JsonOption, RobotArgument, load_all
 from dh2sim.cli.output import json_text, table_lines
 from dh2sim.messages import printable
 
@@ -20,7 +18,7 @@ WIDTH = 80
 
 def mobility(
     robot: RobotArgument,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Count the degrees of freedom of a robot or a mechanism, and find out how it really moves.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import choice, complete_robot, load_all
+from dh2sim.cli.common import ForceOption, choice, complete_robot, load_all
 from dh2sim.cli.output import hand_over, require_free
 from dh2sim.errors import Dh2simError
 from dh2sim.messages import printable
@@ -55,7 +55,7 @@ def new(
         Path | None,
         typer.Option("--out", "-o", metavar="FILE", help="File to write. [default: NAME.yaml]", show_default=False),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    force: ForceOption = False,
 ) -> None:
     """Write a commented robot file to start from: replace its numbers by those of your table.
 

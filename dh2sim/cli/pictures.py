@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import build_any, refuse_options
+from dh2sim.cli.common import QuietOption, build_any, refuse_options
 from dh2sim.cli.output import progress_bar
 from dh2sim.errors import PictureError
 from dh2sim.messages import printable
@@ -66,7 +66,7 @@ def render(
     configuration: Annotated[
         str | None, typer.Option(metavar="NAME", help="Configuration of a ROBOT. [default: home]")
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Render a rollout as a video or a picture, or a robot as a picture.
 
@@ -187,7 +187,7 @@ def plot(
     dpi: Annotated[
         float, typer.Option(min=30, max=1200, metavar="X", help="Pixels per inch; more make text larger.")
     ] = 150.0,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Plot a rollout, or position, velocity, acceleration and jerk of a trajectory.
 

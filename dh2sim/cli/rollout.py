@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import INTERRUPTED, RobotArgument, build_any, named_values
+from dh2sim.cli.common import INTERRUPTED, QuietOption, RobotArgument, build_any, named_values
 from dh2sim.cli.output import json_text, make_console, progress_bar, size_text
 from dh2sim.cli.runs import clipped_controls, contacts, loops
 from dh2sim.messages import printable
@@ -146,7 +146,7 @@ def rollout(
         bool,
         typer.Option("--json", help="Print a description of the run as JSON, as 'dh2sim runs --json' does, alone."),
     ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: QuietOption = False,
 ) -> int:
     """Simulate many rollouts in MuJoCo and write them as a dataset.
 

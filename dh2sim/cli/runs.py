@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, complain
+from dh2sim.cli.common import DONE, FELL_SHORT, QuietOption, complain
 from dh2sim.cli.output import make_console, progress_bar, size_text
 from dh2sim.errors import Dh2simError
 from dh2sim.messages import did_you_mean, listed, printable
@@ -44,7 +44,7 @@ def runs(
         ),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite existing files.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: QuietOption = False,
 ) -> int:
     """Describe runs, or convert them to other formats.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, build_all, named_values
+from dh2sim.cli.common import QuietOption, RobotArgument, build_all, named_values
 from dh2sim.cli.output import json_text, progress_bar, table_lines
 from dh2sim.messages import printable
 
@@ -61,7 +61,7 @@ def sweep(
     ] = 1,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Measure everything again.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, alone.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Measure what each of many designs can do, without simulating it.
 

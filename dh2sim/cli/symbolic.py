@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, choice, load_all, refuse_options
+from dh2sim.cli.common import ForceOption, RobotArgument, choice, load_all, refuse_options
 from dh2sim.cli.output import hand_over, json_text, require_free
 from dh2sim.cli.symbolic_code import LANGUAGES, is_about_code, print_code
 from dh2sim.codegen.program import What as CodeWhat
@@ -58,7 +58,7 @@ def symbolic(
     q: Annotated[bool, typer.Option("--q", help="Call all joint coordinates q_i.")] = False,
     as_: Annotated[str, typer.Option("--as", metavar="FORMAT", help=f"{', '.join((*Format, *LANGUAGES))}.")] = "text",
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write to a file.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
+    force: ForceOption = False,
 ) -> None:
     """Print a robot's kinematics or dynamics in symbols, as a textbook does.
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import MANY, RobotArgument, build_all
+from dh2sim.cli.common import MANY, ForceOption, JsonOption, RobotArgument, build_all
 from dh2sim.cli.output import json_text, require_free, table_lines
 from dh2sim.errors import ConfigurationError, SettingsError, TrajectoryError
 from dh2sim.messages import did_you_mean, listed, printable, shown
@@ -78,8 +78,8 @@ def trajectory(
     ] = None,
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Samples per second. [default: 1000]")] = None,
     samples: Annotated[int | None, typer.Option(metavar="N", help="Number of samples, instead.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in s, rad and m.")] = False,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Plan a motion through waypoints that keeps all limits, and write it as samples.
 

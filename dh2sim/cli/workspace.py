@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, build_all
+from dh2sim.cli.common import JsonOption, QuietOption, RobotArgument, build_all
 from dh2sim.cli.output import json_text, progress_bar, table_lines
 from dh2sim.errors import OutputError
 from dh2sim.messages import printable, shown
@@ -61,8 +61,8 @@ def workspace(
             help="File to write: a picture as .png, .svg or .pdf; numbers as .npz, .csv or .ply.",
         ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone, in rad and m.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    as_json: JsonOption = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Find what a robot reaches inside its joints' limits.
 

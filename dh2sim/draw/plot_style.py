@@ -137,7 +137,7 @@ def save(figure: Any, out: Path, *, dpi: float) -> None:
         figure.savefig(draft, dpi=dpi, format=ending[1:], metadata=dates[ending])
 
 
-def value_range(*values: NDArray[Any], margin: float = 0.07) -> tuple[float, float]:
+def value_range(*values: NDArray[Any]) -> tuple[float, float]:
     """Return the range of an axis that shows values; where they hardly change, it does not blow up their rounding."""
     together = np.concatenate([np.ravel(value) for value in values if np.size(value)] or [np.zeros(1)])
     together = together[np.isfinite(together)]
@@ -145,7 +145,8 @@ def value_range(*values: NDArray[Any], margin: float = 0.07) -> tuple[float, flo
     least = 1e-6 * max(1.0, abs(low), abs(high))
     if high - low < least:
         low, high = 0.5 * (low + high) - least, 0.5 * (low + high) + least
-    return low - margin * (high - low), high + margin * (high - low)
+    margin = 0.07 * (high - low)
+    return low - margin, high + margin
 
 
 def shade_outside(ax: Any, lower: float, upper: float, low: float, high: float) -> None:

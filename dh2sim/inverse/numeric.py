@@ -175,7 +175,6 @@ class NumericSolver:
         *,
         free: Free | None = None,
         lever: float = LEVER,
-        rounds: tuple[int, ...] = ROUNDS,
     ) -> Nearest:
         """Descend from several starts, the first at ``q0``, and keep the nearest that is found of each goal.
 
@@ -185,16 +184,15 @@ class NumericSolver:
                 that reach a goal in one round, the one nearest to it is kept.
             free: What the goals leave open.
             lever: What 1 rad counts as, in sizes of the arm.
-            rounds: How many starts are tried together; later rounds only for goals that were not reached.
         """
         count = len(T)
         first = 0.5 * (self._start_lower + self._start_upper) if q0 is None else q0 / self._units
         first = np.clip(first, self._lower, self._upper)
-        scattered = scattered_configurations(self._start_lower, self._start_upper, sum(rounds) - 1)
+        scattered = scattered_configurations(self._start_lower, self._start_upper, sum(ROUNDS) - 1)
         starts = np.concatenate([first[None], scattered])
         best, left = np.broadcast_to(first, (count, self.n)).copy(), np.full(count, np.inf)
         pending = np.arange(count)
-        for amount in rounds:
+        for amount in ROUNDS:
             tried, starts = starts[:amount], starts[amount:]
             goals = self._goals(np.repeat(T[pending], amount, axis=0), free, lever)
             q, cost = self._descended(goals, np.tile(tried, (len(pending), 1)), 100)

@@ -77,14 +77,12 @@ def frame_poses(chain: ChainLike, q: ArrayLike, *, out: Array | None = None, thr
     return in_blocks(*joint_vectors(robot, q), (len(robot.joints) + 1, 4, 4), fill, out, threads)
 
 
-def joint_poses(chain: KinematicChain, q: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array:
+def joint_poses(chain: KinematicChain, q: ArrayLike) -> Array:
     """Return the poses of all joint-placed bodies in base_link; each turns with its own joint.
 
     Args:
         chain: The robot.
         q: Joint vectors, rad and m, shape (..., n).
-        out: Takes the result, of its shape; by default a new array.
-        threads: See :class:`BatchOptions`.
 
     Returns:
         One pose for each row of the table, shape (..., number of rows, 4, 4).
@@ -97,7 +95,7 @@ def joint_poses(chain: KinematicChain, q: ArrayLike, *, out: Array | None = None
         for i, frame in enumerate(joint_frames(chain, columns)):
             frame.write(results[:, i])
 
-    return in_blocks(*joint_vectors(chain, q), (len(chain.joints), 4, 4), fill, out, threads)
+    return in_blocks(*joint_vectors(chain, q), (len(chain.joints), 4, 4), fill)
 
 
 def reference_joint_poses(chain: KinematicChain, q: ArrayLike) -> tuple[Array, ...]:

@@ -45,17 +45,16 @@ class Walk:
     """Least number of velocities to first order at a place reached."""
 
 
-def walk(equations: LoopEquations, rank: Rank, *, seed: int = 0) -> Walk:
+def walk(equations: LoopEquations, rank: Rank) -> Walk:
     """Count the freedoms of finite motion through the assembly.
 
     Args:
         equations: The loops.
         rank: Of their Jacobian at the assembly.
-        seed: Of the directions that are tried.
     """
     if not rank.mobility:
         return Walk(dimension=0, branches=(), spread=0, tangents=0)
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     directions = random.normal(size=(_STARTS, rank.mobility)) @ rank.motions
     directions = np.vstack([directions, rank.motions])
     directions /= np.linalg.norm(directions, axis=1)[:, None]

@@ -74,11 +74,6 @@ def between(kind: ShapeKind, part: ShapePart, radius: float, start: Array, end: 
     )
 
 
-def along_z(kind: ShapeKind, part: ShapePart, radius: float, start: float, end: float) -> Shape:
-    """Make a shape on the link frame's z axis, from height ``start`` to ``end`` (m, start < end)."""
-    return between(kind, part, radius, read_only([0, 0, start]), read_only([0, 0, end]))
-
-
 def placed(shape: Shape, T_link_frame: Array) -> Shape:
     """Return ``shape``, given in some frame, in the link in which that frame has pose ``T_link_frame``."""
     return replace(shape, T_link_shape=compose(T_link_frame, shape.T_link_shape))

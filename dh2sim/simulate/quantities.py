@@ -21,7 +21,7 @@ MOST: Final = 1e6
 """Greatest number in a distribution, SI units."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Quantity:
     """Something of a rollout that may be random."""
 
@@ -42,86 +42,49 @@ AXES: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {"axis": ("x", "y", "z"), "length": ("a", "d"), "angle": ("alpha", "theta", "beta")}
 )
 """Labels of components."""
+_COORDINATE: Final = "rad or m, see joint_unit"
 QUANTITIES: Final[Mapping[str, Quantity]] = MappingProxyType(
     {
-        "mass": Quantity(kind="factor", variable="mass_scale", words="factor of the mass", owner="link"),
-        "friction": Quantity(kind="factor", variable="friction_scale", words="factor of the friction", owner="joint"),
-        "damping": Quantity(kind="factor", variable="damping_scale", words="factor of the damping", owner="joint"),
-        "armature": Quantity(kind="factor", variable="armature_scale", words="factor of the armature", owner="joint"),
-        "gain": Quantity(kind="factor", variable="gain_scale", words="factor of the gain", owner="actuator"),
+        "mass": Quantity("factor", "mass_scale", "factor of the mass", owner="link"),
+        "friction": Quantity("factor", "friction_scale", "factor of the friction", owner="joint"),
+        "damping": Quantity("factor", "damping_scale", "factor of the damping", owner="joint"),
+        "armature": Quantity("factor", "armature_scale", "factor of the armature", owner="joint"),
+        "gain": Quantity("factor", "gain_scale", "factor of the gain", owner="actuator"),
         # each has a stream of random numbers by its place here: new ones come last
-        "kp": Quantity(
-            kind="factor", variable="kp_scale", words="factor of the actuator's stiffness", owner="actuator"
-        ),
-        "kv": Quantity(
-            kind="factor", variable="kv_scale", words="factor of the actuator's damping", owner="actuator"
-        ),
-        "effort": Quantity(
-            kind="factor", variable="effort_scale", words="factor of the limit of effort", owner="actuator"
-        ),
+        "kp": Quantity("factor", "kp_scale", "factor of the actuator's stiffness", owner="actuator"),
+        "kv": Quantity("factor", "kv_scale", "factor of the actuator's damping", owner="actuator"),
+        "effort": Quantity("factor", "effort_scale", "factor of the limit of effort", owner="actuator"),
         "com": Quantity(
-            kind="offset",
-            variable="com_offset",
-            words="offset of the centre of mass, along the axes of the joint's frame",
-            unit="m",
+            "offset",
+            "com_offset",
+            "offset of the centre of mass, along the axes of the joint's frame",
+            "m",
             owner="link",
             axis="axis",
         ),
-        "payload": Quantity(kind="size", variable="payload", words="point mass at the tool", unit="kg"),
-        "payload_com": Quantity(
-            kind="offset", variable="payload_com", words="place of the payload in tool0", unit="m", axis="axis"
-        ),
-        "gravity": Quantity(
-            kind="size", variable="gravity", words="tilted gravity in the world", unit="m/s2", axis="axis"
-        ),
+        "payload": Quantity("size", "payload", "point mass at the tool", "kg"),
+        "payload_com": Quantity("offset", "payload_com", "place of the payload in tool0", "m", axis="axis"),
+        "gravity": Quantity("size", "gravity", "tilted gravity in the world", "m/s2", axis="axis"),
         "zero": Quantity(
-            kind="offset",
-            variable="zero_offset",
-            words="joint's own coordinate where it reads zero",
-            unit="rad or m, see joint_unit",
-            owner="joint",
+            "offset", "zero_offset", "joint's own coordinate where it reads zero", _COORDINATE, owner="joint"
         ),
         "row_length": Quantity(
-            kind="offset",
-            variable="row_length_error",
-            words="error of a length of the table",
-            unit="m",
-            owner="row",
-            axis="length",
+            "offset", "row_length_error", "error of a length of the table", "m", owner="row", axis="length"
         ),
         "row_angle": Quantity(
-            kind="offset",
-            variable="row_angle_error",
-            words="error of an angle of the table",
-            unit="rad",
-            owner="row",
-            axis="angle",
+            "offset", "row_angle_error", "error of an angle of the table", "rad", owner="row", axis="angle"
         ),
         "encoder_bias": Quantity(
-            kind="offset",
-            variable="encoder_bias",
-            words="constant error of the encoder",
-            unit="rad or m, see joint_unit",
-            owner="joint",
+            "offset", "encoder_bias", "constant error of the encoder", _COORDINATE, owner="joint"
         ),
         "encoder_noise": Quantity(
-            kind="size",
-            variable="encoder_noise",
-            words="standard deviation of the encoder's noise",
-            unit="rad or m, see joint_unit",
-            owner="joint",
+            "size", "encoder_noise", "standard deviation of the encoder's noise", _COORDINATE, owner="joint"
         ),
-        "sensor_delay": Quantity(
-            kind="size", variable="sensor_delay", words="delay of what the controller sees", unit="s"
-        ),
-        "control_delay": Quantity(kind="size", variable="control_delay", words="delay of controls", unit="s"),
-        "push": Quantity(
-            kind="size", variable="push_force", words="force of a push at tool0, in the world", unit="N", axis="axis"
-        ),
-        "push_interval": Quantity(
-            kind="constant", variable="push_interval", words="time from push to push", unit="s"
-        ),
-        "push_duration": Quantity(kind="constant", variable="push_duration", words="duration of a push", unit="s"),
+        "sensor_delay": Quantity("size", "sensor_delay", "delay of what the controller sees", "s"),
+        "control_delay": Quantity("size", "control_delay", "delay of controls", "s"),
+        "push": Quantity("size", "push_force", "force of a push at tool0, in the world", "N", axis="axis"),
+        "push_interval": Quantity("constant", "push_interval", "time from push to push", "s"),
+        "push_duration": Quantity("constant", "push_duration", "duration of a push", "s"),
     }
 )
 NEEDS: Final[Mapping[str, str]] = MappingProxyType(

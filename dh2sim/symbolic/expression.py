@@ -262,13 +262,11 @@ def _atom_order(atom: Atom) -> tuple[Any, ...]:
 # ---------------------------------------------------------------------------- naming
 
 
-def name_sums(sums: Sequence[Sum], *, least: int = 2, prefix: str = "#") -> tuple[dict[Atom, Sum], list[Sum]]:
+def name_sums(sums: Sequence[Sum]) -> tuple[dict[Atom, Sum], list[Sum]]:
     """Name nested sums that occur several times, up to their sign.
 
     Args:
         sums: Nested expressions.
-        least: How often a sum must occur to be named.
-        prefix: What names begin with; a number follows.
 
     Returns:
         The named sums, each using only names before it, and the expressions with names in them.
@@ -300,13 +298,13 @@ def name_sums(sums: Sequence[Sum], *, least: int = 2, prefix: str = "#") -> tupl
                 continue
             own, opposite = base.key, base.opposite_key
             key = min(own, opposite)
-            if count[key] < least or _is_short(base):
+            if count[key] < 2 or _is_short(base):
                 factors.append(Factor(replaced(base), power))
                 continue
             if key not in names:
                 definition = replaced(base)
                 turned = 2 * sum(part.number < 0 for part in definition.terms) > len(definition.terms)
-                name = f"{prefix}{len(named) + 1}"
+                name = f"#{len(named) + 1}"
                 names[key] = (name, opposite if turned else own)
                 named[name] = _positive_first(-definition) if turned else tidied(definition)
             name, defined_key = names[key]

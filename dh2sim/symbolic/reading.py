@@ -100,7 +100,6 @@ class _Reader:
         self._degrees = spec.units.angle is AngleUnit.DEG and spec.source_file is not None
         self._units = spec.units
         self._named: dict[str, Letter] = {}
-        self._angle_parameters: dict[str, Rational] = {}
         self._tree = _tree(spec)
         self._parameters = {
             name: Polynomial.number(exact_number(value)) if numbers else Polynomial.atom(name)

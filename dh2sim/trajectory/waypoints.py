@@ -116,9 +116,6 @@ def _limit(value: object, loc: Loc, scope: Scope) -> Any:
                 return scope.wrong(loc, str(error))
 
 
-_DURATION: Final = Number("", least=0.0, most=_SECONDS)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Waypoint:
     """A waypoint, and how the motion gets there: a joint vector, or a pose of tool0 in base_link."""
@@ -292,9 +289,6 @@ def _check(tree: Tree, scope: Scope, spec: RobotSpec) -> None:
     for index, entry in enumerate(points):
         if isinstance(entry, dict):
             _check_one(entry, ("waypoints", index), scope, spec)
-
-
-_ARC_KEYS: Final = ("centre", "axis", "angle")
 
 
 def _check_one(entry: Tree, loc: Loc, scope: Scope, spec: RobotSpec) -> None:

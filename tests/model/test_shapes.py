@@ -8,7 +8,7 @@ from dh2sim.kinematics.forward import joint_poses
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.model.shapes import Shape, ShapeKind, ShapePart, along_z, between, placed, pose_with_z
+from dh2sim.model.shapes import Shape, ShapeKind, ShapePart, between, placed, pose_with_z
 from dh2sim.robot.spec import Limits, RobotSpec, Row
 from dh2sim.typing import Array
 from tests.sample_robots import CONTINUOUS, MODIFIED, NAMES, ODD, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
@@ -154,7 +154,8 @@ def test_a_shape_between_two_points_ends_at_them() -> None:
 
 
 def test_a_shape_along_z_needs_no_rotation() -> None:
-    shape = along_z(ShapeKind.CYLINDER, ShapePart.JOINT, 0.1, -0.2, 0.6)
+    ends = [np.array([0.0, 0.0, z]) for z in (-0.2, 0.6)]
+    shape = between(ShapeKind.CYLINDER, ShapePart.JOINT, 0.1, *ends)
     np.testing.assert_array_equal(shape.T_link_shape, pose_from_rpy([0, 0, 0.5 * (0.6 - 0.2)], [0, 0, 0]))
 
 
