@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from dh2sim.draw.frame_figure.figure import draw_assignment
-from dh2sim.importing.sources import import_axes
+from dh2sim.importing.axes import import_axes
 from dh2sim.robot.axes_file import read_axes
 
 DOCS: Final = Path(__file__).resolve().parents[1] / "docs"

@@ -283,8 +283,8 @@ def frames(
       dh2sim frames axes.yaml
       dh2sim frames axes.yaml --explain -o arm.yaml
     """
+    from dh2sim.importing.axes import import_axes
     from dh2sim.importing.source_errors import errors_of
-    from dh2sim.importing.sources import import_axes
     from dh2sim.robot.axes_file import read_axes
     from dh2sim.robot.spec import CONVENTIONS, Convention
 

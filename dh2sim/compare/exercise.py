@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dh2sim.errors import Dh2simError
-from dh2sim.importing.sources import import_axes
+from dh2sim.importing.axes import import_axes
 from dh2sim.robot.axes_file import AxesSpec, AxisJoint
 from dh2sim.robot.spec import Convention, JointType, Pose, RobotSpec
 from dh2sim.typing import read_only

@@ -1,4 +1,4 @@
-"""Robot files from other sources: a URDF, an MJCF, a table as people write it, or joint axes."""
+"""Robot files from other sources: a URDF, an MJCF, a table as people write it, or a calibration file."""
 
 from __future__ import annotations
 
@@ -12,176 +12,20 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from dh2sim.errors import Dh2simError
 from dh2sim.formats.calibration import is_calibration
-from dh2sim.formats.serial_robot import SerialLink, SerialRobot
-from dh2sim.formats.table.read import read_table
+from dh2sim.formats.serial_robot import SerialRobot
 from dh2sim.formats.xml_read import Element
-from dh2sim.importing.explain import explanation
 from dh2sim.importing.result import Imported
-from dh2sim.importing.serial import import_serial, robot_name
-from dh2sim.importing.source_errors import MADE, errors_of
+from dh2sim.importing.serial import import_serial
+from dh2sim.importing.source_errors import errors_of
+from dh2sim.importing.table import import_table
 from dh2sim.input_files import read_input
 from dh2sim.kinematics.chain import SpecLike, spec_of
-from dh2sim.kinematics.compaction import far_frames
 from dh2sim.kinematics.frame_assignment.recover import TOLERANCE
-from dh2sim.kinematics.frame_assignment.result import Tolerances
-from dh2sim.kinematics.frame_assignment.rounding import simple_angle, simple_length
-from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
-from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import Choice, member, shown
-from dh2sim.robot.axes_file import AxesSpec
-from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
-from dh2sim.robot.write import robot_file_text
-from dh2sim.typing import Array, read_only
-
-
-def import_table(
-    data: bytes,
-    *,
-    file: str,
-    convention: Convention | str | None = None,
-    angle: AngleUnit | str | None = None,
-    length: LengthUnit | str | None = None,
-    table: int | None = None,
-    name: str | None = None,
-    tolerance: float = TOLERANCE,
-    folder: Path | None = None,
-) -> Imported:
-    """Make a robot file of a Denavit-Hartenberg table in Markdown, CSV, TSV or a toolbox's printout.
-
-    Args:
-        data: The file's content.
-        file: Its name, for messages and for the robot's name; '-' for standard input.
-        convention: Of the table, where it does not say.
-        angle: Unit of its angles, where it does not say.
-        length: Unit of its lengths, where it does not say.
-        table: Number of the table, from 1, where the file has several; by default the first.
-        name: Of the robot.
-        tolerance: Where it is greater than the default, numbers within it of a simple one are made simple, rad and m.
-        folder: Of the robot file, to which paths of meshes are relative.
-
-    Raises:
-        ImportedFileError: The table is wrong, or leaves open what has to be known.
-        Dh2simError: There is no table of that number, or no such convention or unit.
-    """
-    own_name = robot_name(Path(file).stem if name is None else name)
-    read = read_table(data, file=file, name=own_name, convention=convention, angle=angle, length=length, table=table)
-    spec = read.spec
-    if not spec.source:
-        origin = "standard input" if file == "-" else Path(file).name
-        spec = replace(spec, source=f"The table in {origin}, as dh2sim read it.")
-    notes = [_sentence(note) for note in read.notes]
-    if tolerance > TOLERANCE:
-        spec = _simpler(spec, Tolerances(angle=tolerance, length=tolerance, reach=1.0))
-        notes.append(f"Numbers within {tolerance:g} rad or m of a simple one were made simple.")
-    far = far_frames(spec)
-    if far.frames:
-        notes.append(
-            f"{far.sentence} 'dh2sim convert {spec.name}.yaml --to compact' rewrites the table without them."
-        )
-    header = [f"Note: {note}" for note in notes]
-    text = robot_file_text(spec, header=header, folder=folder, angle=read.units.angle, length=read.units.length)
-    with errors_of(file):
-        made = parse_robot(text, file=MADE, directory=folder)
-    return Imported(text=text, spec=made, notes=tuple(notes))
-
-
-def _sentence(note: str) -> str:
-    return f"{note[0].upper()}{note[1:]}{'' if note.endswith('.') else '.'}"
-
-
-def _simpler(spec: RobotSpec, tolerances: Tolerances) -> RobotSpec:
-    rows = [
-        replace(
-            row,
-            a=simple_length(row.a, tolerances),
-            alpha=simple_angle(row.alpha, tolerances),
-            d=simple_length(row.d, tolerances),
-            theta=simple_angle(row.theta, tolerances),
-        )
-        for row in spec.rows
-    ]
-    return replace(spec, rows=tuple(rows))
-
-
-def import_axes(
-    axes: AxesSpec,
-    *,
-    convention: Convention | str | None = None,
-    tolerance: float = TOLERANCE,
-    explain: bool = False,
-    folder: Path | None = None,
-) -> Imported:
-    """Assign frames to joint axes and make a robot file of them.
-
-    Args:
-        axes: As read from their file.
-        convention: Of the table; by default the file's, or else standard.
-        tolerance: Greatest residual, rad, and m for a reach of up to 1 m, then of the reach.
-        explain: Whether to explain every step at the top of the robot file.
-        folder: Of the robot file, to which paths of meshes are relative.
-
-    Raises:
-        MismatchError: The residual is above the tolerance.
-    """
-
-    def made(*header: str) -> Imported:
-        return import_serial(
-            serial_robot(axes),
-            convention=_choice(Convention, convention, "convention") or axes.convention or Convention.STANDARD,
-            tolerance=tolerance,
-            folder=folder,
-            header=header,
-            description=axes.description,
-        )
-
-    imported = made()
-    return made(*explanation(imported)) if explain else imported
-
-
-def serial_robot(axes: AxesSpec) -> SerialRobot:
-    """Return the robot that joint axes describe; every link's frame is on its axis, turned like base_link.
-
-    A sliding joint without a point is where the joint before it is.
-    """
-    joints = []
-    place = np.zeros(3)
-    for axis in axes.joints:
-        before, place = place, place if axis.point is None else axis.point
-        joints.append(
-            SerialJoint(
-                name=axis.name,
-                type=axis.type,
-                T_parent_link=_shift(place - before),
-                axis=axis.direction,
-                point=read_only([0, 0, 0]),
-            )
-        )
-    T_link_tip = np.array(pose_from_rpy(axes.tool.xyz, axes.tool.rpy))
-    T_link_tip[:3, 3] -= place
-    return SerialRobot(
-        name=axes.name,
-        description=axes.source or "Joint axes",
-        chain=SerialChain(joints=tuple(joints), T_link_tip=read_only(T_link_tip)),
-        base=SerialLink(name="base_link"),
-        links=tuple(SerialLink(name=f"link_{i}") for i in range(1, len(joints) + 1)),
-        limits=tuple(axis.limits for axis in axes.joints),
-        dynamics=tuple(axis.dynamics for axis in axes.joints),
-        actuators=tuple(axis.actuator for axis in axes.joints),
-        gravity=axes.gravity,
-        configurations=axes.configurations,
-    )
-
-
-def _shift(offset: Array) -> Array:
-    T = np.eye(4)
-    T[:3, 3] = offset
-    return read_only(T)
-
+from dh2sim.robot.read import load_robot
+from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
 
 STDIN = "-"
 _NO_HAYATI = "a table is made in the standard or the modified convention; Hayati rows are used where they are needed"

@@ -17,8 +17,9 @@ from dh2sim.draw.labels import Label, place_labels
 from dh2sim.draw.plot_style import plot_style
 from dh2sim.draw.projection import look_from
 from dh2sim.errors import OutputError, PictureError
+from dh2sim.importing.axes import import_axes
 from dh2sim.importing.result import Imported
-from dh2sim.importing.sources import ImportOptions, import_axes, import_data
+from dh2sim.importing.sources import ImportOptions, import_data
 from dh2sim.robot.axes_file import read_axes
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, Limits
 from dh2sim.typing import Array

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dh2sim.importing.axes import import_axes
 from dh2sim.importing.result import Imported
-from dh2sim.importing.sources import import_axes
 from dh2sim.robot.axes_file import AxesSpec, AxisJoint
 from dh2sim.robot.spec import Convention, JointType, Limits, Pose
 from dh2sim.typing import read_only

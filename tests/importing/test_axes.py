@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim.importing.sources import import_axes, serial_robot
+from dh2sim.importing.axes import import_axes, serial_robot
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.axes_file import AxesSpec, read_axes
 from dh2sim.robot.read import load_robot

@@ -14,7 +14,8 @@ import pytest
 from dh2sim.errors import Dh2simError, ImportedFileError, MismatchError
 from dh2sim.importing import serial
 from dh2sim.importing.serial import assemble
-from dh2sim.importing.sources import ImportOptions, import_data, import_robot, import_table
+from dh2sim.importing.sources import ImportOptions, import_data, import_robot
+from dh2sim.importing.table import import_table
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.magnitudes import MOST_ROWS
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
