@@ -14,5 +14,5 @@ Array: TypeAlias = NDArray[np.float64]
 def read_only(values: object) -> Array:
     """Return a copy of ``values`` as doubles that nobody can write to."""
     array = np.array(values, dtype=np.float64)
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array

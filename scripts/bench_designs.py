@@ -40,7 +40,11 @@ def designs() -> Iterator[Row]:
 
     many, one = _job(vary=VARY, per_design=ROLLOUTS), _job()
     assert many.designs is not None
-    making = best(lambda: [many.designs.make(i) for i in range(40)], repeats=3) / 40 * 1e3  # type: ignore[union-attr]
+    making = min(
+        best(lambda start=start: many.designs.of(range(start, start + 250, ROLLOUTS), {}), 1)  # type: ignore[misc]
+        for start in range(0, TABLES * ROLLOUTS, 250)
+    )
+    making *= 1e3 / (250 / ROLLOUTS)
     yield "a model of a table, compiled and compared with it", f"{making:.1f} ms", "<= 5 ms", making <= 5.0
     ratios, steps = Ratios(), Ratios()
     simulated = range(TABLES * ROLLOUTS)

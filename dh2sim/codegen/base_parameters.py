@@ -22,7 +22,7 @@ from dh2sim.codegen.newton_euler import InertialParameters
 from dh2sim.kinematics.trace import Number, Trace
 from dh2sim.kinematics.transforms import compose, identity, joint_part, rotate_tensor
 from dh2sim.kinematics.trig import sin_cos
-from dh2sim.model.mass import MassProperties, in_frame, shift_inertia
+from dh2sim.model.mass import MassProperties, in_frame, shifted_inertia
 from dh2sim.model.robot_model import RobotModel
 
 _ROUNDING: Final = 4e-15
@@ -107,7 +107,7 @@ def _links(model: RobotModel, mechanism: Mechanism) -> list[_Link]:
 
 def _about_origin(body: MassProperties) -> _Link:
     com = body.com.tolist()
-    inertia = shift_inertia(body.inertia, body.mass, com).tolist()
+    inertia = shifted_inertia(body.inertia, body.mass, com)
     return _Link(body.mass, [body.mass * value for value in com], inertia)
 
 

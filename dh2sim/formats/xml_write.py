@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
+from typing import Final
 
 from dh2sim.errors import NotFiniteError
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
+
+_LEAST: Final = sys.float_info.min
+_MOST: Final = sys.float_info.max
 
 
 class _NotFinite(str):
@@ -27,14 +32,14 @@ def number(value: float) -> str:
     value = float(value)
     if not math.isfinite(value):
         return _NotFinite(value)
-    return repr(0.0 if abs(value) < sys.float_info.min else value)
+    return repr(0.0 if abs(value) < _LEAST else value)
 
 
 def numbers(values: Iterable[float]) -> str:
     """Return the texts of several numbers, separated by spaces."""
-    texts = [number(value) for value in values]
+    texts = [repr(v) if _LEAST <= abs(v) <= _MOST else number(v) for v in map(float, values)]
     text = " ".join(texts)
-    return _NotFinite(text) if any(isinstance(each, _NotFinite) for each in texts) else text
+    return _NotFinite(text) if _NotFinite in map(type, texts) else text
 
 
 def child(parent: ET.Element, tag: str, **attributes: str) -> ET.Element:
@@ -48,19 +53,41 @@ def document(root: ET.Element, header: Iterable[str]) -> str:
     Raises:
         NotFiniteError: A number in it is NaN or infinite.
     """
-    _require_finite(root, root.tag)
-    ET.indent(root, space="  ")
-    lines = "\n".join(f"  {line}" for line in header)
-    return f"<!--\n{_comment(lines)}\n-->\n{ET.tostring(root, encoding='unicode')}\n"
+    comment = _comment("\n".join(f"  {line}" for line in header))
+    lines = [f"<!--\n{comment}\n-->\n"]
+    _serialise(root, "", (), lines)
+    return "".join(lines)
 
 
-def _require_finite(element: ET.Element, path: str) -> None:
+def _serialise(element: ET.Element, indent: str, parents: tuple[ET.Element, ...], lines: list[str]) -> None:
+    """Append the lines of an element: the bytes of ElementTree, sooner, as there are no namespaces and texts."""
+    texts = []
     for name, text in element.attrib.items():
-        if isinstance(text, _NotFinite):
-            raise NotFiniteError(f"{path}.{name}", text)
+        if text.__class__ is _NotFinite:
+            raise NotFiniteError(f"{_path((*parents, element))}.{name}", text)
+        texts.append(f' {name}="{text.translate(_ESCAPED) if _special(text) else text}"')
+    start = f"{indent}<{element.tag}{''.join(texts)}"
+    if not len(element):
+        lines.append(f"{start} />\n")
+        return
+    lines.append(f"{start}>\n")
     for inner in element:
-        own = inner.get("name") or inner.get("class")
-        _require_finite(inner, f"{path}.{inner.tag}" + (f"[{own}]" if own else ""))
+        _serialise(inner, f"{indent}  ", (*parents, element), lines)
+    lines.append(f"{indent}</{element.tag}>\n")
+
+
+_special: Final = re.compile(r'[&<>"\r\n\t]').search
+_ESCAPED: Final = str.maketrans(
+    {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\r": "&#13;", "\n": "&#10;", "\t": "&#09;"}
+)
+
+
+def _path(elements: tuple[ET.Element, ...]) -> str:
+    names = [element.get("name") or element.get("class") for element in elements[1:]]
+    inner = (
+        f".{each.tag}[{name}]" if name else f".{each.tag}" for each, name in zip(elements[1:], names, strict=True)
+    )
+    return elements[0].tag + "".join(inner)
 
 
 def _comment(text: str) -> str:

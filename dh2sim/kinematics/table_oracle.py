@@ -19,7 +19,8 @@ from dh2sim.errors import ConfigurationError
 from dh2sim.robot.spec import Convention, Pose, RobotSpec, Row
 from dh2sim.typing import Array
 
-_Number = TypeVar("_Number", Array, Decimal)
+_Coordinate = TypeVar("_Coordinate", float, Array)
+_Number = TypeVar("_Number", float, Array, Decimal)
 
 _BLOCK = 2048
 """Configurations handled at a time, so that a block's matrices stay in the processor's cache."""
@@ -96,9 +97,12 @@ def _chain_frames(frames: dict[str, Array], prefix: str, T: Array, rows: Sequenc
     frames[f"{prefix}dh_0"] = T
     count = 0
     for i, row in enumerate(rows, start=1):
-        coordinate = q[count : count + 1] if row.type.moves else np.zeros(1)
+        coordinate = float(q[count]) if row.type.moves else 0.0
         count += row.type.moves
-        T = T @ row_matrix(row, coordinate)[..., 0]
+        theta, d = _moved(row, coordinate)
+        turn, twist, second = ((math.cos(angle), math.sin(angle)) for angle in (theta, row.alpha, row.beta))
+        upper = _entries(row.convention, turn, twist, second, row.a, d, 0.0, 1.0)
+        T = T @ np.array([*upper, [0.0, 0.0, 0.0, 1.0]])
         frames[f"{prefix}dh_{i}"] = T
     return count
 
@@ -118,9 +122,7 @@ def row_matrix(row: Row, q: Array) -> Array:
     Returns:
         Shape (4, 4, N).
     """
-    coordinate = -q if row.flip else q
-    theta = row.theta + coordinate if row.type.turns else np.asarray(row.theta)
-    d = row.d + coordinate if row.type.moves and not row.type.turns else np.asarray(row.d)
+    theta, d = map(np.asarray, _moved(row, q))
     ct, st = np.cos(theta), np.sin(theta)
     ca, sa, cb, sb = (np.asarray(f(angle)) for angle in (row.alpha, row.beta) for f in (math.cos, math.sin))
     zero, one, a = np.asarray(0.0), np.asarray(1.0), np.asarray(row.a)
@@ -130,6 +132,15 @@ def row_matrix(row: Row, q: Array) -> Array:
         for k, entry in enumerate(entries):
             matrix[i, k] = entry
     return matrix
+
+
+def _moved(row: Row, q: _Coordinate) -> tuple[_Coordinate | float, _Coordinate | float]:
+    """Return theta and d of a row at a coordinate."""
+    coordinate = -q if row.flip else q
+    return (
+        row.theta + coordinate if row.type.turns else row.theta,
+        row.d + coordinate if row.type.moves and not row.type.turns else row.d,
+    )
 
 
 def _entries(

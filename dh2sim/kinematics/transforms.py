@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import TypeAlias, cast
 
 import numpy as np
@@ -26,6 +27,7 @@ _LOCKED = 4e-16
 """Cosine of the pitch, at and below which nothing but rounding is left of roll."""
 
 
+@cache
 def identity() -> Array:
     """Return the identity, shape (4, 4)."""
     return _transform(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0))
@@ -41,12 +43,17 @@ def compose(T_a_b: Array, T_b_c: Array) -> Array:
     Returns:
         T_a_b · T_b_c, shape (4, 4).
     """
-    left, right = T_a_b.tolist(), T_b_c.tolist()
-    rotation = [
-        [row[0] * right[0][k] + row[1] * right[1][k] + row[2] * right[2][k] for k in range(3)] for row in left[:3]
+    (x1, y1, z1, p1), (x2, y2, z2, p2), (x3, y3, z3, p3), _ = T_b_c.tolist()
+    rows = [
+        [
+            a * x1 + b * x2 + c * x3 + 0.0,
+            a * y1 + b * y2 + c * y3 + 0.0,
+            a * z1 + b * z2 + c * z3 + 0.0,
+            a * p1 + b * p2 + c * p3 + p + 0.0,
+        ]
+        for a, b, c, p in T_a_b.tolist()[:3]
     ]
-    position = [row[0] * right[0][3] + row[1] * right[1][3] + row[2] * right[2][3] + row[3] for row in left[:3]]
-    return _transform(rotation, position)
+    return read_only([*rows, [0.0, 0.0, 0.0, 1.0]])
 
 
 def invert(T_a_b: Array) -> Array:
@@ -231,14 +238,14 @@ def rotate_tensor(T_a_b: Array, tensor: Array) -> Array:
     Returns:
         Exactly symmetric, shape (3, 3).
     """
-    R, A = T_a_b.tolist(), tensor.tolist()
-    RA = [[R[i][0] * A[0][j] + R[i][1] * A[1][j] + R[i][2] * A[2][j] for j in range(3)] for i in range(3)]
-    turned = [[0.0] * 3 for _ in range(3)]
-    for i in range(3):
-        for j in range(i, 3):
-            value = RA[i][0] * R[j][0] + RA[i][1] * R[j][1] + RA[i][2] * R[j][2]
-            turned[i][j] = turned[j][i] = value + 0.0
-    return read_only(turned)
+    R = [row[:3] for row in T_a_b.tolist()[:3]]
+    (a1, a2, a3), (b1, b2, b3), (c1, c2, c3) = tensor.tolist()
+    RA = [(x * a1 + y * b1 + z * c1, x * a2 + y * b2 + z * c2, x * a3 + y * b3 + z * c3) for x, y, z in R]
+    xx, xy, xz, yy, yz, zz = (
+        RA[i][0] * R[j][0] + RA[i][1] * R[j][1] + RA[i][2] * R[j][2] + 0.0
+        for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+    )
+    return read_only([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 _BLOCK = 2048

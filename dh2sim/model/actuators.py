@@ -14,7 +14,7 @@ import numpy as np
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import reference_joint_frames, reference_joint_poses
-from dh2sim.model.mass import MassProperties, in_frame, shift_inertia
+from dh2sim.model.mass import MassProperties, in_frame, shifted_inertia
 from dh2sim.model.shapes import neat
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, JointType
 from dh2sim.typing import Array
@@ -79,15 +79,15 @@ def seen_inertias(chain: KinematicChain, bodies: Sequence[MassProperties | None]
             continue
         carried = [body for body in placed[i:] if body is not None]
         if joint.type.turns:
-            axis = [float(poses[i][k, 2]) for k in range(3)]
-            origin = [float(poses[i][k, 3]) for k in range(3)]
+            axis, origin = poses[i][:3, 2:].T.tolist()
             terms = []
             for body in carried:
-                arm = [float(body.com[k]) - origin[k] for k in range(3)]
-                along = _dot(arm, axis)  # of no account, and much where a frame is far along its axis
-                arm = [arm[k] - along * axis[k] for k in range(3)]
-                about = shift_inertia(body.inertia, body.mass, arm)
-                terms.append(_dot(axis, [_dot([float(x) for x in about[k]], axis) for k in range(3)]))
+                x, y, z = body.com.tolist()
+                x, y, z = x - origin[0], y - origin[1], z - origin[2]
+                along = _dot((x, y, z), axis)  # of no account, and much where a frame is far along its axis
+                arm = [x - along * axis[0], y - along * axis[1], z - along * axis[2]]
+                about = shifted_inertia(body.inertia, body.mass, arm)
+                terms.append(_dot(axis, [_dot(row, axis) for row in about]))
         else:
             terms = [body.mass for body in carried]
         seen.append(math.fsum(terms))

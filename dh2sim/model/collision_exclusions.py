@@ -10,7 +10,6 @@ import numpy as np
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import reference_joint_poses
-from dh2sim.kinematics.transforms import move_point
 from dh2sim.model.shapes import Shape
 from dh2sim.typing import Array
 
@@ -55,9 +54,7 @@ def excluded_pairs(
     for joint in chain.joints:
         group.append(group[-1] + (1 if joint.type.moves else 0))
     group += group[-1:] * (len(names) - len(group))
-    touching = np.zeros((len(names), len(names)), dtype=bool)
-    for q in configurations:
-        touching |= _overlaps(chain, shapes, q)
+    touching = _overlapping(chain, shapes, configurations)
     pairs = []
     for i in range(len(names)):
         for j in range(i + 1, len(names)):
@@ -70,25 +67,28 @@ def excluded_pairs(
     return tuple(pairs)
 
 
-def _overlaps(chain: KinematicChain, shapes: Sequence[Sequence[Shape]], q: Array) -> np.ndarray:
-    """Whether each pair of links overlaps at ``q``: booleans, shape (links, links)."""
-    poses = [np.eye(4), *reference_joint_poses(chain, q)]
-    poses += poses[-1:] * (len(shapes) - len(poses))
-    owner, starts, ends, radii = [], [], [], []
-    for index, (T, own) in enumerate(zip(poses, shapes, strict=True)):
-        for shape in (one for one in own if one.solid):
-            start, end = shape.ends
-            owner.append(index)
-            starts.append(move_point(T, start))
-            ends.append(move_point(T, end))
-            radii.append(shape.radius)
+def _overlapping(
+    chain: KinematicChain, shapes: Sequence[Sequence[Shape]], configurations: Iterable[Array]
+) -> np.ndarray:
+    """Whether each pair of links overlaps in one of the configurations: booleans, shape (links, links)."""
+    solid = [(index, shape) for index, own in enumerate(shapes) for shape in own if shape.solid]
     result = np.zeros((len(shapes), len(shapes)), dtype=bool)
-    if not owner:
+    if not solid:
         return result
-    a, b, r, link = np.array(starts), np.array(ends), np.array(radii), np.array(owner)
-    k, other = (index.ravel() for index in np.indices((len(owner), len(owner))))
-    near = segment_distance(a[k], b[k], a[other], b[other]) <= 1.001 * (r[k] + r[other])
-    result[link[k[near]], link[other[near]]] = True
+    link, radii = np.array([index for index, _ in solid]), np.array([shape.radius for _, shape in solid])
+    centres = np.array([shape.T_link_shape for _, shape in solid])
+    half = np.array([[0.5 * shape.length] for _, shape in solid]) * centres[:, :3, 2]
+    x, y, z = np.stack([centres[:, :3, 3] - half, centres[:, :3, 3] + half]).transpose(2, 0, 1)[..., None]
+    k, other = np.triu_indices(len(solid), 1)
+    apart = link[k] != link[other]
+    k, other = k[apart], other[apart]
+    for q in configurations:
+        poses = [np.eye(4), *reference_joint_poses(chain, q)]
+        poses += poses[-1:] * (len(shapes) - len(poses))
+        T = np.array(poses)[link, :3]  # element by element, which rounds as plain arithmetic does
+        a, b = T[..., 0] * x + T[..., 1] * y + T[..., 2] * z + T[..., 3]
+        near = segment_distance(a[k], b[k], a[other], b[other]) <= 1.001 * (radii[k] + radii[other])
+        result[link[k[near]], link[other[near]]] = True
     return result | result.T
 
 

@@ -41,6 +41,8 @@ def travels_of(chain: KinematicChain, rows: Sequence[Row]) -> list[Range]:
     is nothing.
     """
     given = [_displacements(joint, row.limits.position) for joint, row in zip(chain.joints, rows, strict=True)]
+    if all(given):
+        return [travel for travel in given if travel]
     rest = reach_bound(build_skeleton(chain, [travel or (0.0, 0.0) for travel in given]))
     assumed = min(neat(rest), LENGTH.most) if rest > NO_LENGTH else 1.0
     return [travel or (-assumed, assumed) for travel in given]

@@ -65,16 +65,16 @@ def of_shape(shape: Shape, density: float) -> MassProperties:
     I_x += 2 m_b (2/5 r² + l²/4 + 3/8 l r). Ball: 2/5 m r². Box: I_x = m (y² + z²)/12.
     (Beer & Johnston, Vector Mechanics, tables of inertia; parallel axes.)
     """
-    T = shape.T_link_shape
+    T, com = shape.T_link_shape, read_only(shape.T_link_shape[:3, 3])
     if shape.size is not None:
         x, y, z = shape.size
         mass = density * x * y * z
         moments = [mass * (u * u + v * v) / 12 for u, v in ((y, z), (x, z), (x, y))]
         own = read_only([[moments[i] if i == j else 0.0 for j in range(3)] for i in range(3)])
-        return MassProperties(mass=mass, com=read_only(T[:3, 3]), inertia=rotate_tensor(T, own))
+        return MassProperties(mass=mass, com=com, inertia=rotate_tensor(T, own))
     r, length = shape.radius, shape.length
     if shape.kind is ShapeKind.SPHERE:
-        return replace(ball(density * 4 / 3 * math.pi * r * r * r, r), com=read_only(T[:3, 3]))
+        return replace(ball(density * 4 / 3 * math.pi * r * r * r, r), com=com)
     mass = density * math.pi * r * r * length
     I_z = mass * r * r / 2
     I_x = mass * (3 * r * r + length * length) / 12
@@ -84,7 +84,7 @@ def of_shape(shape: Shape, density: float) -> MassProperties:
         I_x += 2 * half_ball * (2 / 5 * r * r + length * length / 4 + 3 / 8 * length * r)
         mass += 2 * half_ball
     own = read_only([[I_x, 0, 0], [0, I_x, 0], [0, 0, I_z]])
-    return MassProperties(mass=mass, com=read_only(T[:3, 3]), inertia=rotate_tensor(T, own))
+    return MassProperties(mass=mass, com=com, inertia=rotate_tensor(T, own))
 
 
 def ball(mass: float, radius: float) -> MassProperties:
@@ -102,27 +102,28 @@ def combine(parts: Iterable[MassProperties]) -> MassProperties:
     """Combine rigid bodies that are fixed to each other, all given in one frame (parallel-axis theorem)."""
     parts = tuple(parts)
     mass = math.fsum(part.mass for part in parts)
-    com = [math.fsum(part.mass * float(part.com[i]) for part in parts) / mass for i in range(3)]
-    moved = [
-        shift_inertia(part.inertia, part.mass, [float(part.com[i]) - com[i] for i in range(3)]) for part in parts
+    coms = [part.com.tolist() for part in parts]
+    com = [math.fsum(part.mass * own[i] for part, own in zip(parts, coms, strict=True)) / mass for i in range(3)]
+    tensors = [
+        shifted_inertia(part.inertia, part.mass, [x - c for x, c in zip(part.com.tolist(), com, strict=True)])
+        for part in parts
     ]
-    tensors = [tensor.tolist() for tensor in moved]
     inertia = [[math.fsum(tensor[i][j] for tensor in tensors) for j in range(3)] for i in range(3)]
     least = NOTHING * (inertia[0][0] + inertia[1][1] + inertia[2][2])
     inertia = [[0.0 if abs(inertia[i][j]) < least else inertia[i][j] for j in range(3)] for i in range(3)]
     return MassProperties(mass=mass, com=read_only(com), inertia=read_only(inertia))
 
 
-def shift_inertia(inertia: Array, mass: float, offset: list[float]) -> Array:
+def shifted_inertia(inertia: Array, mass: float, offset: list[float]) -> list[list[float]]:
     """Return the inertia, shape (3, 3), about a point ``offset`` (m) from the centre: I + m (o·o E - o oᵀ)."""
-    square = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]
-    rows = inertia.tolist()
-    return read_only(
-        [
-            [rows[i][j] + mass * ((square if i == j else 0.0) - offset[i] * offset[j]) for j in range(3)]
-            for i in range(3)
-        ]
-    )
+    x, y, z = offset
+    square = x * x + y * y + z * z
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = inertia.tolist()
+    return [
+        [xx + mass * (square - x * x), xy + mass * (0.0 - x * y), xz + mass * (0.0 - x * z)],
+        [yx + mass * (0.0 - y * x), yy + mass * (square - y * y), yz + mass * (0.0 - y * z)],
+        [zx + mass * (0.0 - z * x), zy + mass * (0.0 - z * y), zz + mass * (square - z * z)],
+    ]
 
 
 def is_possible(inertia: Array) -> bool:
@@ -140,17 +141,18 @@ def made_possible(inertia: Array) -> Array:
     of mass, tr(I)/2 E - I, are what must be positive; a multiple of E is added where they are not, no greater than
     it takes.
     """
-    trace = float(inertia[0, 0]) + float(inertia[1, 1]) + float(inertia[2, 2])
+    rows = inertia.tolist()
+    trace = rows[0][0] + rows[1][1] + rows[2][2]
     least = 0.1 * ROUNDING[1] * trace  # readers' own rounding is some thousand times less
     for share in ROUNDING:
         extra = share * trace
         half = (
             0.5 * (trace + extra) - least
         )  # all eigenvalues of what follows are positive: pivots alone do not say so
-        moments = [[(half if i == j else 0.0) - float(inertia[i, j]) for j in range(3)] for i in range(3)]
+        moments = [[(half if i == j else 0.0) - x for j, x in enumerate(row)] for i, row in enumerate(rows)]
         if min(_pivots(moments)) > 0.0:
             return read_only(
-                [[float(inertia[i, j]) + (extra if i == j else 0.0) for j in range(3)] for i in range(3)]
+                [[x + (extra if i == j else 0.0) for j, x in enumerate(row)] for i, row in enumerate(rows)]
             )
     return inertia
 
@@ -186,7 +188,7 @@ def substantial(inertia: Array) -> Array:
     """
     trace = float(inertia[0, 0]) + float(inertia[1, 1]) + float(inertia[2, 2])
     least = max(INERTIA.least, THIN * trace) * (1.0 - 1e-9)  # turned, one that is just enough may be less
-    less = [[float(inertia[i, j]) - (least if i == j else 0.0) for j in range(3)] for i in range(3)]
+    less = [[x - (least if i == j else 0.0) for j, x in enumerate(row)] for i, row in enumerate(inertia.tolist())]
     if min(_pivots(less)) > 0.0:
         return inertia
     return read_only([[float(inertia[i, j]) + (least if i == j else 0.0) for j in range(3)] for i in range(3)])
@@ -231,18 +233,10 @@ def link_inertial(
     estimate = _estimate(link, shapes, anchor)
     estimate = _of_mass(estimate, max(estimate.mass, MIN_MASS) if link.mass is None else link.mass)
     mass, com, inertia = estimate.mass, estimate.com, estimate.inertia
-    in_dh = in_frame(
-        T_link_dh,
-        MassProperties(
-            mass=mass,
-            com=read_only([0, 0, 0]) if link.com is None else link.com,
-            inertia=read_only([[0.0] * 3] * 3) if link.inertia is None else link.inertia,
-        ),
-    )
     if link.com is not None:
-        com = in_dh.com
+        com = read_only(move_point(T_link_dh, link.com))
     if link.inertia is not None:
-        inertia = in_dh.inertia
+        inertia = rotate_tensor(T_link_dh, link.inertia)
     body = MassProperties(mass=mass, com=com, inertia=made_possible(substantial(inertia)))
     return body, tuple(k for k, v in given.items() if v is None)
 

@@ -53,7 +53,7 @@ class Part(Kind):
     number_is: str | None = field(default=None, kw_only=True)
     """The key that a number in place of the mapping is the value of."""
 
-    @property
+    @functools.cached_property
     def keys(self) -> Mapping[str, Kind]:
         """The keys in a file, those of inline parts too."""
         keys = {k: kind for k, kind in _keys(self.of).items() if not isinstance(kind, Internal)}

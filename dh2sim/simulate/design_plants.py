@@ -34,6 +34,8 @@ _SIZES: Final = tuple(
 """Numbers of what a model has."""
 _TREES: Final = ("bvh_child", "bvh_depth", "bvh_nodeid")
 """What MuJoCo has of a model and a batch cannot have of each simulation."""
+Scratch = dict[tuple[int, ...], mujoco.MjData]
+"""Data for computations on models, by the models' sizes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,11 +106,12 @@ class DesignPlants:
         for design in set(made) - set(wanted):
             del made[design]
         problems: list[Problem] = []
+        scratch: Scratch = {}
         for design in dict.fromkeys(wanted):
             if design in made:
                 continue
             try:
-                made[design] = self.make(design)
+                made[design] = self.make(design, scratch)
             except MismatchError as error:
                 raise MismatchError(f"{self.designs.name(design)}: {error}") from None
             except RobotError as error:
@@ -119,8 +122,12 @@ class DesignPlants:
             raise self.designs.error(problems)
         return [made[design] for design in wanted]
 
-    def make(self, design: int) -> DesignPlant:
+    def make(self, design: int, scratch: Scratch | None = None) -> DesignPlant:
         """Make the plant of a design, and compare it with its table.
+
+        Args:
+            design: Its number.
+            scratch: Kept from one design to the next.
 
         Raises:
             Dh2simError: It cannot be simulated.
@@ -129,7 +136,7 @@ class DesignPlants:
         spec = self.designs.spec(design)
         model = build_model(spec)
         plant = compile_plant(self.recipe.text(model), model)
-        compare_with_table(plant, model)
+        compare_with_table(plant, model, {} if scratch is None else scratch)
         configurations = spec.named_configurations
         return DesignPlant(
             plant=plant,
@@ -139,8 +146,13 @@ class DesignPlants:
         )
 
 
-def compare_with_table(plant: Plant, robot: RobotModel) -> None:
+def compare_with_table(plant: Plant, robot: RobotModel, scratch: Scratch) -> None:
     """Compare the poses of all DH frames and tool0 with the table's, at one configuration that is special in nothing.
+
+    Args:
+        plant: Of the robot, compiled.
+        robot: The robot.
+        scratch: Memory of models of the same sizes, which is used again: to get it takes as long as the rest.
 
     Raises:
         MismatchError: They differ by more than rounding.
@@ -149,7 +161,10 @@ def compare_with_table(plant: Plant, robot: RobotModel) -> None:
     lower, upper = robot.travel
     share = np.modf(0.37 + 0.618034 * np.arange(plant.n))[0]
     q = lower + share * (upper - lower)
-    data = mujoco.MjData(model)
+    sizes = _sizes(model)
+    if sizes not in scratch:
+        scratch[sizes] = mujoco.MjData(model)
+    data = scratch[sizes]
     data.qpos[model.nq - plant.n :] = q
     mujoco.mj_kinematics(model, data)
     frames = [*(f"dh_{i}" for i in range(len(spec.rows) + 1)), "tool0"]
@@ -168,9 +183,12 @@ def compare_with_table(plant: Plant, robot: RobotModel) -> None:
 
 
 def _layout(model: mujoco.MjModel, *, as_fields: bool) -> object:
-    sizes = tuple(getattr(model, name) for name in _SIZES)
     heavy = (model.body_mass > 0.0).tobytes()
-    return sizes, heavy, *(getattr(model, name).tobytes() for name in _TREES if as_fields)
+    return _sizes(model), heavy, *(getattr(model, name).tobytes() for name in _TREES if as_fields)
+
+
+def _sizes(model: mujoco.MjModel) -> tuple[int, ...]:
+    return tuple(getattr(model, name) for name in _SIZES)
 
 
 def groups(designs: Iterable[DesignPlant]) -> Iterator[list[int]]:

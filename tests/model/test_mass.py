@@ -10,7 +10,7 @@ from hypothesis import given, settings
 
 from dh2sim.kinematics.transforms import pose_from_rpy, quaternion_from_rotation
 from dh2sim.model.build import build_model
-from dh2sim.model.mass import MassProperties, combine, in_frame, made_possible, of_shape, shift_inertia
+from dh2sim.model.mass import MassProperties, combine, in_frame, made_possible, of_shape, shifted_inertia
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.spec import RobotSpec
@@ -152,7 +152,7 @@ def test_an_inertia_in_another_frame_is_turned_and_moved() -> None:
 
 def test_the_parallel_axis_theorem_equals_a_point_mass_farther_out() -> None:
     offset = [0.3, -0.4, 0.5]
-    found = shift_inertia(read_only(np.zeros((3, 3))), 2.0, offset)
+    found = shifted_inertia(read_only(np.zeros((3, 3))), 2.0, offset)
     cross = np.array([[0, -0.5, -0.4], [0.5, 0, -0.3], [0.4, 0.3, 0]])
     np.testing.assert_allclose(found, 2.0 * cross.T @ cross, rtol=0, atol=1e-15)
 

@@ -8,6 +8,9 @@ is enough. A body that has no mass is placed exactly, so such a site gets one of
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from functools import lru_cache
+
+import numpy as np
 
 from dh2sim.formats.xml_write import child, numbers
 from dh2sim.kinematics.transforms import identity, quaternion_from_rotation, rotate_tensor
@@ -22,7 +25,12 @@ NOISE = 1e-15
 
 def placed(T: Array) -> dict[str, str]:
     """Return the attributes of an element with pose ``T``, shape (4, 4), in its body."""
-    return {"pos": numbers(T[:3, 3]), "quat": numbers(quaternion_from_rotation(T[:3, :3]))}
+    return {"pos": numbers(T[:3, 3].tolist()), "quat": _quaternion(T[:3, :3].tobytes())}
+
+
+@lru_cache(maxsize=1024)  # robots that differ in lengths have the same orientations
+def _quaternion(rotation: bytes) -> str:
+    return numbers(quaternion_from_rotation(np.frombuffer(rotation).reshape(3, 3)).tolist())
 
 
 def add_site(body: ET.Element, name: str, T: Array, inertial: MassProperties | None) -> None:

@@ -112,7 +112,8 @@ def to_mjcf(model: ModelLike, options: MjcfOptions = EXPORTED) -> str:
     add_contact(mujoco, model)
     add_actuators(mujoco, model)
     add_sensors(mujoco, model)
-    add_keyframes(mujoco, model, floating_base=options.floating_base)
+    if options.keyframes:
+        add_keyframes(mujoco, model, floating_base=options.floating_base)
     return document(mujoco, provenance(model))
 
 
@@ -216,12 +217,12 @@ def add_inertial(body: ET.Element, properties: MassProperties | None) -> None:
     if properties is None:  # without this MuJoCo takes the body's place in its parent for its principal frame
         child(body, "inertial", pos=numbers([0, 0, 0]), mass=number(0), diaginertia=numbers([0, 0, 0]))
         return
-    I = properties.inertia  # noqa: E741
-    inertial = child(body, "inertial", pos=numbers(properties.com), mass=number(properties.mass))
-    if I[0, 1] == I[0, 2] == I[1, 2] == 0.0:
-        inertial.set("diaginertia", numbers([I[0, 0], I[1, 1], I[2, 2]]))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = properties.inertia.tolist()
+    inertial = child(body, "inertial", pos=numbers(properties.com.tolist()), mass=number(properties.mass))
+    if xy == xz == yz == 0.0:
+        inertial.set("diaginertia", numbers([xx, yy, zz]))
     else:
-        inertial.set("fullinertia", numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]))
+        inertial.set("fullinertia", numbers([xx, yy, zz, xy, xz, yz]))
 
 
 def add_joint(body: ET.Element, joint: JointModel, reference: float = 0.0) -> None:
