@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dh2sim.compare.fitting import Fit, ToolResidual, best_fit, joint_samples, measured
+from dh2sim.compare.fitting import Fit, ToolResidual, any_fit, best_fit, joint_samples, measured
 from dh2sim.compare.geometry import LABELS, Difference, first_difference
 from dh2sim.compare.inputs import PLAINLY, ReadRobot, read_any
-from dh2sim.compare.matching import Correspondence, Obstacle, ObstacleKind
+from dh2sim.compare.matching import MARGIN, Correspondence, Obstacle, ObstacleKind, correspondences
 from dh2sim.compare.misreadings import Misreading, misreadings
 from dh2sim.compare.quantities import JointPair, QuantityDifference, quantity_differences
 from dh2sim.compare.screws import ScrewAxes, axes_of
@@ -267,7 +267,9 @@ def compared(a: ReadRobot, b: ReadRobot, tolerance: float, labels: tuple[str, st
         tolerance=tolerance,
         equivalence=None,
         difference=(
-            first_difference(of_a, of_b, fit, tolerance, labels) if isinstance(fit, Obstacle) else _sum(fit.residual)
+            first_difference(of_a, of_b, fit, tolerance, labels)
+            if isinstance(fit, Obstacle)
+            else _sum(of_a, of_b, fit.residual, tolerance, labels)
         ),
         same_at=_same_at(a.spec, b.spec, of_a, of_b, tolerance),
         misreadings=misreadings(a.spec, b.spec, tolerance),
@@ -276,11 +278,18 @@ def compared(a: ReadRobot, b: ReadRobot, tolerance: float, labels: tuple[str, st
     )
 
 
-def _sum(residual: ToolResidual) -> Difference:
+def _sum(a: ScrewAxes, b: ScrewAxes, residual: ToolResidual, tolerance: float, labels: tuple[str, str]) -> Difference:
+    """Return the difference of mechanisms none of whose numbers is far off by itself, with the first that is off."""
     text = (
         f"number by number they nearly agree, but tool0 is up to {millimetres(residual.position)} and "
         f"{degrees(residual.rotation)} off"
     )
+    closer = tolerance / MARGIN
+    found = correspondences(a, b, closer)
+    if isinstance(found, Obstacle):
+        first = first_difference(a, b, found, closer, labels)
+        if first.a is not None and first.b is not None and first.a != first.b:
+            return replace(first, kind=ObstacleKind.SUM, sentence=f"{text}: {first.sentence}")
     return Difference(kind=ObstacleKind.SUM, joints=(), a=None, b=None, sentence=text)
 
 
@@ -345,8 +354,8 @@ def _tidied(way: Correspondence, turns: tuple[bool, ...]) -> Correspondence:
 def _same_at(a: RobotSpec, b: RobotSpec, of_a: ScrewAxes, of_b: ScrewAxes, tolerance: float) -> float | None:
     for looser in _LOOSER:
         if looser > tolerance:
-            fit = best_fit(of_a, of_b, looser)
-            if isinstance(fit, Fit) and fit.good:
+            fit = any_fit(of_a, of_b, looser)
+            if fit is not None:
                 same = _equivalence(a, b, of_a, of_b, fit, looser)
                 if same is not None:
                     return max(same.residual.rotation, same.residual.position / max(1.0, of_a.reach, of_b.reach))

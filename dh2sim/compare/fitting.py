@@ -8,7 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dh2sim.compare.matching import Correspondence, Obstacle, ObstacleKind, correspondences
+from dh2sim.compare.matching import (
+    Correspondence,
+    Obstacle,
+    ObstacleKind,
+    correspondences,
+    some_correspondences,
+)
 from dh2sim.compare.screws import ScrewAxes
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint, serial_link_poses
@@ -68,7 +74,9 @@ def best_fit(a: ScrewAxes, b: ScrewAxes, tolerance: float) -> Fit | Obstacle:
     """
     first: Fit | Obstacle | None = None
     for order in _orders(b):
-        found = _fit_in_order(a, _reordered(b, order), order, tolerance)
+        ordered = _reordered(b, order)
+        ways = correspondences(a, ordered, tolerance)
+        found = ways if isinstance(ways, Obstacle) else _best_of(ways, a, ordered, order, tolerance)
         if isinstance(found, Fit) and found.good:
             return found
         if first is None:
@@ -77,6 +85,19 @@ def best_fit(a: ScrewAxes, b: ScrewAxes, tolerance: float) -> Fit | Obstacle:
             break
     assert first is not None
     return first
+
+
+def any_fit(a: ScrewAxes, b: ScrewAxes, tolerance: float) -> Fit | None:
+    """Return a correspondence of two mechanisms within a tolerance, or None; not the simplest one.
+
+    Arguments are those of ``best_fit``, which takes longer.
+    """
+    for order in _orders(b):
+        ordered = _reordered(b, order)
+        ways = some_correspondences(a, ordered, tolerance, _MOST_TRIED)
+        if ways and (found := _best_of(ways, a, ordered, order, tolerance)).good:
+            return found
+    return None
 
 
 def measured(
@@ -104,10 +125,8 @@ def joint_samples(axes: ScrewAxes, count: int) -> Array:
     return scattered_configurations(-bound, bound, count)
 
 
-def _fit_in_order(a: ScrewAxes, b: ScrewAxes, order: tuple[int, ...], tolerance: float) -> Fit | Obstacle:
-    ways = correspondences(a, b, tolerance)
-    if isinstance(ways, Obstacle):
-        return ways
+def _best_of(ways: list[Correspondence], a: ScrewAxes, b: ScrewAxes, order: tuple[int, ...], tolerance: float) -> Fit:
+    """Return the first of several correspondences that is good once it is refined, else the first of all."""
     reach = max(a.reach, b.reach)
     chain_a, chain_b = _as_chain(a), _as_chain(b)
     q = joint_samples(a, _CONFIGURATIONS)
@@ -143,12 +162,12 @@ def _as_chain(axes: ScrewAxes) -> SerialChain:
 
 
 def _refined(way: Correspondence, chain_b: SerialChain, poses: Array, q: Array, size: float) -> Correspondence:
-    """Return the correspondence with zeros, base and tool moved to where the poses differ least (Gauss-Newton).
+    """Return the correspondence with zeros, base and tool moved to where the poses differ least.
 
     What is free stays where it is: steps have least norm.
     """
     zeros, T_base, T_tool = way.zeros.copy(), way.T_base.copy(), way.T_tool.copy()
-    n = chain_b.n
+    n, before = chain_b.n, np.inf
     for _ in range(_ROUNDS):
         links = serial_link_poses(chain_b, q * way.senses + zeros)
         wanted = T_base @ poses @ T_tool
@@ -172,7 +191,18 @@ def _refined(way: Correspondence, chain_b: SerialChain, poses: Array, q: Array, 
         )
         matrix[:, :3] /= size
         error[:, :3] /= size
-        step = np.linalg.lstsq(matrix.reshape(-1, n + 12), error.reshape(-1), rcond=1e-9)[0]
+        left = float(np.linalg.norm(error))
+        if left > 0.9 * before:
+            break
+        before = left
+        # what is nearly free, as turns about nearly parallel axes are, would make great steps to fit noise: damped by
+        # the residual, by which convergence stays quadratic (J. Fan, Y. Yuan, Computing 74, 2005)
+        damping = left * np.eye(n + 12)
+        step = np.linalg.lstsq(
+            np.concatenate([matrix.reshape(-1, n + 12), damping]),
+            np.concatenate([error.reshape(-1), np.zeros(n + 12)]),
+            rcond=1e-9,
+        )[0]
         zeros += step[:n]
         T_base = _moved(step[n : n + 6]) @ T_base
         T_tool = T_tool @ _moved(step[n + 6 :])

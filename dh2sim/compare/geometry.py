@@ -14,7 +14,7 @@ import numpy as np
 
 from dh2sim.compare.matching import Obstacle, ObstacleKind
 from dh2sim.compare.screws import ScrewAxes
-from dh2sim.compare.words import degrees, millimetres
+from dh2sim.compare.words import degrees, millimetres, told_apart
 from dh2sim.typing import Array
 
 LABELS = ("A", "B")
@@ -120,9 +120,10 @@ def _twist(a: ScrewAxes, b: ScrewAxes, i: int, k: int, tolerance: float, labels:
         for first in range(i, last):
             x, y = (_angle_between(axes.directions[first], axes.directions[last]) for axes in (a, b))
             if abs(x - y) > tolerance:
+                in_a, in_b = told_apart(degrees, x, y)
                 text = (
-                    f"the axes of {a.names[first]} and {a.names[last]} are {degrees(x)} apart in {labels[0]}, "
-                    f"{degrees(y)} in {labels[1]}"
+                    f"the axes of {a.names[first]} and {a.names[last]} are {in_a} apart in {labels[0]}, "
+                    f"{in_b} in {labels[1]}"
                 )
                 return Difference(
                     kind=ObstacleKind.TWIST, joints=(a.names[first], a.names[last]), a=x, b=y, sentence=text
@@ -136,10 +137,8 @@ def _distance(a: ScrewAxes, b: ScrewAxes, i: int, k: int, tolerance: float, labe
     x, y = (_across(axes, i, k) for axes in (a, b))
     names = (a.names[i], a.names[k])
     if abs(x - y) > tolerance:
-        text = (
-            f"the axes of {names[0]} and {names[1]} are {millimetres(x)} apart in {labels[0]}, "
-            f"{millimetres(y)} in {labels[1]}"
-        )
+        in_a, in_b = told_apart(millimetres, x, y)
+        text = f"the axes of {names[0]} and {names[1]} are {in_a} apart in {labels[0]}, {in_b} in {labels[1]}"
         return Difference(kind=ObstacleKind.DISTANCE, joints=names, a=x, b=y, sentence=text)
     text = (
         f"the axes of {names[0]} and {names[1]} are {millimetres(x)} apart in both, but twisted the other way in "
@@ -154,9 +153,10 @@ def _offset(a: ScrewAxes, b: ScrewAxes, i: int, tolerance: float, labels: tuple[
     for joint in range(i + 1):
         x, y = of_a[joint].offset, of_b[joint].offset
         if x is not None and y is not None and abs(x - y) > tolerance:
+            in_a, in_b = told_apart(millimetres, x, y)
             text = (
-                f"along the axis of {a.names[joint]}, its two common normals are {millimetres(x)} apart in "
-                f"{labels[0]}, {millimetres(y)} in {labels[1]}"
+                f"along the axis of {a.names[joint]}, its two common normals are {in_a} apart in {labels[0]}, "
+                f"{in_b} in {labels[1]}"
             )
             return Difference(kind=ObstacleKind.OFFSET, joints=(a.names[joint],), a=x, b=y, sentence=text)
     x = of_a[i].offset

@@ -31,7 +31,7 @@ MOST_HYPOTHESES = 256
 """Followed at a time; senses are left open by axes that meet at right angles, two ways for each."""
 _MOST_READ = 32
 """Hypotheses of which zeros, base and tool are computed: those with the fewest joints that turn the other way."""
-_MARGIN = 10.0
+MARGIN = 10.0
 """By which what is found on the way may be further off than the tolerance."""
 _SURE = 1e-7
 """Sine below which directions are taken for parallel, at any tolerance."""
@@ -140,10 +140,33 @@ def correspondences(a: ScrewAxes, b: ScrewAxes, tolerance: float) -> list[Corres
     return sorted(ways, key=lambda way: _cost(way, matcher))
 
 
+def some_correspondences(a: ScrewAxes, b: ScrewAxes, tolerance: float, count: int) -> list[Correspondence]:
+    """Return a few of the ways to make B out of A, whichever are found first; arguments as for ``correspondences``.
+
+    Depth first, which is quick where axes leave many senses open.
+    """
+    if a.turns != b.turns:
+        return []
+    matcher = _Matcher(a, b, tolerance)
+    nothing = _Hypothesis(senses=[], rotations=[], gaps=[], shifts=np.zeros(a.n))
+    left = MOST_HYPOTHESES * len(matcher.groups)
+
+    def completed(hypothesis: _Hypothesis, index: int) -> Iterator[_Hypothesis]:
+        nonlocal left
+        if index == len(matcher.groups):
+            yield hypothesis
+        elif left > 0:
+            left -= 1
+            for longer in matcher.extended([hypothesis], index)[0]:
+                yield from completed(longer, index + 1)
+
+    return [next(matcher.ways(found)) for found in itertools.islice(completed(nothing, 0), count)]
+
+
 class _Matcher:
     def __init__(self, a: ScrewAxes, b: ScrewAxes, tolerance: float) -> None:
         self.a, self.b = a, b
-        self.angle = _MARGIN * tolerance + 1e-12
+        self.angle = MARGIN * tolerance + 1e-12
         self.size = max(1.0, a.reach, b.reach)
         self.length = self.angle * self.size
         self.parallel = max(_SURE, self.angle)

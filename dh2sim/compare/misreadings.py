@@ -13,9 +13,9 @@ from enum import StrEnum
 from itertools import combinations
 from typing import Any
 
-from dh2sim.compare.fitting import Fit, best_fit
+from dh2sim.compare.fitting import any_fit
 from dh2sim.compare.screws import ScrewAxes, axes_of, axes_of_rows, joint_lines
-from dh2sim.compare.words import degrees, millimetres
+from dh2sim.compare.words import degrees, millimetres, told_apart
 from dh2sim.kinematics.transforms import identity
 from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
 
@@ -134,8 +134,8 @@ class _Target:
             if abs(ours[2] - theirs[2]) > _LEVER * far:  # NaN where there is none
                 return None
         axes = axes_of_rows(rows, identity(), identity())
-        fit = best_fit(axes, self._axes, self._tolerance)
-        if not (isinstance(fit, Fit) and fit.good):
+        fit = any_fit(axes, self._axes, self._tolerance)
+        if fit is None:
             return None
         return max(fit.residual.rotation, fit.residual.position / max(1.0, axes.reach, self._axes.reach))
 
@@ -416,7 +416,8 @@ def _values(a: tuple[Row, ...], b: tuple[Row, ...]) -> Iterator[_Edit]:
             right, wrong = getattr(row, column), getattr(other, column)
             if right != wrong:
                 edited = [*a[:i], _with(row, column, wrong), *a[i + 1 :]]
-                text = f"{column} of row {i + 1} is {_value_text(column, wrong)}, not {_value_text(column, right)}"
+                is_now, was = told_apart(millimetres if column in _LENGTHS else degrees, wrong, right)
+                text = f"{column} of row {i + 1} is {is_now}, not {was}"
                 yield _edit(edited, MisreadingKind.VALUE, (i,), (column,), text)
 
 

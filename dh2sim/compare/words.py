@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -14,20 +15,29 @@ _NOTHING = 1e-10
 """rad and m that are not worth a word."""
 
 
-def number(value: float) -> str:
-    """Return a number with as many digits as it needs, at most six."""
-    text = f"{value:.{_DIGITS}g}"
+def number(value: float, digits: int = _DIGITS) -> str:
+    """Return a number with as many digits as it needs, at most six unless ``digits`` says otherwise."""
+    text = f"{value:.{digits}g}"
     return "0" if text == "-0" else text
 
 
-def degrees(angle: float) -> str:
+def degrees(angle: float, digits: int = _DIGITS) -> str:
     """Return an angle, rad, as ``90°``."""
-    return f"{number(0.0 if abs(angle) < _NOTHING else math.degrees(angle))}°"
+    return f"{number(0.0 if abs(angle) < _NOTHING else math.degrees(angle), digits)}°"
 
 
-def millimetres(length: float) -> str:
+def millimetres(length: float, digits: int = _DIGITS) -> str:
     """Return a length, m, as ``431.8 mm``."""
-    return f"{number(0.0 if abs(length) < _NOTHING else 1000.0 * length)} mm"
+    return f"{number(0.0 if abs(length) < _NOTHING else 1000.0 * length, digits)} mm"
+
+
+def told_apart(write: Callable[[float, int], str], x: float, y: float) -> tuple[str, str]:
+    """Return two values as ``degrees`` or ``millimetres`` writes them, with the digits by which they differ."""
+    for digits in range(_DIGITS, 17):
+        texts = write(x, digits), write(y, digits)
+        if texts[0] != texts[1]:
+            break
+    return texts
 
 
 def rotation_text(R: Array, smallest: float = _NOTHING) -> str:

@@ -108,6 +108,33 @@ def test_robots_that_differ_by_little_are_the_same_at_the_tolerance_that_is_name
     assert not diff(a, b, tolerance=0.5 * found.same_at).same
 
 
+@pytest.mark.parametrize("name", ["ur5e", "stanford", "kuka_iiwa14"])
+def test_robots_all_of_whose_numbers_are_slightly_off_are_the_same_to_about_that_tolerance(name: str) -> None:
+    """Parallel and intersecting axes, whose common normals turn anywhere when they are slightly off."""
+    a = robot(name)
+    rng = np.random.default_rng(0)
+    rows = [
+        replace(each, **{key: getattr(each, key) + 1e-5 * rng.normal() for key in ("a", "alpha", "d")})
+        for each in a.rows
+    ]
+    b = replace(a, rows=tuple(rows), source_file=None)
+    assert diff(a, b, tolerance=1e-4).same
+
+
+def test_where_no_number_is_far_off_by_itself_the_first_that_is_off_is_named() -> None:
+    a = robot("planar_2r")
+    b = edited(a, 0, a=a.rows[0].a + 4e-6)
+    found = diff(a, b)
+    assert found.difference is not None
+    assert found.difference.kind is ObstacleKind.SUM
+    assert found.difference.joints == ("joint_1", "joint_2")
+    assert found.difference.sentence.startswith("number by number they nearly agree, but tool0 is up to 0.004")
+    assert found.difference.sentence.endswith(
+        "the axes of joint_1 and joint_2 are 1000 mm apart in A, 1000.004 mm in B"
+    )
+    assert "a of row 1 is 1000.004 mm, not 1000 mm" in found.misreadings[0].sentence
+
+
 def test_a_robot_with_fixed_rows_flips_and_all_conventions_is_itself_in_another_place() -> None:
     b = replace(ODD_ROBOT, base=replace(ODD_ROBOT.base, pose=Pose(xyz=np.array([1.0, 2.0, 3.0]))))
     same = dh2sim.Robot.from_spec(ODD_ROBOT).diff(b).equivalence
