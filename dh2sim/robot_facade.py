@@ -95,7 +95,7 @@ class Robot:
         Args:
             rows: The DH table, base first.
             name: Letters, digits, '_' and '-', starting with a letter; names the exported files.
-            convention: Of rows that name none: 'standard', 'modified' or 'hayati'.
+            convention: 'standard', 'modified' or 'hayati', of rows that give none.
             base: Pose of DH frame 0 in base_link.
             tool: Pose of tool0 in DH frame n; a :class:`ToolSpec` has mass, inertia and looks too.
             payload: What the arm is to carry besides, for the limits and gains that are left open; a number is its
@@ -145,6 +145,11 @@ class Robot:
         return robot
 
     @classmethod
+    def of_model(cls, model: RobotModel) -> Self:
+        """Return the robot of a model."""
+        return cls.from_spec(model.spec)
+
+    @classmethod
     def load(cls, path_or_name: FilePath) -> Self:
         """Read a robot file, or a robot that comes with dh2sim; a path that exists wins.
 
@@ -178,13 +183,13 @@ class Robot:
             path: The file.
             base: Link that becomes base_link; by default the root.
             tip: Link that becomes tool0; by default where the arm ends.
-            convention: Of the table: 'standard' or 'modified'.
+            convention: Convention of the table: 'standard' or 'modified'.
             tolerance: Greatest residual, rad, and m for a reach of up to 1 m, then of the reach; numbers within it of
                 a simple one are made simple.
             package_paths: Folders, or a folder, in which ``package://`` is looked for first.
             root: Folder outside of which a xacro file includes no file; by default the file's own.
             arguments: Values of a xacro file's arguments, by name.
-            name: Of the robot, instead of the file's.
+            name: Name of the robot, instead of the file's.
 
         Raises:
             Dh2simError: The file is wrong or holds no serial arm; the text says what and where.
@@ -234,12 +239,12 @@ class Robot:
 
         Args:
             path: The file.
-            convention: Of the table, where it does not say: 'standard' or 'modified'.
-            angle: Unit of its angles, where it does not say: 'deg' or 'rad'.
-            length: Unit of its lengths, where it does not say: 'm', 'mm', 'cm' or 'in'.
+            convention: 'standard' or 'modified', for a table that does not say.
+            angle: Unit of angles, 'deg' or 'rad', for a table that does not say.
+            length: Unit of lengths, 'm', 'mm', 'cm' or 'in', for a table that does not say.
             table: Number of the table, from 1, where the file has several; by default the first.
             tolerance: Numbers within it of a simple one are made simple, rad and m, if it is above the default.
-            name: Of the robot, instead of the file's.
+            name: Name of the robot, instead of the file's.
 
         Raises:
             Dh2simError: The table is wrong or says too little; the text says what and where.
@@ -264,9 +269,9 @@ class Robot:
             path: The file.
             nominal: The robot that it is of, a robot file, or the name of one that comes with dh2sim: gives limits,
                 masses, names; a calibration.conf holds only what is to be added to its table.
-            convention: Of the table: 'standard' or 'modified'; by default the nominal robot's.
+            convention: Convention of the table, 'standard' or 'modified'; by default the nominal robot's.
             tolerance: Greatest residual, rad, and m for a reach of up to 1 m, then of the reach.
-            name: Of the robot.
+            name: Name of the robot.
 
         Raises:
             Dh2simError: The file is wrong, or is another robot's; the text says what and where.
@@ -299,22 +304,14 @@ class Robot:
 
     @cached_property
     def model(self) -> RobotModel:
-        """The robot with shapes, masses, limits and actuators; what was estimated or assumed is marked.
-
-        Raises:
-            MeshError: A mesh file cannot be used.
-        """
+        """The robot with shapes, masses, limits and actuators; what was estimated or assumed is marked."""
         from dh2sim.model.build import build_model
 
         return build_model(self.spec)
 
     @cached_property
     def mechanism(self) -> MechanismModel:
-        """A mechanism with shapes, masses, limits and actuators, its loops closed.
-
-        Raises:
-            MeshError: A mesh file cannot be used.
-        """
+        """A mechanism with shapes, masses, limits and actuators, its loops closed."""
         from dh2sim.model.mechanism import build_mechanism
 
         return build_mechanism(self.spec)
@@ -335,21 +332,14 @@ class Robot:
         ranges = [joint.position_range or (-np.inf, np.inf) for joint in self.model.moving_joints]
         return read_only([lower for lower, _ in ranges]), read_only([upper for _, upper in ranges])
 
-    def slips(self) -> tuple[Slip, ...]:
-        """Return numbers that are allowed but rarely meant, such as degrees in a file of radians."""
-        from dh2sim.model.slips import find_slips
-
-        return find_slips(self.model)
-
     def fk(self, q: ArrayLike, frame: str = "tool0", **options: Unpack[BatchOptions]) -> Array:
         """Return the pose of a frame in base_link.
 
         Args:
-            q: Joint vectors, rad and m, shape (..., n); or the name of a configuration. Of a mechanism with closed
-                loops: one vector, of all joints or of the driven ones, which the others are moved by from the
-                assembly.
+            q: Joint vectors, rad and m, shape (..., n); or the name of a configuration. Of a mechanism one vector,
+                of all joints or of the driven ones, which move the others from the assembly.
             frame: tool0, base_link, dh_0 … dh_n or link_1 … link_n; rocker/dh_1 … of a branch.
-            **options: ``out=`` takes the result; ``rows=3`` leaves out 0 0 0 1; ``threads=`` for large batches, 0 for
+            **options: ``out`` takes the result; ``rows=3`` leaves out 0 0 0 1; ``threads`` for large batches, 0 for
                 all processors; ``backend="numba"`` for compiled code.
 
         Returns:
@@ -377,8 +367,7 @@ class Robot:
             **options: ``out``, ``threads`` and ``backend``, as for :meth:`fk`.
 
         Returns:
-            Shape (..., 6, n): rows 0-2 linear, rows 3-5 angular. Of a mechanism (6, k) at one configuration: the
-            columns are its driven joints, and the passive ones follow.
+            Shape (..., 6, n): rows 0-2 linear, rows 3-5 angular. Of a mechanism (6, k), for its k driven joints.
 
         Raises:
             ConfigurationError: ``q`` has the wrong shape, or something in it is not finite; or an option is wrong.
@@ -393,63 +382,26 @@ class Robot:
 
         return geometric_jacobian(self.chain, self._vectors(q), frame=frame, **options)
 
-    def mobility(self) -> Mobility:
-        """Count the degrees of freedom, and find out by rank and by walking along the loops what they are.
-
-        Raises:
-            AssemblyError: Loops cannot be closed.
-        """
-        from dh2sim.mobility.robot_mechanism import find_mobility
-
-        return find_mobility(self.spec)
-
-    def diff(self, other: SpecLike | FilePath, *, tolerance: float = 1e-6) -> Comparison:
-        """Compare the robot with another: the same mechanism, or which misreading of the table explains it.
-
-        Args:
-            other: A robot, a file of any kind that dh2sim reads, or the name of a robot that comes with dh2sim.
-            tolerance: Greatest difference of tool0, rad, and m for a reach of up to 1 m, then of the reach.
-
-        Raises:
-            Dh2simError: The file is wrong, or one of the robots has closed loops or branches.
-        """
-        from dh2sim.compare.comparison import diff
-
-        return diff(self, other, tolerance=tolerance)
-
-    def symbolic(self, what: What | str = "pose", **options: Unpack[SymbolicKeywords]) -> SymbolicForm:
-        """Return the robot's kinematics or dynamics in symbols, compared with numbers; ``print`` shows it.
-
-        Args:
-            what: 'pose', 'matrices', 'jacobian' or 'dynamics'.
-            **options: As for :func:`dh2sim.symbolic_form`: ``source``, ``target``, ``style``, ``lengths``, ``names``,
-                ``numbers``, ``letters``, ``fold``, ``joint_names``.
-
-        Raises:
-            Dh2simError: An argument has a value that is not allowed, or the robot is too large for what is asked.
-        """
-        from dh2sim.symbolic.request import symbolic_form
-
-        in_numbers = what == "dynamics" and not options.get("letters")
-        return symbolic_form(self.spec, what, bodies=self.model.bodies if in_numbers else None, **options)
-
     def singular_values(self, q: ArrayLike, frame: str = "tool0") -> Array:
-        """Return the singular values of the geometric Jacobian, largest first, shape (..., min(6, n)).
-
-        The arguments and errors are those of :meth:`jacobian`.
-        """
+        """Return the singular values of :meth:`jacobian`, largest first, shape (..., min(6, n))."""
         from dh2sim.kinematics.singularity import singular_values
 
         return singular_values(self.jacobian(q, frame))
 
     def manipulability(self, q: ArrayLike, frame: str = "tool0") -> Array:
-        """Return the product of the singular values, Yoshikawa's measure, shape (...); zero in a singularity.
-
-        The arguments and errors are those of :meth:`jacobian`.
-        """
+        """Return Yoshikawa's measure, the product of :meth:`singular_values`, shape (...); zero in a singularity."""
         from dh2sim.kinematics.singularity import manipulability
 
         return manipulability(self.jacobian(q, frame))
+
+    def random_configurations(self, count: int, *, seed: int = 0) -> Array:
+        """Draw joint vectors between the limits, ±π for continuous joints; rad and m, shape (count, n)."""
+        from dh2sim.kinematics.sampling import random_configurations
+
+        return random_configurations(*self.model.travel, count, seed)
+
+    def _vectors(self, q: ArrayLike) -> ArrayLike:
+        return self.spec.configuration(q) if isinstance(q, str) else q
 
     def ik(
         self,
@@ -486,26 +438,21 @@ class Robot:
         near = None if q0 is None else self._vectors(q0)
         return inverse_kinematics(self, T, near, limits, lock, free, numeric)
 
-    def trajectory(self, waypoints: Iterable[Any], **options: Unpack[TrajectoryKeywords]) -> Trajectory:
-        """Plan a motion through waypoints, from rest to rest, that keeps all limits.
+    def explain_ik(self, T: ArrayLike) -> Explanation:
+        """Derive the configurations that reach a pose as a textbook does, in steps with the numbers.
 
         Args:
-            waypoints: At least two: names of configurations, joint vectors (n,), poses of tool0 in base_link (4, 4),
-                or mappings with the keys of a waypoint file, in rad and m.
-            **options: As for :func:`dh2sim.plan_trajectory`: ``kind`` ('joint', 'line' or 'arc'), ``profile``
-                ('quintic', 'trapezoid', 'jerk' or 'optimal'), ``duration``, ``limits``, ``through``, ``free``.
+            T: Pose of tool0 in base_link, shape (4, 4).
 
         Returns:
-            The :class:`Trajectory`: ``at(t)`` gives positions, velocities, accelerations and jerks, ``save`` writes
-            samples.
+            The :class:`Explanation`: it prints as text, and is false where textbooks have no closed form for the arm.
 
         Raises:
-            SettingsError: Waypoints or options are wrong.
-            TrajectoryError: There is no such trajectory; the text says where and why.
+            ConfigurationError: ``T`` is not a pose.
         """
-        from dh2sim.trajectory.plan import plan_trajectory
+        from dh2sim.inverse.textbook import explain_inverse_kinematics
 
-        return plan_trajectory(self.model, waypoints, **options)
+        return explain_inverse_kinematics(self, T)
 
     def workspace(self, **options: Unpack[WorkspaceKeywords]) -> Workspace:
         """Find what a frame's origin reaches inside the limits.
@@ -527,30 +474,74 @@ class Robot:
 
         return compute_workspace(self.model, **options)
 
-    def explain_ik(self, T: ArrayLike) -> Explanation:
-        """Derive the configurations that reach a pose as a textbook does, in steps with the numbers.
-
-        Args:
-            T: Pose of tool0 in base_link, shape (4, 4).
-
-        Returns:
-            The :class:`Explanation`: it prints as text, and is false where textbooks have no closed form for the arm.
+    def mobility(self) -> Mobility:
+        """Count the degrees of freedom, and find out by rank and by walking along the loops what they are.
 
         Raises:
-            ConfigurationError: ``T`` is not a pose.
+            AssemblyError: Loops cannot be closed.
         """
-        from dh2sim.inverse.textbook import explain_inverse_kinematics
+        from dh2sim.mobility.robot_mechanism import find_mobility
 
-        return explain_inverse_kinematics(self, T)
+        return find_mobility(self.spec)
 
-    def _vectors(self, q: ArrayLike) -> ArrayLike:
-        return self.spec.configuration(q) if isinstance(q, str) else q
+    def convert(self, convention: Convention | str) -> Self:
+        """Return the same arm with its table in another convention, 'standard' or 'modified', or 'compact'.
 
-    def random_configurations(self, count: int, *, seed: int = 0) -> Array:
-        """Draw joint vectors between the limits, ±π for continuous joints; rad and m, shape (count, n)."""
-        from dh2sim.kinematics.sampling import random_configurations
+        A compact table has every frame within reach of the arm; ``notes`` says which rows changed, and why.
 
-        return random_configurations(*self.model.travel, count, seed)
+        Raises:
+            Dh2simError: The poses of tool0 would differ by more than rounding.
+        """
+        from dh2sim.importing.convert import convert_robot
+
+        converted = convert_robot(self.spec, convention)
+        return self.from_spec(converted.spec, notes=converted.notes)
+
+    def save(self, path: FilePath, *, overwrite: bool = False) -> None:
+        """Write a robot file that ``load`` reads as the same robot; parameters become the numbers that they gave.
+
+        It is in the units of the file that the robot was read from, or else in deg and m.
+
+        Raises:
+            OutputError: There is a file already, or it cannot be written.
+        """
+        from dh2sim.robot.write import save_robot
+
+        save_robot(self.spec, path, notes=self.notes, overwrite=overwrite)
+
+    def symbolic(self, what: What | str = "pose", **options: Unpack[SymbolicKeywords]) -> SymbolicForm:
+        """Return the robot's kinematics or dynamics in symbols, compared with numbers; ``print`` shows it.
+
+        Args:
+            what: 'pose', 'matrices', 'jacobian' or 'dynamics'.
+            **options: As for :func:`dh2sim.symbolic_form`: ``source``, ``target``, ``style``, ``lengths``, ``names``,
+                ``numbers``, ``letters``, ``fold``, ``joint_names``.
+
+        Raises:
+            Dh2simError: An argument has a value that is not allowed, or the robot is too large for what is asked.
+        """
+        from dh2sim.symbolic.request import symbolic_form
+
+        in_numbers = what == "dynamics" and not options.get("letters")
+        return symbolic_form(self.spec, what, bodies=self.model.bodies if in_numbers else None, **options)
+
+    def code(
+        self, language: Language | str = "python", what: str | Iterable[str] = "pose", *, name: str | None = None
+    ) -> str:
+        """Return code for the robot's kinematics and dynamics, in one file that needs no other; rad and m.
+
+        Args:
+            language: 'python', 'numpy', 'c', 'cpp', 'matlab' or 'javascript'.
+            what: 'pose' of tool0 in base_link, its 'jacobian', 'inverse-dynamics', or several of them.
+            name: Begins the names of functions in C, is the namespace in C++ and the function's name in MATLAB; by
+                default the robot's name.
+
+        Raises:
+            Dh2simError: There is no such language or code; or the code differs from the table.
+        """
+        from dh2sim.codegen.generate import generate_code
+
+        return generate_code(self, what, language, name=name)
 
     def urdf(self, *, dh_frames: bool = True) -> str:
         """Return the URDF; with ``dh_frames`` it has a link for every DH frame. Meshes are written by ``export``."""
@@ -609,6 +600,12 @@ class Robot:
         wanted = list(dict.fromkeys(member(Format, format_, "format") for format_ in formats))
         return export_robot(self._written, Path(out), formats=wanted, dh_frames=dh_frames, verified=verify)
 
+    def slips(self) -> tuple[Slip, ...]:
+        """Return numbers that are allowed but rarely meant, such as degrees in a file of radians."""
+        from dh2sim.model.slips import find_slips
+
+        return find_slips(self.model)
+
     def validate(
         self,
         *,
@@ -623,7 +620,7 @@ class Robot:
 
         Args:
             samples: Number of random configurations inside the limits.
-            seed: Of the configurations.
+            seed: Seed of the random number generator.
             tolerance: Allowed angle, rad, and distance as a share of max(1 m, reach).
             source: URDF or MJCF that the robot was imported from, to compare its masses with.
             base: Link of the source that became base_link; by default the root.
@@ -643,23 +640,40 @@ class Robot:
             self._written, samples=samples, seed=seed, tolerance=tolerance, source=source, source_options=options
         )
 
-    def code(
-        self, language: Language | str = "python", what: str | Iterable[str] = "pose", *, name: str | None = None
-    ) -> str:
-        """Return code for the robot's kinematics and dynamics, in one file that needs no other; rad and m.
+    def diff(self, other: SpecLike | FilePath, *, tolerance: float = 1e-6) -> Comparison:
+        """Compare the robot with another: the same mechanism, or which misreading of the table explains it.
 
         Args:
-            language: 'python', 'numpy', 'c', 'cpp', 'matlab' or 'javascript'.
-            what: 'pose' of tool0 in base_link, its 'jacobian', 'inverse-dynamics', or several of them.
-            name: Begins the names of functions in C, is the namespace in C++ and the function's name in MATLAB; by
-                default the robot's name.
+            other: A robot, a file of any kind that dh2sim reads, or the name of a robot that comes with dh2sim.
+            tolerance: Greatest difference of tool0, rad, and m for a reach of up to 1 m, then of the reach.
 
         Raises:
-            Dh2simError: There is no such language or code; or the code differs from the table.
+            Dh2simError: The file is wrong, or one of the robots has closed loops or branches.
         """
-        from dh2sim.codegen.generate import generate_code
+        from dh2sim.compare.comparison import diff
 
-        return generate_code(self, what, language, name=name)
+        return diff(self, other, tolerance=tolerance)
+
+    def trajectory(self, waypoints: Iterable[Any], **options: Unpack[TrajectoryKeywords]) -> Trajectory:
+        """Plan a motion through waypoints, from rest to rest, that keeps all limits.
+
+        Args:
+            waypoints: At least two: names of configurations, joint vectors (n,), poses of tool0 in base_link (4, 4),
+                or mappings with the keys of a waypoint file, in rad and m.
+            **options: As for :func:`dh2sim.plan_trajectory`: ``kind`` ('joint', 'line' or 'arc'), ``profile``
+                ('quintic', 'trapezoid', 'jerk' or 'optimal'), ``duration``, ``limits``, ``through``, ``free``.
+
+        Returns:
+            The :class:`Trajectory`: ``at(t)`` gives positions, velocities, accelerations and jerks, ``save`` writes
+            samples.
+
+        Raises:
+            SettingsError: Waypoints or options are wrong.
+            TrajectoryError: There is no such trajectory; the text says where and why.
+        """
+        from dh2sim.trajectory.plan import plan_trajectory
+
+        return plan_trajectory(self.model, waypoints, **options)
 
     def rollout(
         self,
@@ -715,56 +729,6 @@ class Robot:
             **options,
         )
 
-    def calibrate(
-        self,
-        data: Measurements | FilePath,
-        *,
-        kind: str | None = None,
-        groups: str | None = None,
-        **options: Unpack[CalibrationKeywords],
-    ) -> Calibration:
-        """Fit table, base and tool to measurements of the real robot.
-
-        Args:
-            data: A CSV file, as ``docs/calibration.md`` describes it; or what ``measurements`` makes of arrays, or
-                ``run_measurements`` of a run.
-            kind: Of a file: 'pose', 'position', 'distance' or 'socket'; by default what its columns are for.
-            groups: Of a file: the column whose rows of one value are held out together.
-            **options: As for :func:`dh2sim.calibrate.calibration.calibrate`: ``unknown``, ``prior``, ``robust``,
-                ``noise``, ``held_out``, ``seed``.
-
-        Returns:
-            The calibration: ``robot`` is a specification, from which ``Robot.from_spec`` makes a robot.
-
-        Raises:
-            MeasurementFileError: The file is wrong; the text says what and where.
-            CalibrationError: The measurements cannot tell what is asked of them.
-        """
-        from dh2sim.calibrate.calibration import calibrate
-        from dh2sim.calibrate.data_file import read_measurements
-
-        if isinstance(data, str | os.PathLike):
-            data = read_measurements(data, self, kind=kind, groups=groups)
-        return calibrate(self, data, **options)
-
-    def plan_measurements(self, count: int, *, kind: str = "position", seed: int = 0) -> Plan:
-        """Choose configurations to measure the robot at, inside its limits and without self-contact.
-
-        Args:
-            count: How many.
-            kind: Of the measurements: 'pose', 'position' or 'distance'.
-            seed: Of the random candidates.
-
-        Returns:
-            The plan: ``q`` has the configurations, ``error`` what they tell as compared to ``random_error``.
-
-        Raises:
-            CalibrationError: There are too few to tell the parameters, or the kind cannot be planned.
-        """
-        from dh2sim.calibrate.plan import plan_measurements
-
-        return plan_measurements(self, count, kind=kind, seed=seed)
-
     def sweep(self, *, out: FilePath | None = None, **options: Unpack[SweepKeywords]) -> Sweep:
         """Measure what each of many designs can do, without simulation.
 
@@ -784,36 +748,55 @@ class Robot:
 
         return sweep(self.model, out=out, wrap=Robot.of_model, **options)
 
-    @classmethod
-    def of_model(cls, model: RobotModel) -> Self:
-        """Return the robot of a model."""
-        return cls.from_spec(model.spec)
+    def calibrate(
+        self,
+        data: Measurements | FilePath,
+        *,
+        kind: str | None = None,
+        groups: str | None = None,
+        **options: Unpack[CalibrationKeywords],
+    ) -> Calibration:
+        """Fit table, base and tool to measurements of the real robot.
 
-    def convert(self, convention: Convention | str) -> Self:
-        """Return the same arm with its table in another convention, 'standard' or 'modified', or 'compact'.
+        Args:
+            data: A CSV file, as ``docs/calibration.md`` describes it; or what ``measurements`` makes of arrays, or
+                ``run_measurements`` of a run.
+            kind: What a file contains, 'pose', 'position', 'distance' or 'socket'; by default seen by its columns.
+            groups: Column of a file; rows with the same value are held out together.
+            **options: As for :func:`dh2sim.calibrate.calibration.calibrate`: ``unknown``, ``prior``, ``robust``,
+                ``noise``, ``held_out``, ``seed``.
 
-        A compact table has every frame within reach of the arm, with Hayati rows where they are needed; ``notes``
-        says which rows changed, and why.
-
-        Raises:
-            Dh2simError: The poses of tool0 would differ by more than rounding.
-        """
-        from dh2sim.importing.convert import convert_robot
-
-        converted = convert_robot(self.spec, convention)
-        return self.from_spec(converted.spec, notes=converted.notes)
-
-    def save(self, path: FilePath, *, overwrite: bool = False) -> None:
-        """Write a robot file that ``load`` reads as the same robot; parameters become the numbers that they gave.
-
-        It is in the units of the file that the robot was read from, or else in deg and m.
+        Returns:
+            The calibration: ``robot`` is a specification, from which ``Robot.from_spec`` makes a robot.
 
         Raises:
-            OutputError: There is a file already, or it cannot be written.
+            MeasurementFileError: The file is wrong; the text says what and where.
+            CalibrationError: The measurements do not determine what is to be fitted.
         """
-        from dh2sim.robot.write import save_robot
+        from dh2sim.calibrate.calibration import calibrate
+        from dh2sim.calibrate.data_file import read_measurements
 
-        save_robot(self.spec, path, notes=self.notes, overwrite=overwrite)
+        if isinstance(data, str | os.PathLike):
+            data = read_measurements(data, self, kind=kind, groups=groups)
+        return calibrate(self, data, **options)
+
+    def plan_measurements(self, count: int, *, kind: str = "position", seed: int = 0) -> Plan:
+        """Choose configurations to measure the robot at, inside its limits and without self-contact.
+
+        Args:
+            count: Number of configurations.
+            kind: What is measured: 'pose', 'position' or 'distance'.
+            seed: Seed of the random number generator.
+
+        Returns:
+            The plan: configurations ``q``, the expected ``error``, and ``random_error``, that of random ones.
+
+        Raises:
+            CalibrationError: There are too few to determine the parameters, or the kind cannot be planned.
+        """
+        from dh2sim.calibrate.plan import plan_measurements
+
+        return plan_measurements(self, count, kind=kind, seed=seed)
 
     def draw(
         self,
@@ -830,8 +813,8 @@ class Robot:
                 the driven ones, as for :meth:`fk`.
             style: 'kinematic': joints as cylinders and boxes, axes, frames and lengths; 'frames': all axes of the
                 frames; 'stick': a stick plot in the box of the workspace, with base line and shadow.
-            workspace: Of a stick plot: least and greatest x, y and z, m; by default a cube around the arm.
-            reach: Of a stick plot: length that joints and axes are measured by, m; by default the arm's.
+            workspace: Box of a stick plot: least and greatest x, y and z, m; by default a cube around the arm.
+            reach: Length by which a stick plot measures joints and axes, m; by default the arm's.
 
         Returns:
             The drawing: ``svg`` and ``tikz`` are texts, ``save("arm.pdf")`` writes a file.
