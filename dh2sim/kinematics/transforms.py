@@ -205,8 +205,12 @@ def quaternion_from_rotation(R: Array) -> Array:
 
 def _transform(rotation: Sequence[Sequence[float]], position: Sequence[float]) -> Array:
     """Assemble a read-only transform; every zero becomes +0.0."""
-    rows = [_clean((*row, p)) for row, p in zip(rotation, position, strict=True)]
-    return read_only([*rows, [0.0, 0.0, 0.0, 1.0]])
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    x, y, z = position
+    T = np.array([[a, b, c, x], [d, e, f, y], [g, h, i, z], [0.0, 0.0, 0.0, 1.0]])
+    T += 0.0
+    T.setflags(write=False)
+    return T
 
 
 def _clean(values: Sequence[float]) -> list[float]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import reference_joint_poses
+from dh2sim.kinematics.transforms import identity
 from dh2sim.model.shapes import Shape
 from dh2sim.typing import Array
 
@@ -78,17 +79,17 @@ def _overlapping(
     link, radii = np.array([index for index, _ in solid]), np.array([shape.radius for _, shape in solid])
     centres = np.array([shape.T_link_shape for _, shape in solid])
     half = np.array([[0.5 * shape.length] for _, shape in solid]) * centres[:, :3, 2]
-    x, y, z = np.stack([centres[:, :3, 3] - half, centres[:, :3, 3] + half]).transpose(2, 0, 1)[..., None]
+    x, y, z = np.stack([centres[:, :3, 3] - half, centres[:, :3, 3] + half]).transpose(2, 0, 1)[:, :, None, :, None]
     k, other = np.triu_indices(len(solid), 1)
     apart = link[k] != link[other]
     k, other = k[apart], other[apart]
-    for q in configurations:
-        poses = [np.eye(4), *reference_joint_poses(chain, q)]
-        poses += poses[-1:] * (len(shapes) - len(poses))
-        T = np.array(poses)[link, :3]  # element by element, which rounds as plain arithmetic does
-        a, b = T[..., 0] * x + T[..., 1] * y + T[..., 2] * z + T[..., 3]
-        near = segment_distance(a[k], b[k], a[other], b[other]) <= 1.001 * (radii[k] + radii[other])
-        result[link[k[near]], link[other[near]]] = True
+    poses = np.array([[identity(), *reference_joint_poses(chain, q)] for q in configurations])
+    T = poses[:, np.minimum(link, poses.shape[1] - 1), :3]
+    a, b = T[..., 0] * x + T[..., 1] * y + T[..., 2] * z + T[..., 3]  # which rounds as plain arithmetic does
+    first, second = ((a[:, one].reshape(-1, 3), b[:, one].reshape(-1, 3)) for one in (k, other))
+    near = segment_distance(*first, *second).reshape(len(poses), -1) <= 1.001 * (radii[k] + radii[other])
+    touching = near.any(axis=0)
+    result[link[k[touching]], link[other[touching]]] = True
     return result | result.T
 
 

@@ -226,11 +226,13 @@ class Number(Kind):
         bounds = self.magnitude(turns=scope.turns)
         if bounds is ANY:
             return None
-        unit, si = self._unit(scope)
+        own = self._own_unit(scope)
+        si = IN_SI[own] if own else 1.0
         most, least = bounds.most / si, bounds.least / si
         size, positive = abs(number), self.above is not None
         if math.isnan(size) or (size <= most * _SLACK and (size * _SLACK >= least or size == 0 or not self.unsigned)):
             return None
+        unit = f" {own}{_PER_SECOND[self.rate]}" if own else f" {self.size.unit}".rstrip()
         if self.unsigned and not positive:
             small = f"0, or from {shown_size(least)} to" if least else "at most"
             return f"must be {small} {shown_size(most)}{unit}"
@@ -253,12 +255,11 @@ class Number(Kind):
             case None:
                 return self.size
 
-    def _unit(self, scope: Scope) -> tuple[str, float]:
-        """Return the unit that the number is in, for messages, and its size in SI units."""
+    def _own_unit(self, scope: Scope) -> str:
+        """Return the unit of angle or length that the number is in; empty for one that is neither."""
         if self.dimension is None:
-            return f" {self.size.unit}".rstrip(), 1.0
-        unit = scope.angle if self.magnitude(turns=scope.turns) is ANGLE else scope.length
-        return f" {unit}{_PER_SECOND[self.rate]}", IN_SI[unit]
+            return ""
+        return scope.angle if self.magnitude(turns=scope.turns) is ANGLE else scope.length
 
     def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
         """Return the number in SI units."""

@@ -9,11 +9,11 @@ from dh2sim import Robot
 from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.batches import THREADED, thread_count
 from dh2sim.kinematics.chain import build_chain
-from dh2sim.kinematics.forward import forward_kinematics, frame_poses, geometric_jacobian, joint_poses
+from dh2sim.kinematics.forward import forward_kinematics, frame_poses, geometric_jacobian
 from tests.sample_robots import ODD_ROBOT, STANFORD
 
 ODD = build_chain(ODD_ROBOT)
-FUNCTIONS = [forward_kinematics, geometric_jacobian, frame_poses, joint_poses]
+FUNCTIONS = [forward_kinematics, geometric_jacobian, frame_poses]
 
 
 @pytest.mark.parametrize("function", FUNCTIONS)
