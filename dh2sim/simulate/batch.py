@@ -163,6 +163,7 @@ class BatchObservation:
     def __init__(self, plant: Plant, batch: Batch, gravity_forces: GravityForces) -> None:
         """Observe a batch that is at its start; ``plant`` is the robot as its controller sees it."""
         self._plant, self._batch, self._gravity_forces = plant, batch, gravity_forces
+        self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
         self._made: JointSpace | LoopSpace | None = None
         self._gravity: Array | None = None
         self._fields: dict[str, Array] = {}
@@ -183,12 +184,12 @@ class BatchObservation:
     @property
     def q(self) -> Array:
         """Joint positions, shape (batch, n)."""
-        return np.array(self._batch.bind("qpos")[:, self._plant.positions])
+        return np.array(self._qpos[:, self._plant.positions])
 
     @property
     def v(self) -> Array:
         """Joint velocities, shape (batch, n)."""
-        return np.array(self._batch.bind("qvel")[:, self._plant.velocities])
+        return np.array(self._qvel[:, self._plant.velocities])
 
     @property
     def mass_matrix(self) -> Array:
@@ -212,7 +213,7 @@ class BatchObservation:
     def gravity(self) -> Array:
         """Forces that balance gravity, shape (batch, n)."""
         if self._gravity is None:
-            self._gravity = self._gravity_forces.forces(self._batch.bind("qpos"))
+            self._gravity = self._gravity_forces.forces(self._qpos)
         return self._gravity.copy()
 
     @property
@@ -354,10 +355,21 @@ class MonitoredBatch:
             now = sensor.gap(sensors).max(axis=1, initial=0.0)
             self.gaps[simulations, k] = np.fmax(self.gaps[simulations, k], now)
 
-    def look(self, step: int) -> None:
-        """Compute what MuJoCo derives from the states at the beginning of a time step, or at the end of the run."""
-        if self.alive.any():
-            self.stop(self.call(self.batch.forward, self.ids, stage=VELOCITY_STAGE), step)
+    def put_back(self, simulations: NDArray[np.intp], before: Array) -> None:
+        """Give simulations the states they had, of which ``before`` has those of all, and no warnings."""
+        self.batch.state[simulations] = before[simulations]
+        self.batch.warning[simulations] = 0
+
+    def look(self, step: int, simulations: NDArray[np.intp] | None = None) -> None:
+        """Compute what MuJoCo derives from the states at the beginning of a time step, or at the end of the run.
+
+        Args:
+            step: The time step, in which those that fail are stopped.
+            simulations: Which of those that still run; by default all.
+        """
+        ids = self.ids if simulations is None else simulations.astype(np.int32)
+        if self.alive.any() and (ids is None or len(ids)):
+            self.stop(self.call(self.batch.forward, ids, stage=VELOCITY_STAGE), step)
 
     def stop(self, simulations: NDArray[np.intp], step: int) -> None:
         """Stop simulations that failed in a time step."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dh2sim.errors import ControllerError
 from dh2sim.simulate.batch import MonitoredBatch
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Observation, OpenLoop
+from dh2sim.simulate.mujoco_runtime import VELOCITY_STAGE
 from dh2sim.simulate.records import DERIVED, INTERVALS
 from dh2sim.typing import Array
 
@@ -175,9 +176,8 @@ class _Segment:
 
     def _step_by_step(self, failed: NDArray[np.intp], before: Array, controls: Array, first: int, count: int) -> None:
         """Simulate again those that failed, to find the step in which they did, and record what came before."""
-        monitored, batch = self._monitored, self._monitored.batch
-        batch.state[failed] = before[failed]
-        batch.warning[failed] = 0
+        monitored = self._monitored
+        monitored.put_back(failed, before)
         left = failed
         for j in range(count):
             now, start = controls[left, min(j, controls.shape[1] - 1)][:, None], self._qpos.copy()
@@ -249,8 +249,8 @@ def simulate_closed_loop(
 ) -> None:
     """Simulate a batch from its start to its end, recording.
 
-    Before a step, what MuJoCo derives from positions and velocities is computed (``mjSTAGE_VEL``); the step continues
-    from there, so that observing costs nothing.
+    Before a step, what MuJoCo derives from positions and velocities is computed (``mjSTAGE_VEL``), in the same call as
+    the step before it; the step continues from there, so that observing costs nothing.
 
     Args:
         monitored: The batch, at its start and persistent.
@@ -284,15 +284,21 @@ def simulate_closed_loop(
             pushes.apply(step)
         controls[:], outside = monitored.clipped(wanted)
         pages.note("ctrl", "before", controls)
-        failed = monitored.call(batch.step, monitored.ids)
+        before = batch.state.copy()
+        # step and look at once: what is kept of a simulation is in the processor's cache then
+        failed = in_step = monitored.call(batch.step, monitored.ids, stage=VELOCITY_STAGE)
+        if len(failed):  # again, one after the other, to tell which of them fails
+            monitored.put_back(failed, before)
+            in_step = monitored.call(batch.step, failed.astype(np.int32))
         for field in ("qacc", "sensordata"):
             if field in derived:
                 pages.note(field, "after", derived[field])
         for field, values in states.items():
             pages.note(field, "state", values)
         pages.turn()
-        monitored.stop(failed, step)
-        monitored.look(step + 1)
+        monitored.stop(in_step, step)
+        if len(failed):
+            monitored.look(step + 1, np.setdiff1d(failed, in_step))
         if outside is not None:
             monitored.count(outside[:, None], step, 1)
         observation.advance()
