@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import math
 import os
-import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from dh2sim.cli.common import ForceOption, JsonOption, QuietOption, RobotArgument, load_all, refuse_options
-from dh2sim.cli.output import json_text, require_free, table_lines
+from dh2sim.cli.common import (
+    ForceOption,
+    JsonOption,
+    QuietOption,
+    RobotArgument,
+    SeedOption,
+    load_all,
+    refuse_options,
+)
+from dh2sim.cli.output import WIDTH, json_text, require_free, table_lines, wrapped
 from dh2sim.messages import counted, listed, printable, shown
 
 if TYPE_CHECKING:
@@ -22,7 +29,6 @@ if TYPE_CHECKING:
     from dh2sim.calibrate.result import Calibration, ParameterResult
     from dh2sim.robot.spec import RobotSpec
 
-WIDTH: Final = 80
 _UNITS: Final = {
     "m": (1.0, False), "mm": (1e-3, False), "um": (1e-6, False), "µm": (1e-6, False), "cm": (1e-2, False),
     "rad": (1.0, True), "mrad": (1e-3, True), "deg": (math.pi / 180.0, True),
@@ -103,7 +109,7 @@ def calibrate(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write a report as HTML, one file with all plots.")
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the random number generator.")] = 0,
+    seed: SeedOption = 0,
     force: ForceOption = False,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
@@ -235,7 +241,7 @@ def _plan(
             whole = table_lines(table, left=0)
         lines += ["", *whole]
     if found.note:
-        lines += ["", *textwrap.wrap(f"Note: {found.note}", WIDTH, subsequent_indent="      ")]
+        lines += ["", *wrapped(f"Note: {found.note}", rest="      ")]
     if out is not None:
         lines += ["", f"written: {out}"]
     print(printable("\n".join(lines)))
@@ -380,7 +386,7 @@ def _lines(found: Calibration) -> list[str]:
         lines += _told_lines(found, title, which)
     lines += _outlier_lines(found)
     for note in found.notes:
-        lines += textwrap.wrap(f"Note: {note}", WIDTH, subsequent_indent="      ", break_on_hyphens=False)
+        lines += wrapped(f"Note: {note}", rest="      ")
     return [printable(line) for line in lines]
 
 
@@ -409,7 +415,7 @@ def _error_lines(found: Calibration) -> list[str]:
         lines.append("Nothing is held out: there is only one group.")
     elif any(fold.reason for fold in held.folds):
         failed = next(fold for fold in held.folds if fold.reason)
-        lines += textwrap.wrap(f"Without {listed(failed.groups)}: {failed.reason}", WIDTH, break_on_hyphens=False)
+        lines += wrapped(f"Without {listed(failed.groups)}: {failed.reason}", rest="")
     return lines
 
 
@@ -452,7 +458,7 @@ def _told_lines(found: Calibration, title: str, which: str) -> list[str]:
     for reason, names in reasons.items():
         into = f" into {reason}" if which == "folded" else f": {reason}" if reason else ""
         text = f"{title}: {', '.join(names)}{into}"
-        lines += textwrap.wrap(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+        lines += wrapped(text)
     return ["", *lines] if lines else []
 
 

@@ -8,7 +8,15 @@ from typing import Annotated
 
 import typer
 
-from dh2sim.cli.common import FELL_SHORT, choice, refuse_other_formats, tolerance_of
+from dh2sim.cli.common import (
+    FELL_SHORT,
+    SamplesOption,
+    SeedOption,
+    ToleranceOption,
+    choice,
+    refuse_other_formats,
+    tolerance_of,
+)
 from dh2sim.cli.output import progress_bar
 from dh2sim.messages import printable
 
@@ -68,16 +76,9 @@ def check(
         Path | None,
         typer.Option(metavar="DIR", help="Draw robots that changed, before and after; with --changed-since."),
     ] = None,
-    samples: Annotated[
-        int, typer.Option(min=1, max=10**8, metavar="N", help="Number of random configurations, inside the limits.")
-    ] = 200,
-    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the random configurations.")] = 0,
-    tolerance: Annotated[
-        float,
-        typer.Option(
-            metavar="T", help="Largest error: an angle in rad, a distance as a fraction of the reach or of 1 m."
-        ),
-    ] = 1e-12,
+    samples: SamplesOption = 200,
+    seed: SeedOption = 0,
+    tolerance: ToleranceOption = 1e-12,
 ) -> int:
     """Check all that a repository with robots should keep right.
 

@@ -78,6 +78,16 @@ RobotsArgument = Annotated[
 StrictOption = Annotated[bool, typer.Option("--strict", help="Treat notes, which point out likely slips, as errors.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite existing files.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON alone, in m, rad, kg and s.")]
+SeedOption = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the random number generator.")]
+SamplesOption = Annotated[
+    int, typer.Option(min=1, max=10**8, metavar="N", help="Number of random configurations, inside the limits.")
+]
+ToleranceOption = Annotated[
+    float,
+    typer.Option(
+        metavar="T", help="Largest error: an angle in rad, a distance as a fraction of the reach or of 1 m."
+    ),
+]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,14 +9,12 @@ import typer
 
 from dh2sim.cli.common import DONE, FELL_SHORT, JsonOption, choice, complete_robot, other_format, tolerance_of
 from dh2sim.cli.importing import errors_with_options
-from dh2sim.cli.output import json_text, table_lines
+from dh2sim.cli.output import json_text, print_wrapped, table_lines
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.compare.comparison import Comparison, Equivalence
     from dh2sim.importing.sources import ImportOptions
-
-WIDTH = 80
 
 
 def diff(
@@ -159,12 +156,4 @@ def _print_quantities(found: Comparison) -> None:
 
 def print_item(sentence: str) -> None:
     """Print a sentence as an item of a list, wrapped at 80 columns."""
-    print(
-        textwrap.fill(
-            f"  - {printable(sentence)}",
-            WIDTH,
-            subsequent_indent="    ",
-            break_long_words=False,
-            break_on_hyphens=False,
-        )
-    )
+    print_wrapped(sentence, first="  - ", rest="    ")

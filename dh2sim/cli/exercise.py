@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from dh2sim.cli.common import ForceOption
+from dh2sim.cli.common import ForceOption, SeedOption
 from dh2sim.cli.output import json_text
 from dh2sim.errors import OutputError
 from dh2sim.messages import printable
@@ -16,7 +16,7 @@ TEXT, DRAWING, SOLUTION = "exercise.md", "arm.svg", "solution.yaml"
 
 
 def exercise(
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the random number generator.")] = 0,
+    seed: SeedOption = 0,
     level: Annotated[int, typer.Option(metavar="1-4", min=1, max=4, help="Difficulty.")] = 1,
     out: Annotated[
         Path | None,

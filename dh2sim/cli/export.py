@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dh2sim.cli.common import DONE, FELL_SHORT, RobotsArgument, StrictOption, build_any, complain
+from dh2sim.cli.output import print_wrapped
 from dh2sim.errors import Dh2simError, OutputError
 from dh2sim.messages import printable
 
@@ -146,4 +146,4 @@ def _print_report(report: ExportReport, out: Path, model: RobotModel | Mechanism
 
 def _list(title: str, lines: Iterable[str]) -> None:
     for line in lines:
-        print(textwrap.fill(f"{title}: {line}", 80, initial_indent="  ", subsequent_indent="    "))
+        print_wrapped(f"{title}: {line}", first="  ", rest="    ")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -11,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from dh2sim.cli.common import JsonOption, RobotArgument, StrictOption, build_any
-from dh2sim.cli.output import json_text, table_lines
-from dh2sim.messages import printable
+from dh2sim.cli.output import WIDTH, json_text, print_wrapped, table_lines
 
 if TYPE_CHECKING:
     from dh2sim.model.robot_model import JointModel, RobotModel
@@ -20,7 +18,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-WIDTH = 80
 """Columns of what is printed; a table of many or long columns may need more."""
 
 
@@ -132,9 +129,9 @@ def _print(model: RobotModel, *, srdf: bool) -> None:
     spec = model.spec
     description, source = (" ".join(text.split()) for text in (spec.description, spec.source))
     group = _group(spec)
-    _print_wrapped(f"{spec.name}  {description}{f' ({group})' if group else ''}".rstrip())
+    print_wrapped(f"{spec.name}  {description}{f' ({group})' if group else ''}".rstrip())
     if source:
-        _print_wrapped(f"Source: {source}")
+        print_wrapped(f"Source: {source}")
     for lines in (*_dh_tables(model), _frame_table(model)):
         print()
         print("\n".join(lines))
@@ -145,17 +142,11 @@ def _print(model: RobotModel, *, srdf: bool) -> None:
     payload = 0.0 if model.payload is None else model.payload.mass
     carries = f"{'assumed' if spec.payload.mass is None else 'nominal'} payload {payload:.3g} kg"
     for line in (f"reach at most {reach}, moving mass {model.mass:.4g} kg, {carries}", *_remarks(model)):
-        _print_wrapped(line)
+        print_wrapped(line)
     if srdf:
         print("Pairs of links that do not collide, as in an SRDF:")
         for pair in model.excluded:
             print(f'  <disable_collisions link1="{pair.link1}" link2="{pair.link2}" reason="{pair.reason.value}"/>')
-
-
-def _print_wrapped(text: str) -> None:
-    print(
-        textwrap.fill(printable(text), WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-    )
 
 
 def _dh_tables(model: RobotModel) -> list[list[str]]:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from typing import Any
 
-from dh2sim.cli.output import table_lines
+from dh2sim.cli.output import print_wrapped, table_lines
 from dh2sim.kinematics.loop_motion import actuated_joints
 from dh2sim.kinematics.transforms import rpy_from_rotation
 from dh2sim.kinematics.tree import BASE, tree_frames
 from dh2sim.messages import printable
 from dh2sim.mobility.robot_mechanism import find_mobility
 from dh2sim.model.mechanism import MechanismModel
-
-WIDTH = 80
 
 
 def mechanism_dict(model: MechanismModel) -> dict[str, Any]:
@@ -60,9 +57,9 @@ def _is_link(name: str) -> bool:
 def print_mechanism(model: MechanismModel) -> None:
     """Print a mechanism."""
     spec, tree = model.spec, model.tree
-    _wrapped(f"{spec.name}  {' '.join(spec.description.split())}".rstrip())
+    print_wrapped(f"{spec.name}  {' '.join(spec.description.split())}".rstrip())
     if spec.source:
-        _wrapped(f"Source: {' '.join(spec.source.split())}")
+        print_wrapped(f"Source: {' '.join(spec.source.split())}")
     driven = {model.moving_joints[k].name for k in actuated_joints(spec)}
     lines = [["joint", "type", "on", "driven", "at assembly", "limits"]]
     for k, joint in enumerate(model.joints):
@@ -78,7 +75,7 @@ def print_mechanism(model: MechanismModel) -> None:
     print()
     print(printable("\n".join(table_lines(lines, left=4))))
     if spec.actuated is None:
-        _wrapped("The file has no 'actuated': every joint counts as driven.")
+        print_wrapped("The file has no 'actuated': every joint counts as driven.")
     if tree.closures:
         print()
         rows = [["closure", "type", "between"]]
@@ -94,10 +91,10 @@ def print_mechanism(model: MechanismModel) -> None:
             rows.append([name, *lengths, *angles])
     print(printable("\n".join(table_lines(rows, left=1))))
     print()
-    _wrapped(f"size {model.size:.4g} m, moving mass {model.mass:.4g} kg")
+    print_wrapped(f"size {model.size:.4g} m, moving mass {model.mass:.4g} kg")
     for entry in (*model.estimates, *model.assumptions):
-        _wrapped(entry.sentence)
-    _wrapped(f"Mobility: {find_mobility(spec).verdict}")
+        print_wrapped(entry.sentence)
+    print_wrapped(f"Mobility: {find_mobility(spec).verdict}")
 
 
 def _number(turns: bool, value: float) -> str:
@@ -107,9 +104,3 @@ def _number(turns: bool, value: float) -> str:
 def _value(turns: bool, value: float) -> str:
     rounded = round(math.degrees(value), 4) if turns else round(value, 6)
     return f"{rounded + 0.0:g}{'°' if turns else ' m'}"
-
-
-def _wrapped(text: str) -> None:
-    print(
-        textwrap.fill(printable(text), WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-    )

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from typing import TYPE_CHECKING
 
 from dh2sim.cli.common import JsonOption, RobotArgument, load_all
-from dh2sim.cli.output import json_text, table_lines
+from dh2sim.cli.output import json_text, print_wrapped, table_lines
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from dh2sim.mobility.result import Mobility
-
-WIDTH = 80
 
 
 def mobility(
@@ -68,9 +65,9 @@ def _print(found: Mobility) -> None:
         print()
         for k, loop in enumerate(mechanism.loops, 1):
             names = ", ".join(mechanism.joints[i].name for i in loop.joints)
-            _wrapped(f"loop {k}: lambda {loop.dimension}, joints {names}")
+            print_wrapped(f"loop {k}: lambda {loop.dimension}, joints {names}")
     print()
-    _wrapped(found.verdict)
+    print_wrapped(found.verdict)
 
 
 def _rank_line(found: Mobility) -> str:
@@ -90,9 +87,3 @@ def _finite_line(found: Mobility) -> str:
     if found.walk.dimension:
         return f"finite {found.finite}: counted after walking along the loops"
     return f"finite {found.finite}: no velocity goes on along the loops"
-
-
-def _wrapped(text: str) -> None:
-    print(
-        textwrap.fill(printable(text), WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-    )

@@ -9,10 +9,13 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from dh2sim.errors import NotFiniteError, OutputError
 from dh2sim.messages import printable
+
+WIDTH: Final = 80
+"""Columns of what is printed, unless the terminal is asked."""
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -33,6 +36,23 @@ def make_console(width: int | None = None) -> Console:
             raise BrokenPipeError
 
     return RaisingConsole(highlight=False, width=width)
+
+
+def wrapped(text: str, *, first: str = "", rest: str = "  ", width: int = WIDTH) -> list[str]:
+    """Return the lines of a text for a terminal; the first begins with ``first``, the others with ``rest``."""
+    return textwrap.wrap(
+        printable(text),
+        width,
+        initial_indent=first,
+        subsequent_indent=rest,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def print_wrapped(text: str, *, first: str = "", rest: str = "  ", width: int = WIDTH) -> None:
+    """Print a text as ``wrapped`` returns it."""
+    print("\n".join(wrapped(text, first=first, rest=rest, width=width)))
 
 
 def print_whole(table: Table) -> None:
@@ -155,7 +175,6 @@ def hand_over(text: str, out: Path | None, *, summary: str, notes: Iterable[str]
     if quiet:
         return
     for note in notes:
-        text = textwrap.fill(f"dh2sim: note: {printable(note)}", 80, subsequent_indent="  ", break_on_hyphens=False)
-        print(text, file=sys.stderr)
+        print("\n".join(wrapped(f"dh2sim: note: {note}")), file=sys.stderr)
     where = "" if out is None else f"{out}: "
     print(printable(f"{where}{summary}"), file=sys.stderr if out is None else sys.stdout)

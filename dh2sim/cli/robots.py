@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import textwrap
 from dataclasses import asdict
 from typing import Annotated
 
 import typer
 
-from dh2sim.cli.output import json_text
+from dh2sim.cli.output import json_text, print_wrapped
 
 
 def list_robots(
@@ -40,7 +39,7 @@ def list_robots(
         print(f"{group.capitalize()}s")
         for robot in members:
             start = f"  {robot.name:{width}}  {_joints(robot.joints):7}  "
-            print(textwrap.fill(robot.description, 80, initial_indent=start, subsequent_indent=" " * len(start)))
+            print_wrapped(robot.description, first=start, rest=" " * len(start))
 
 
 def _joints(letters: str) -> str:

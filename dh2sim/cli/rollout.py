@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 import signal
 import sys
-import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dh2sim.cli.common import INTERRUPTED, QuietOption, RobotArgument, build_any, named_values
-from dh2sim.cli.output import json_text, make_console, progress_bar, size_text
+from dh2sim.cli.output import json_text, make_console, print_wrapped, progress_bar, size_text
 from dh2sim.cli.runs import clipped_controls, contacts, loops
 from dh2sim.messages import printable
 
@@ -345,14 +344,4 @@ def _print_summary(job: Job, summary: RunDescription, progress: Progress, out: s
     if summary.not_run:
         counts.append(f"not run {summary.not_run:,}")
     counts += [*contacts(summary), *loops(summary), *clipped_controls(summary)]
-    width = make_console().width
-    print(
-        textwrap.fill(
-            ", ".join(counts),
-            width,
-            initial_indent="  ",
-            subsequent_indent="    ",
-            break_long_words=False,
-            break_on_hyphens=False,
-        )
-    )
+    print_wrapped(", ".join(counts), first="  ", rest="    ", width=make_console().width)

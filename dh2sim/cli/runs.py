@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-import textwrap
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dh2sim.cli.common import DONE, FELL_SHORT, QuietOption, complain
-from dh2sim.cli.output import make_console, progress_bar, size_text
+from dh2sim.cli.output import make_console, progress_bar, size_text, wrapped
 from dh2sim.errors import Dh2simError
 from dh2sim.messages import did_you_mean, listed, printable
 
@@ -168,15 +167,9 @@ def _print(description: RunDescription, *, verified: bool) -> None:
     console.print(Text.assemble((printable(description.path), "bold"), "  ", verdict), soft_wrap=True)
     for title, lines in _sections(description, verified=verified):
         for number, line in enumerate(lines):
-            wrapped = textwrap.wrap(
-                printable(line),
-                max(console.width, 40),
-                initial_indent=f"  {title if number == 0 else '':<11} ",
-                subsequent_indent=" " * 14,
-                break_long_words=False,
-                break_on_hyphens=False,
-            )
-            console.print(Text("\n".join(wrapped)), soft_wrap=True)
+            first = f"  {title if number == 0 else '':<11} "
+            text = wrapped(line, first=first, rest=" " * 14, width=max(console.width, 40))
+            console.print(Text("\n".join(text)), soft_wrap=True)
 
 
 def _change(key: str, setting: float | str) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
+from dh2sim.cli.output import WIDTH, wrapped
 from dh2sim.inverse.reach import amount_text, beyond_limits
 from dh2sim.messages import printable
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 MOST: Final = 32
 """Solutions that are printed; JSON lists them all."""
-WIDTH: Final = 80
 
 
 def print_solutions(
@@ -50,12 +49,12 @@ def solution_lines(
     count, turned = len(first), len(solutions) - len(first)
     inside = int(solutions.within_limits[first].sum())
     if solutions.reason:
-        lines = _filled(f"{robot.name}: no joint vector reaches {what}: {solutions.reason}")
+        lines = wrapped(f"{robot.name}: no joint vector reaches {what}: {solutions.reason}")
     else:
         text = "1 joint vector reaches" if count == 1 else f"{count} joint vectors reach"
         text += f" {what}" + (f", {inside} within limits" if inside < count else "")
         text += f"; {turned} more by whole turns" if turned else ""
-        lines = _filled(f"{robot.name}: {text}")
+        lines = wrapped(f"{robot.name}: {text}")
     if solutions.nearest is not None and not count:
         lines += ["", "The nearest that was found:", *_table(spec, solutions.nearest[None], [""])]
     if count:
@@ -77,13 +76,13 @@ def solution_lines(
         if count > MOST:
             lines.append(f"and {count - MOST} more, which --json lists")
     for number, curve in enumerate(solutions.curves, start=1):
-        lines += _filled(f"curve {number}: {_curve_text(spec, curve)}")
+        lines += wrapped(f"curve {number}: {_curve_text(spec, curve)}")
     if solutions.found_share < 1.0:
         share = math.floor(1000.0 * solutions.found_share) / 10.0  # never 100
-        lines += _filled(f"There may be more: in trials {share:.1f}% of all solutions were found.")
+        lines += wrapped(f"There may be more: in trials {share:.1f}% of all solutions were found.")
     if len(behind):
         names = ", ".join(row.name for row in robot.moving_rows[len(spec.moving_rows) :])
-        lines += _filled(f"Not moved, being behind {frame}: {names}")
+        lines += wrapped(f"Not moved, being behind {frame}: {names}")
     return lines + _notes(solutions.notes)
 
 
@@ -129,7 +128,7 @@ def _table(spec: RobotSpec, q: Array, remarks: Sequence[str], marked: Array | No
     wide = widths(names)
     if number + sum(width + 1 for width in wide) > WIDTH:
         short = [f"q{i + 1}" for i in range(len(names))]
-        lines += _filled(", ".join(f"{a} {b}" for a, b in zip(short, names, strict=True)))
+        lines += wrapped(", ".join(f"{a} {b}" for a, b in zip(short, names, strict=True)))
         names, wide = short, widths(short)
     for head in ([f"{name} " for name in names], [f"{unit} " for unit in units]):
         lines.append(
@@ -142,7 +141,7 @@ def _table(spec: RobotSpec, q: Array, remarks: Sequence[str], marked: Array | No
         lines.append(f"{label:>{number}}{values}".rstrip())
         indent = " " * (number + 3)
         if remark:
-            lines += textwrap.wrap(remark, WIDTH, initial_indent=indent, subsequent_indent=indent)
+            lines += wrapped(remark, first=indent, rest=indent)
     return lines
 
 
@@ -172,9 +171,5 @@ def _curve_text(spec: RobotSpec, curve: Curve) -> str:
 def _notes(notes: Sequence[str]) -> list[str]:
     lines: list[str] = []
     for note in notes:
-        lines += _filled(f"note: {printable(note)}")
+        lines += wrapped(f"note: {note}")
     return lines
-
-
-def _filled(text: str) -> list[str]:
-    return textwrap.wrap(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dh2sim.cli.common import MANY, ForceOption, JsonOption, RobotArgument, build_all
-from dh2sim.cli.output import json_text, require_free, table_lines
+from dh2sim.cli.output import json_text, require_free, table_lines, wrapped
 from dh2sim.errors import ConfigurationError, SettingsError, TrajectoryError
 from dh2sim.messages import did_you_mean, listed, printable, shown
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from dh2sim.trajectory.trajectory import Trajectory
     from dh2sim.trajectory.waypoints import WaypointFile
 
-WIDTH = 80
 _FILES = (".yaml", ".yml", ".json")
 
 
@@ -267,7 +265,7 @@ _ASSUMED = {
 
 
 def _filled(text: str) -> list[str]:
-    return textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
+    return wrapped(text, first="  ", rest="    ")
 
 
 _MOST_PASSAGES = 24

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,11 +9,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import FELL_SHORT, RobotsArgument, StrictOption, build_any, complain, tolerance_of
-from dh2sim.cli.output import json_text, make_console, print_whole, progress_bar
+from dh2sim.cli.common import (
+    FELL_SHORT,
+    RobotsArgument,
+    SamplesOption,
+    SeedOption,
+    StrictOption,
+    ToleranceOption,
+    build_any,
+    complain,
+    tolerance_of,
+)
+from dh2sim.cli.output import json_text, make_console, print_whole, progress_bar, wrapped
 from dh2sim.errors import Dh2simError, OutputError
 from dh2sim.extras import require_extra
-from dh2sim.messages import printable
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -26,22 +34,9 @@ if TYPE_CHECKING:
 
 def validate(
     robots: RobotsArgument,
-    samples: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=10**8,
-            metavar="N",
-            help="Number of random configurations, inside the limits.",
-        ),
-    ] = 1000,
-    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the random configurations.")] = 0,
-    tolerance: Annotated[
-        float,
-        typer.Option(
-            metavar="T", help="Largest error: an angle in rad, a distance as a fraction of the reach or of 1 m."
-        ),
-    ] = 1e-12,
+    samples: SamplesOption = 1000,
+    seed: SeedOption = 0,
+    tolerance: ToleranceOption = 1e-12,
     dynamics: Annotated[
         bool,
         typer.Option(
@@ -178,15 +173,8 @@ def _print(report: ValidationReport) -> None:
         console.print(Text.assemble((robot.name, "bold"), " ", verdict))
         print_whole(_table(robot))
         for remark, style in dict.fromkeys(_remarks(robot)):
-            wrapped = textwrap.wrap(
-                printable(remark),
-                console.width,
-                initial_indent="  ",
-                subsequent_indent="    ",
-                break_long_words=False,
-                break_on_hyphens=False,
-            )
-            console.print(Text("\n".join(wrapped), style), soft_wrap=True)
+            text = wrapped(remark, first="  ", rest="    ", width=console.width)
+            console.print(Text("\n".join(text), style), soft_wrap=True)
         if not robot.ok:
             console.print()
     if len(report.robots) > 1:

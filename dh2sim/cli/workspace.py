@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dh2sim.cli.common import JsonOption, QuietOption, RobotArgument, build_all
-from dh2sim.cli.output import json_text, progress_bar, table_lines
+from dh2sim.cli.output import json_text, progress_bar, table_lines, wrapped
 from dh2sim.errors import OutputError
 from dh2sim.messages import printable, shown
 
@@ -137,8 +137,6 @@ def _require_file(out: Path | None) -> bool:
 
 def _lines(found: Workspace, units: Units) -> list[str]:
     """Return what is printed, at most 80 columns wide as far as names allow."""
-    import textwrap
-
     from dh2sim.robot.spec import AngleUnit
 
     kind = {3: "volume", 2: "surface", 1: "curve", 0: "point"}[found.dimension]
@@ -193,7 +191,7 @@ def _lines(found: Workspace, units: Units) -> list[str]:
     lines += ["", *(line.rstrip() for line in table_lines(table, left=3))]
     notes = [*found.notes, *(found.dexterity.notes if found.dexterity is not None else ())]
     for note in notes:
-        lines += textwrap.wrap(f"Note: {note}", 80, subsequent_indent="      ", break_on_hyphens=False)
+        lines += wrapped(f"Note: {note}", rest="      ")
     return [printable(line) for line in lines]
 
 
