@@ -249,8 +249,8 @@ def simulate_closed_loop(
 ) -> None:
     """Simulate a batch from its start to its end, recording.
 
-    Before a step, what MuJoCo derives from positions and velocities is computed (``mjSTAGE_VEL``), in the same call as
-    the step before it; the step continues from there, so that observing costs nothing.
+    Before a step, what MuJoCo derives from positions and velocities is computed (``mjSTAGE_VEL``), in the same call
+    as the step before it; the step continues from there, so that observing costs nothing.
 
     Args:
         monitored: The batch, at its start and persistent.

@@ -134,7 +134,7 @@ def test_the_report_fits_into_80_columns(name: str) -> None:
         (["home", "zero", "--limits", "velocity=0"], "--limits velocity must be a finite number above 0, got 0.0"),
         (["home", "zero", "--rate", "5"], "needs --out"),
         (["home", "zero", "-o", "motion.txt"], "--out must end in .csv or .npz, got 'motion.txt'"),
-        (["home", "zero", "--kind", "line"], "the line ends in a singularity"),
+        (["home", "zero", "--kind", "line"], "the line reaches the pose at its end in another configuration"),
         (["points.yaml", "home"], "points.yaml is a waypoint file: it cannot be combined with other waypoints"),
         (["points.yaml"], "points.yaml: cannot be read"),
     ],
