@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -49,15 +50,32 @@ def _joints(letters: str) -> str:
     return "".join(f"{letters.count(kind)}{kind}" for kind in "RP" if kind in letters)
 
 
-def schema() -> None:
-    """Print the JSON Schema of robot files, with which editors complete and check them.
+class SchemaOf(StrEnum):
+    """Kinds of files that have a schema."""
+
+    ROBOT = "robot"
+    WAYPOINTS = "waypoints"
+
+
+def schema(
+    of: Annotated[
+        SchemaOf, typer.Argument(metavar="robot|waypoints", help="What the files describe.")
+    ] = SchemaOf.ROBOT,
+) -> None:
+    """Print the JSON Schema of robot files or waypoint files, with which editors complete and check them.
 
     \b
     Examples:
       dh2sim schema > robot.schema.json
-      # then, on the first line of a robot file:
+      dh2sim schema waypoints > waypoints.schema.json
+      # then, on the first line of a file:
       # yaml-language-server: $schema=robot.schema.json
     """
-    from dh2sim.robot.schema import json_schema
+    if of is SchemaOf.ROBOT:
+        from dh2sim.robot.schema import json_schema
 
-    print(json_text(json_schema()))
+        print(json_text(json_schema()))
+    else:
+        from dh2sim.trajectory.waypoints import waypoint_schema
+
+        print(json_text(waypoint_schema()))

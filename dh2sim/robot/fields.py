@@ -125,6 +125,10 @@ class Kind:
         """Return a checked value in SI units; ``turns`` says whether the joint coordinate is an angle."""
         return value
 
+    def json_schema(self) -> dict[str, Any] | None:
+        """Return its JSON Schema; None of kinds that :mod:`dh2sim.robot.schema` knows."""
+        return None
+
 
 class Name(Kind):
     """A name that every format can hold."""

@@ -1,4 +1,4 @@
-"""The JSON Schema of robot files, for editors."""
+"""The JSON Schemas of robot files, and of files with the same kinds of fields, for editors."""
 
 from __future__ import annotations
 
@@ -29,21 +29,27 @@ from dh2sim.robot.parts import Inertia, InertiaNumbers, NamedParts, Part, Parts,
 from dh2sim.robot.spec import ROBOT, AngleUnit, LengthUnit
 
 _NAME = {"pattern": NAME_PATTERN, "maxLength": LONGEST_NAME}
-_NUMBER = {"type": ["number", "string"]}
+NUMBER = {"type": ["number", "string"]}
+"""Of a number, or an expression."""
 _NOTE = """A number may be an arithmetic expression in a string: + - * / **, parentheses, parameters, pi, sqrt, sin,
 cos, tan, asin, acos, atan, atan2 (arguments in radians)."""
 
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a robot file."""
+    return schema_of(ROBOT, "robot file", "A robot described by its Denavit-Hartenberg table.")
+
+
+def schema_of(part: Part, title: str, description: str) -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a file that is a part."""
     definitions: dict[str, Any] = {}
-    robot = _part(ROBOT, definitions)
+    whole = _part(part, definitions)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "dh2sim robot file",
+        "title": f"dh2sim {title}",
         "$defs": dict(sorted(definitions.items())),
-        **robot,
-        "description": f"A robot described by its Denavit-Hartenberg table.\n\n{_NOTE}",
+        **whole,
+        "description": f"{description}\n\n{_NOTE}",
     }
 
 
@@ -69,6 +75,8 @@ def _property(kind: Kind, default: Any, definitions: dict[str, Any]) -> dict[str
 
 
 def _value(kind: Kind, definitions: dict[str, Any]) -> dict[str, Any]:
+    if (own := kind.json_schema()) is not None:
+        return own
     match kind:
         case Part():
             name = _name(kind.of)
@@ -95,7 +103,7 @@ def _value(kind: Kind, definitions: dict[str, Any]) -> dict[str, Any]:
             lengths = {} if kind.count is None else {"minItems": kind.count, "maxItems": kind.count}
             return {"type": "array", "items": {"type": "string"}, **lengths}
         case Vector():
-            return {"type": "array", "items": _NUMBER}
+            return {"type": "array", "items": NUMBER}
         case Choice():
             letters = [spelling for short in kind.short for spelling in (short.upper(), short)]
             definitions[kind.of.__name__] = {
@@ -105,7 +113,7 @@ def _value(kind: Kind, definitions: dict[str, Any]) -> dict[str, Any]:
             }
             return {"$ref": f"#/$defs/{kind.of.__name__}"}
         case Number():
-            return _NUMBER | _bounds(kind)
+            return NUMBER | _bounds(kind)
         case Color():
             least, most = kind.counts
             return {"type": "array", "items": _value(kind.item, definitions), "minItems": least, "maxItems": most}
@@ -117,7 +125,7 @@ def _value(kind: Kind, definitions: dict[str, Any]) -> dict[str, Any]:
             return {"type": "object", "propertyNames": _NAME, "additionalProperties": _value(Vector(), definitions)}
         case Parameters():
             names = {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}
-            return {"type": "object", "propertyNames": names, "additionalProperties": _NUMBER}
+            return {"type": "object", "propertyNames": names, "additionalProperties": NUMBER}
         case Name():
             return {"type": "string", **_NAME}
         case Flag():

@@ -31,9 +31,10 @@ from dh2sim.robot.fields import (
 )
 from dh2sim.robot.parts import Internal, Part, Parts, plain
 from dh2sim.robot.read import read_tree
+from dh2sim.robot.schema import NUMBER, schema_of
 from dh2sim.robot.spec import LENGTHS, RobotSpec, Row, Units
 from dh2sim.robot.yaml_tree import read_yaml_file
-from dh2sim.trajectory.limits import GIVEN, LimitValue
+from dh2sim.trajectory.limits import GIVEN, QUANTITIES, LimitValue
 from dh2sim.trajectory.profiles import Profile
 from dh2sim.typing import Array, read_only
 
@@ -85,6 +86,10 @@ class JointVector(Kind):
                 found.append(scope.wrong((*loc, index), str(error)))
         return WRONG if WRONG in found else found
 
+    def json_schema(self) -> dict[str, Any]:
+        """Return the schema of either."""
+        return {"anyOf": [NUMBER, {"type": "array", "items": NUMBER}]}
+
 
 @dataclass(eq=False, repr=False)
 class LimitsKind(Kind):
@@ -99,6 +104,12 @@ class LimitsKind(Kind):
                 message = f"unknown key {shown(name)}.{did_you_mean(str(name), GIVEN)} Allowed keys: {listed(GIVEN)}"
                 scope.report((*loc, str(name)), message, at_key=True, path=loc)
         return {name: _limit(each, (*loc, name), scope) for name, each in value.items() if name in GIVEN}
+
+    def json_schema(self) -> dict[str, Any]:
+        """Return the schema of limits: of all joints, of each, or of some by name."""
+        of_joints = [NUMBER, {"type": "array", "items": NUMBER}, {"type": "object", "additionalProperties": NUMBER}]
+        limits = {name: {"anyOf": of_joints} if name in QUANTITIES else NUMBER for name in GIVEN}
+        return {"type": "object", "properties": limits, "additionalProperties": False}
 
 
 def _limit(value: object, loc: Loc, scope: Scope) -> Any:
@@ -196,6 +207,11 @@ class WaypointFile:
 
 
 WAYPOINT_FILE: Final = Part("", WaypointFile)
+
+
+def waypoint_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a waypoint file."""
+    return schema_of(WAYPOINT_FILE, "waypoint file", "What a trajectory goes through.")
 
 
 def read_waypoints(path: str | os.PathLike[str], spec: RobotSpec) -> WaypointFile:

@@ -2,11 +2,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from dh2sim import plan_trajectory, read_trajectory
 from dh2sim.errors import OutputError, SettingsError, TrajectoryError
+from dh2sim.trajectory.waypoints import waypoint_schema
 from tests.sample_robots import NAMES, model
 
 
@@ -108,3 +111,22 @@ def test_samples_end_where_the_trajectory_does() -> None:
     for wrong in ({"rate": 0.0}, {"rate": 1e12}, {"samples": 1}, {"rate": 1.0, "samples": 5}):
         with pytest.raises(SettingsError):
             planned.sample(**wrong)
+
+
+def test_the_schema_of_waypoint_files_takes_what_the_reader_takes() -> None:
+    schema = waypoint_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    valid = jsonschema.Draft202012Validator(schema).is_valid
+    page = YAML(typ="safe", pure=True).load(Path("docs/waypoints.yaml").read_text(encoding="utf-8"))
+    assert valid(page)
+    assert schema["properties"]["profile"]["$ref"] == "#/$defs/Profile"
+    for point in ("home", [1, 2], {"q": "home", "stop": False}, {"xyz": [1, "2 * lift", 3], "rpy": [0, 0, 0]}):
+        assert valid({"waypoints": [point, "zero"], "limits": {"jerk": {"joint_1": "50%"}, "tool_speed": 2}})
+    for wrong in (
+        {"waypoints": [{"xyz": [1, 2]}, "home"]},
+        {"waypoints": [{"foo": 1}, "home"]},
+        {"waypoints": ["home", "zero"], "limits": {"speed": 1}},
+        {"waypoints": ["home", "zero"], "kind": "spline"},
+        {"kind": "line"},
+    ):
+        assert not valid(wrong), wrong
