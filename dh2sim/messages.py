@@ -71,8 +71,8 @@ def printable(text: str) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """Return a number with a noun whose plural ends in s, as in '1 row' and '12 rows'."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    """Return a number with a noun whose plural ends in s, as in '1 row' and '1,200 rows'."""
+    return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"
 
 
 def listed(names: Iterable[str], between: str = ", ") -> str:

@@ -16,7 +16,7 @@ import typer
 from dh2sim.cli.common import INTERRUPTED, QuietOption, RobotArgument, build_any, named_values
 from dh2sim.cli.output import json_text, make_console, print_wrapped, progress_bar, size_text
 from dh2sim.cli.runs import clipped_controls, contacts, loops
-from dh2sim.messages import printable
+from dh2sim.messages import counted, printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -331,8 +331,8 @@ def _print_speed(job: Job, progress: Progress) -> None:
 def _print_summary(job: Job, summary: RunDescription, progress: Progress, out: str) -> None:
     options = job.options
     print(
-        f"{summary.robot}: {summary.rollouts:,} rollouts of {summary.steps:,} steps ({summary.duration:g} s), "
-        f"{printable(str(options.controller))}, in {printable(out)}"
+        f"{summary.robot}: {counted(summary.rollouts, 'rollout')} of {counted(summary.steps, 'step')} "
+        f"({summary.duration:g} s), {printable(str(options.controller))}, in {printable(out)}"
     )
     _print_speed(job, progress)
     recorded = [each.name for each in job.layout.variables if {"step", "interval"} & {*each.dimensions}]

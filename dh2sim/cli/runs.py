@@ -14,7 +14,7 @@ import typer
 from dh2sim.cli.common import DONE, FELL_SHORT, QuietOption, complain
 from dh2sim.cli.output import make_console, progress_bar, size_text, wrapped
 from dh2sim.errors import Dh2simError
-from dh2sim.messages import did_you_mean, listed, printable
+from dh2sim.messages import counted, did_you_mean, listed, printable
 
 if TYPE_CHECKING:
     from dh2sim.simulate.description import RunDescription
@@ -192,11 +192,22 @@ def _change(key: str, setting: float | str) -> str:
             return f"{key} {setting:g}{unit}"
 
 
+def _designs(description: RunDescription) -> str:
+    """Return which designs a run has, as in 'a2 ±5 %, d3 normal:0.01; 10 rollouts each'."""
+    drawn = [
+        f"{name} {how}" if ":" in how else f"{name} ±{100 * float(how):g} %" for name, how in description.vary.items()
+    ]
+    listed = [] if description.designs is None else [f"of {printable(description.designs) or 'a table'}"]
+    return f"{', '.join([*listed, *drawn])}; {counted(description.per_design, 'rollout')} each"
+
+
 def _sections(description: RunDescription, *, verified: bool) -> Iterator[tuple[str, list[str]]]:
     yield "robot", [description.robot]
     yield "controller", [description.controller]
     changes = ", ".join(_change(name, setting) for name, setting in description.randomize.items())
     yield "randomised", [changes or "nothing"]
+    if description.vary or description.designs is not None:
+        yield "designs", [_designs(description)]
     yield (
         "rollouts",
         [

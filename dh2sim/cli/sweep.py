@@ -9,7 +9,8 @@ import typer
 
 from dh2sim.cli.common import QuietOption, RobotArgument, build_all, named_values
 from dh2sim.cli.output import json_text, progress_bar, table_lines
-from dh2sim.messages import printable
+from dh2sim.errors import Dh2simError
+from dh2sim.messages import counted, printable
 
 if TYPE_CHECKING:
     from dh2sim.sweep.sweep import Sweep
@@ -75,6 +76,8 @@ def sweep(
       dh2sim sweep puma560 --designs designs.csv --measure reach -o arms.csv
       dh2sim sweep ur5e --vary d4=0.1 --count 32 --measure reach --json
     """
+    if not vary and designs is None:
+        raise Dh2simError("there is nothing to vary: give --vary or --designs")
     model = build_all([robot])[0]
     from dh2sim.robot_facade import Robot
     from dh2sim.sweep.sweep import DEFAULT_COUNT, sweep
@@ -133,7 +136,7 @@ def _as_json(found: Sweep) -> dict[str, object]:
 def _lines(found: Sweep) -> list[str]:
     before = found.count - found.measured
     kept = f", {before:,} of them before" if before else ""
-    lines = [f"{found.robot}: {found.count:,} designs measured{kept}", ""]
+    lines = [f"{found.robot}: {counted(found.count, 'design')} measured{kept}", ""]
     table: list[tuple[str, ...]] = [("measure", "least", "mean", "best", "design")]
     for name, spread in found.measures.items():
         values = (f"{value:.5g}" for value in (spread.least, spread.mean, spread.best.value))

@@ -117,6 +117,12 @@ class RunDescription:
     integrator: str
     start: str
     randomize: Mapping[str, float | str]
+    vary: Mapping[str, str]
+    """How numbers of the robot file are drawn, by name."""
+    designs: str | None
+    """File of designs, or None."""
+    per_design: int
+    """Successive rollouts that have one design."""
     recorded: Mapping[str, RecordedVariable]
     stopped: tuple[EarlyStop, ...]
     """Every rollout that stopped early."""
@@ -192,6 +198,9 @@ def describe(path: str | PathLike[str]) -> RunDescription:
         integrator=attributes["integrator"],
         start=settings["start"],
         randomize=MappingProxyType(dict(attributes["randomize"])),
+        vary=MappingProxyType(dict(settings.get("vary", {}))),
+        designs=settings.get("designs"),
+        per_design=settings.get("per_design", 1),
         recorded=MappingProxyType(
             {
                 name: RecordedVariable(

@@ -121,6 +121,9 @@ def test_json_tells_the_same_alone(run: Path, arrays: Arrays) -> None:
         "integrator": "implicitfast",
         "start": "home",
         "randomize": {"mass": 0.1},
+        "vary": {},
+        "designs": None,
+        "per_design": 1,
         "bytes_on_disk": _bytes_on_disk(run),
         "bytes_in_memory": sum(array.nbytes for array in arrays.values()),
         "blocks": 3,
@@ -252,3 +255,14 @@ def test_options_that_make_no_sense_are_reported(run: Path, options: list[str], 
 )
 def test_sizes_are_reported_with_a_digit_and_a_unit(count: int, text: str) -> None:
     assert size_text(count) == text
+
+
+def test_the_designs_of_a_run_are_described(tmp_path: Path) -> None:
+    path = tmp_path / "run.zarr"
+    options = ["--vary", "a1=0.05,joint_1.link.mass=uniform:1:2", "--rollouts", "2", "--per-design", "2", "-q"]
+    assert dh2sim("rollout", "planar_2r", "--out", str(path), "--steps", "2", *options).status == 0
+    found = dh2sim("runs", str(path)).out
+    assert "  designs     a1 ±5 %, joint_1.link.mass uniform:1.0:2.0; 2 rollouts each\n" in found
+    described = json.loads(dh2sim("runs", str(path), "--json").out)
+    assert described["vary"] == {"a1": "0.05", "joint_1.link.mass": "uniform:1.0:2.0"}
+    assert (described["designs"], described["per_design"]) == (None, 2)

@@ -50,6 +50,9 @@ def test_a_finished_run_is_described(tmp_path: Path) -> None:
         "integrator": "Euler",
         "start": "home",
         "randomize": {},
+        "vary": {},
+        "designs": None,
+        "per_design": 1,
         "recorded": {
             "qpos": {"units": "rad or m", "dimensions": ["rollout", "step", "joint"], "shape": [7, 5, 2]},
             "ctrl": {"units": "N*m or N", "dimensions": ["rollout", "interval", "actuator"], "shape": [7, 4, 2]},
