@@ -34,7 +34,7 @@ p = built.fk(q)[:, :3, 3]
 for name, robot in (("nominal", nominal), ("calibrated", calibrated)):
     error = np.linalg.norm(robot.fk(q)[:, :3, 3] - p, axis=1)
     print(f"{name}: off by {1e3 * np.sqrt((error**2).mean()):.3f} mm, at most {1e3 * error.max():.3f} mm")
-print(f"predicted: {1e3 * found.predicted.length:.3f} mm; {found.identifiable} parameters told")
+print(f"predicted: {1e3 * found.predicted.length:.3f} mm; {found.identifiable} parameters identifiable")
 print(f"chi² per degree of freedom: {found.fit.chi2_per_dof:.3f}, expected 1 ± {found.chi2_spread:.3f}")
 
 # a robot like any other

@@ -63,7 +63,7 @@ def simulate(name: str, kind: str, *, fits: int, seed: int = 0) -> Statistics:
     """Calibrate many robots that are off one table."""
     nominal = load_robot(name)
     nominal = replace(nominal, tool=replace(nominal.tool, xyz=nominal.tool.xyz + REFLECTOR), source_file=None)
-    chi2, dof, held, predicted, whitened, told = [], 0, [], [], [], 0
+    chi2, dof, held, predicted, whitened, fitted = [], 0, [], [], [], 0
     for k in range(fits):
         true = off(nominal, 1e-3, 1000 * seed + k)
         q, unseen = random_q(nominal, ROWS[kind], 2000 * seed + k), random_q(nominal, UNSEEN, 3000 * seed + k)
@@ -83,17 +83,17 @@ def simulate(name: str, kind: str, *, fits: int, seed: int = 0) -> Statistics:
         truth = fit(exact, best.state, kept, best.sigma).state
         change = robot.change(best.state.values, truth.values)
         error = np.concatenate([change, (best.state.points - truth.points).ravel()])[kept]
-        told = len(kept)
+        fitted = len(kept)
         whitened.append(float(error @ np.linalg.solve(best.covariance, error)))
-    per_dof, per_told = np.array(chi2) / dof, np.array(whitened) / told
+    per_dof, per_parameter = np.array(chi2) / dof, np.array(whitened) / fitted
     return Statistics(
         fits=fits,
         chi2=float(per_dof.mean()),
         chi2_off=float((per_dof.mean() - 1.0) / math.sqrt(2.0 / dof / fits)),
         held_out=math.sqrt(float(np.mean(held))),
         predicted=math.sqrt(float(np.mean(predicted))),
-        parameters=float(per_told.mean()),
-        parameters_off=float((per_told.mean() - 1.0) / math.sqrt(2.0 / told / fits)),
+        parameters=float(per_parameter.mean()),
+        parameters_off=float((per_parameter.mean() - 1.0) / math.sqrt(2.0 / fitted / fits)),
     )
 
 

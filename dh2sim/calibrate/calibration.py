@@ -17,10 +17,9 @@ from dh2sim.calibrate.identify import find_basis
 from dh2sim.calibrate.initial import initial_states
 from dh2sim.calibrate.measurements import Kind, Measurements
 from dh2sim.calibrate.observations import Observations, State
-from dh2sim.calibrate.outliers import find_outliers
+from dh2sim.calibrate.outliers import Outlier, chi2_spread, find_outliers
 from dh2sim.calibrate.parameters import Group, RobotParameters, Values
-from dh2sim.calibrate.result import Calibration, Outlier, ParameterResult, Told
-from dh2sim.calibrate.statistics import chi2_spread
+from dh2sim.calibrate.result import Calibration, ParameterResult, ParameterStatus
 from dh2sim.calibrate.unknowns import prior_of, requested_columns
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
@@ -36,6 +35,13 @@ _FAR: Final = 0.1
 """m, by which a base has been moved that is not only corrected."""
 _VAGUE: Final = 3e-3
 """m or rad: a standard deviation that is greater than errors of most robots."""
+_UNITS: Final = {"mm": 1e-3, "cm": 1e-2, "inches": 0.0254}
+_SPREAD: Final = 0.01
+"""m, over which the tool must have moved for a unit to show."""
+_GROWTH: Final = 2.0
+"""Times the size of its table, that no arm is built off."""
+_MOST_NAMED: Final = 6
+"""Parameters in a message."""
 _ADVICE: Final = (
     "Measure more, at configurations that are spread over the limits, fit fewer parameters (unknown), or say how far "
     "off they may be (prior)."
@@ -136,11 +142,27 @@ class _Task:
             (k for k in range(len(self.parameters)) if k not in self.free), "not among the unknown"
         )
         self.notes: list[str] = []
+        self._require_metres()
         self._hold_what_has_no_reference()
         self.free = {k for k in self.free if k not in self.held}
         self.groups = {self.parameters[k].group for k in self.free} - {None}
         self.prior_given = dict(prior or {})
         self.prior = prior_of(self.robot, self.prior_given, self.free, Observations(self.robot, measured))
+
+    def _require_metres(self) -> None:
+        """Raise an error if positions are spread as many times wider than the table's as a unit is."""
+        measured = self.measured
+        if measured.kind not in (Kind.POSE, Kind.POSITION) or measured.position is None:
+            return
+        _, p = self.robot.tool_poses(self.robot.start, measured.q)
+        expected, found = (float(np.sqrt(np.var(points, axis=0).sum())) for points in (p, measured.position))
+        for unit, size in _UNITS.items():
+            for times, given, meant in ((1.0 / size, unit, "m"), (size, "m", unit)):
+                if abs(found - times * expected) < 0.1 * times * expected and expected > _SPREAD:
+                    raise CalibrationError(
+                        f"{self._what(measured)}: positions are spread over {found:.3g} m, where the table says "
+                        f"{expected:.3g} m: they look like {given} taken for {meant}"
+                    )
 
     def _hold_what_has_no_reference(self) -> None:
         """Hold what places the arm as a whole, where nothing that was measured says where it is."""
@@ -254,15 +276,15 @@ class _Task:
             return
         measured, robot = observations.measured, len(self.parameters)
         J = weighted_jacobian(observations, state, self.sigma)
-        told = find_basis(J, observations.unknowns, columns)
+        basis = find_basis(J, observations.unknowns, columns)
         could = self.possible(observations, state)
-        mine = {k for k in told.kept if k < robot}
+        mine = {k for k in basis.kept if k < robot}
         count = f"{len(could)} parameters of the robot" + (
             f" and {len(observations.unknowns) - robot} of the measurement"
             if len(observations.unknowns) > robot
             else ""
         )
-        if len(J) < len(could) + len(told.kept) - len(mine):
+        if len(J) < len(could) + len(basis.kept) - len(mine):
             raise CalibrationError(
                 f"{self._what(measured)} cannot fix {count}: they are only {counted(len(J), 'equation')}. {_ADVICE}"
             )
@@ -270,10 +292,13 @@ class _Task:
             return
         missing = [self.parameters[k].name for k in sorted(could - mine)]
         still = _still_joints(self.robot.spec, measured.q)
-        why = f" {listed(still)} {'does' if len(still) == 1 else 'do'} not move." if still else ""
+        if len(still) == self.robot.n:
+            why = " No joint moves."
+        else:
+            why = f" {listed(still)} {'does' if len(still) == 1 else 'do'} not move." if still else ""
         raise CalibrationError(
             f"{self._what(measured)} cannot fix {count}: they tell only {len(mine)} of the robot apart, not also "
-            f"{listed(missing)}.{why} {_ADVICE}"
+            f"{_some(missing)}.{why} {_ADVICE}"
         )
 
     def _require_useful(self, before: Fit, whole: Fit) -> None:
@@ -282,6 +307,12 @@ class _Task:
             return
         measured = whole.observations.measured
         q = random_vectors(self.robot.spec, self.measured.q, _TRIES, self.seed)
+        growth = _extent(self.robot, whole.state.values, q) / max(_extent(self.robot, self.robot.start, q), 1e-12)
+        if not 1.0 / _GROWTH < growth < _GROWTH:
+            raise CalibrationError(
+                f"{self._what(measured)}: they would make the arm {growth:.4g} times as large as its table says: "
+                "lengths are in another unit, or the robot is not the one that was measured"
+            )
         known = self._predicted(whole, q).length
         was = errors_of(before.observations, before.state).length
         if known > _USELESS * max(was, 3.0 * whole.sigma.length):
@@ -360,15 +391,18 @@ class _Task:
             own = None if parameter.row < 0 else start.rows[parameter.row][parameter.group.value]
             now = None if parameter.row < 0 else values.rows[parameter.row][parameter.group.value]
             into = whole.basis.folded.get(k, ())
-            told = (
-                Told.HELD if k in self.held else Told.FITTED if k in sigma else Told.FOLDED if into else Told.UNSEEN
-            )
+            if k in self.held:
+                status = ParameterStatus.HELD
+            elif k in sigma:
+                status = ParameterStatus.FITTED
+            else:
+                status = ParameterStatus.FOLDED if into else ParameterStatus.UNSEEN
             found.append(
                 ParameterResult(
                     name=parameter.name,
                     group=parameter.group,
                     is_angle=parameter.is_angle,
-                    told=told,
+                    status=status,
                     nominal=own,
                     value=now,
                     change=float(changes[k]),
@@ -429,8 +463,15 @@ class _Task:
         ]
         if vague:
             notes.append(
-                f"{listed(vague)} {'is' if len(vague) == 1 else 'are'} told to no better than {1e3 * _VAGUE:g} mm or "
-                "mrad: only together do these numbers mean anything. A prior keeps them near the robot file's."
+                f"{listed(vague)} {'is' if len(vague) == 1 else 'are'} determined to no better than "
+                f"{1e3 * _VAGUE:g} mm or mrad: only together do these numbers mean anything. A prior keeps them near "
+                "the robot file's."
+            )
+        copies = _copies(whole.observations.measured)
+        if copies:
+            notes.append(
+                f"{counted(copies, 'row')} {'is an exact copy' if copies == 1 else 'are exact copies'} of another: "
+                "remove what was not measured anew, since each row counts."
             )
         if outliers and not self.robust:
             notes.append("There are outliers; a robust fit leaves them out.")
@@ -441,6 +482,30 @@ def _misfit(observations: Observations, state: State) -> float:
     """Return how bad a start is; rows that are far off do not decide."""
     size = np.abs(observations.equations(state).e)
     return float(np.minimum(size, 10.0 * np.median(size) + 1e-12).sum())
+
+
+def _copies(measured: Measurements) -> int:
+    """Return how many rows are exact copies of rows before them, in what was measured and where."""
+    count = len(measured)
+    given = (measured.q, measured.position, measured.rotation, measured.distance)
+    numbers = np.concatenate([each.reshape(count, -1) for each in given if each is not None], axis=1)
+    names = (
+        texts or ("",) * count
+        for texts in (measured.station, measured.placement, measured.socket, measured.to, measured.pair)
+    )
+    return count - len(set(zip((row.tobytes() for row in numbers), *names, strict=True)))
+
+
+def _extent(robot: RobotParameters, values: Values, q: Array) -> float:
+    """Return how far the last DH frame gets around: the rms distance from its mean position, m."""
+    _, p = robot.tool_poses(replace(values, tool=np.eye(4)), q)
+    return float(np.sqrt(((p - p.mean(axis=0)) ** 2).sum(axis=1).mean()))
+
+
+def _some(names: Sequence[str]) -> str:
+    if len(names) <= _MOST_NAMED + 1:
+        return listed(names)
+    return f"{listed(names[:_MOST_NAMED])} and {len(names) - _MOST_NAMED} others"
 
 
 def _still_joints(spec: RobotSpec, q: Array) -> list[str]:

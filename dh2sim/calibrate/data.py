@@ -8,7 +8,7 @@ from typing import Any
 
 from dh2sim.calibrate.held_out import Errors, HeldOut
 from dh2sim.calibrate.measurements import Kind
-from dh2sim.calibrate.result import Calibration, Told
+from dh2sim.calibrate.result import Calibration, ParameterStatus
 from dh2sim.messages import counted
 
 
@@ -48,7 +48,7 @@ def calibration_data(found: Calibration) -> dict[str, Any]:
             {
                 "name": parameter.name,
                 "unit": "rad" if parameter.is_angle else "m",
-                "told": parameter.told.value,
+                "told": parameter.status.value,
                 "nominal": parameter.nominal,
                 "value": parameter.value,
                 "change": parameter.change,
@@ -104,9 +104,9 @@ def summary(found: Calibration) -> list[tuple[str, str]]:
         what += f", {counted(len(set(measured.groups)), measured.group_name)}"
     facts = [
         ("", what),
-        ("told", f"{found.identifiable} parameters of the robot, {found.possible} at most by this kind"),
+        ("identifiable", f"{found.identifiable} parameters of the robot, {found.possible} at most by this kind"),
     ]
-    own = sum(each.told is Told.FITTED for each in found.parameters)
+    own = sum(each.status is ParameterStatus.FITTED for each in found.parameters)
     if len(fit.basis.kept) > own:
         facts.append(
             ("", f"and {len(fit.basis.kept) - own} of {'stations' if measured.socket is None else 'sockets'}")

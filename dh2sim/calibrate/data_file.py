@@ -28,6 +28,7 @@ _MOST_PROBLEMS: Final = 50
 _LENGTH_UNITS: Final = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
 _ANGLE_UNITS: Final = {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "mrad": 1e-3}
 _HEADING: Final = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(]\s*(?P<unit>[^\])]*?)\s*[\])])?\s*")
+_SUFFIXED: Final = re.compile(r"(?P<name>.+)_(?P<unit>m|mm|cm|um|in|rad|deg|mrad)")
 _JOINT_ALIAS: Final = re.compile(r"(?:q|j|joint)_?([0-9]{1,3})", re.IGNORECASE)
 _POSITION: Final = ("x", "y", "z")
 _QUATERNION: Final = ("qw", "qx", "qy", "qz")
@@ -237,6 +238,8 @@ def _columns(
         match = _HEADING.fullmatch(cell.text)
         name, unit = (match["name"], match["unit"] or "") if match else (cell.text, "")
         key = _folded(name)
+        if not unit and key not in joints and (suffixed := _SUFFIXED.fullmatch(key)):
+            key, unit = suffixed["name"], suffixed["unit"]
         joint = joints.get(key, -1)
         alias = _JOINT_ALIAS.fullmatch(key)
         if joint < 0 and alias and 1 <= int(alias[1]) <= len(rows):
@@ -372,7 +375,7 @@ def _cells(
             if not column.factor:
                 texts[column.name][k] = cell.text
                 continue
-            text = cell.text.replace(",", ".") if separator == ";" else cell.text
+            text = cell.text.replace(",", ".") if separator != "," else cell.text
             try:
                 number = float(text) if "_" not in text else float("x")
             except ValueError:

@@ -1,6 +1,6 @@
 """Errors at measurements that a fit has not seen, with groups held out whole.
 
-Rows of one placement share its errors, so that a row held out alone would be told by its neighbours.
+Rows of one placement share its errors, so that a row held out alone would be predicted by its neighbours.
 """
 
 from __future__ import annotations

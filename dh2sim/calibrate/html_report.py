@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dh2sim.calibrate.held_out import Errors
 from dh2sim.calibrate.observations import LENGTH
-from dh2sim.calibrate.result import Calibration, ParameterResult, Told
+from dh2sim.calibrate.result import Calibration, ParameterResult, ParameterStatus
 from dh2sim.typing import Array
 
 _STYLE: Final = """
@@ -58,7 +58,7 @@ def html_report(found: Calibration) -> str:
         "<h2>Parameters</h2>",
         *_parameter_figures(found),
         _parameters(found),
-        *_told(found),
+        *_not_fitted(found),
     ]
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -347,7 +347,7 @@ def _parameter_figures(found: Calibration) -> list[str]:
         table = [
             each
             for each in found.parameters
-            if each.told is Told.FITTED and each.is_angle is is_angle and each.nominal is not None
+            if each.status is ParameterStatus.FITTED and each.is_angle is is_angle and each.nominal is not None
         ]
         if table:
             caption = f"Changes of the table, {unit}, with two standard deviations."
@@ -388,7 +388,7 @@ def _changes(table: Sequence[ParameterResult], unit: str) -> str:
 def _parameters(found: Calibration) -> str:
     rows = []
     for each in found.parameters:
-        if each.told is not Told.FITTED or each.sigma is None:
+        if each.status is not ParameterStatus.FITTED or each.sigma is None:
             continue
         unit = "mrad" if each.is_angle else "mm"
         values = ["", ""]
@@ -399,16 +399,16 @@ def _parameters(found: Calibration) -> str:
     return _table(["parameter", "was", "is", "change", "sigma", ""], rows)
 
 
-def _told(found: Calibration) -> list[str]:
+def _not_fitted(found: Calibration) -> list[str]:
     why: dict[str, list[str]] = {}
     for each in found.parameters:
         reasons = {
-            Told.FOLDED: f"folded into {', '.join(each.into)}",
-            Told.UNSEEN: "without effect on what was measured",
-            Told.HELD: f"held: {each.reason}",
+            ParameterStatus.FOLDED: f"folded into {', '.join(each.into)}",
+            ParameterStatus.UNSEEN: "without effect on what was measured",
+            ParameterStatus.HELD: f"held: {each.reason}",
         }
-        if each.told in reasons:
-            why.setdefault(reasons[each.told], []).append(each.name)
+        if each.status in reasons:
+            why.setdefault(reasons[each.status], []).append(each.name)
     if not why:
         return []
     rows = [[", ".join(names), reason] for reason, names in why.items()]

@@ -1,4 +1,4 @@
-"""Which parameters measurements tell: a basis of the identifiable ones, and what the others fold into."""
+"""Which parameters measurements determine: a basis of the identifiable ones, and what the others fold into."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _CLEAR: Final = 0.1
 _PART: Final = 0.02
 """Of the greatest share, from which on a parameter is named among those that another one folds into."""
 _ORDER: Final = (None, Group.BASE, Group.TOOL, Group.A, Group.ALPHA, Group.BETA, Group.D, Group.THETA)
-"""Who is told first: placements of base and tool take the constants of the table that do the same."""
+"""What is determined first: placements of base and tool take the constants of the table that do the same."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Basis:
-    """Parameters that are told independently of each other, and what the others do the same as."""
+    """Parameters that are determined independently of each other, and what the others do the same as."""
 
     kept: tuple[int, ...]
     """Columns, ascending."""
@@ -54,7 +54,7 @@ def find_basis(J: Array, unknowns: Sequence[Parameter], columns: Sequence[int]) 
     kept: list[int] = []
     rest = triangle.copy()
     limit = _CLEAR
-    while limit >= DEPENDENT:  # who is first comes first, but not before others that are told much better
+    while limit >= DEPENDENT:  # who is first comes first, but not before others that are determined much better
         for k in range(len(present)):
             if k not in kept and np.linalg.norm(rest[:, k]) > limit:
                 kept.append(k)

@@ -1,20 +1,38 @@
-"""Rows that are farther off than noise takes any of as many."""
+"""Rows that are farther off than noise takes any of as many, by the chi-squared distribution."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dh2sim.calibrate.fit import Fit
 from dh2sim.calibrate.observations import ANGLE, LENGTH
-from dh2sim.calibrate.result import Outlier
-from dh2sim.calibrate.statistics import chi2_quantile
+from dh2sim.typing import Array
 
 OUTLIER: Final = 0.01
 """Chance that any row at all is called an outlier where there is none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outlier:
+    """A row that is farther off than noise takes any."""
+
+    row: int
+    place: str
+    """Such as ``line 17``."""
+    group: str
+    times: float
+    """Standard deviations of a component."""
+    length: float
+    """How far off, m; NaN where no length was measured."""
+    angle: float
+    """rad; NaN where no angle was measured."""
+    left_out: bool
 
 
 def find_outliers(whole: Fit, dropped: NDArray[np.intp] | Sequence[int], *, robust: bool) -> tuple[Outlier, ...]:
@@ -54,3 +72,20 @@ def find_outliers(whole: Fit, dropped: NDArray[np.intp] | Sequence[int], *, robu
             )
         )
     return tuple(sorted(found, key=lambda outlier: -outlier.times))
+
+
+def chi2_quantile(share: float, dof: ArrayLike) -> Array:
+    """Return quantiles of the chi-squared distribution (E. B. Wilson, M. M. Hilferty, 1931), within a few percent.
+
+    Args:
+        share: Of the distribution that lies below, in (0, 1).
+        dof: Degrees of freedom.
+    """
+    z = NormalDist().inv_cdf(share)
+    spread = 2.0 / (9.0 * np.asarray(dof, dtype=np.float64))
+    return np.asarray(np.asarray(dof) * np.maximum(1.0 - spread + z * np.sqrt(spread), 0.0) ** 3)
+
+
+def chi2_spread(dof: int) -> float:
+    """Return the standard deviation of chi-squared per degree of freedom."""
+    return float(np.sqrt(2.0 / dof)) if dof > 0 else float("nan")

@@ -9,13 +9,13 @@ from enum import StrEnum
 from dh2sim.calibrate.fit import Fit
 from dh2sim.calibrate.held_out import Errors, HeldOut
 from dh2sim.calibrate.measurements import Measurements
+from dh2sim.calibrate.outliers import Outlier, chi2_spread
 from dh2sim.calibrate.parameters import Group
-from dh2sim.calibrate.statistics import chi2_spread
 from dh2sim.robot.spec import RobotSpec
 
 
-class Told(StrEnum):
-    """What measurements say of a parameter."""
+class ParameterStatus(StrEnum):
+    """What became of a parameter."""
 
     FITTED = "fitted"
     FOLDED = "folded"
@@ -33,7 +33,7 @@ class ParameterResult:
     name: str
     group: Group
     is_angle: bool
-    told: Told
+    status: ParameterStatus
     nominal: float | None
     """rad or m; None of a component of a pose, whose change counts."""
     value: float | None
@@ -45,23 +45,6 @@ class ParameterResult:
     """What it folds into."""
     reason: str = ""
     """Why it was held."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Outlier:
-    """A row that is farther off than noise takes any."""
-
-    row: int
-    place: str
-    """Such as ``line 17``."""
-    group: str
-    times: float
-    """Standard deviations of a component."""
-    length: float
-    """How far off, m; NaN where no length was measured."""
-    angle: float
-    """rad; NaN where no angle was measured."""
-    left_out: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -82,9 +65,9 @@ class Calibration:
     errors_before: Errors
     errors: Errors
     identifiable: int
-    """Of the robot's parameters, how many the measurements tell apart by themselves."""
+    """Of the robot's parameters, how many the measurements determine by themselves."""
     possible: int
-    """How many any measurements of this kind could tell of those that were asked for."""
+    """How many any measurements of this kind could determine of those that were asked for."""
     outliers: tuple[Outlier, ...]
     held_out: HeldOut | None
     predicted: Errors

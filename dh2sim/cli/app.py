@@ -98,6 +98,7 @@ Examples:
   dh2sim convert stanford --to modified
   dh2sim frames axes.yaml            from joint axes to a table
   dh2sim diff puma560 puma560_standard
+  dh2sim calibrate ur5e --plan 30 -o configurations.csv
   dh2sim rollout stanford --out run.zarr
   dh2sim runs run.zarr               what a run contains
   dh2sim sweep stanford --vary d2=0.2 --count 32 -o arms.csv

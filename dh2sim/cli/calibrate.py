@@ -222,7 +222,7 @@ def _plan(
     lines = [f"{spec.name}: {counted(count, 'configuration')} to measure {found.kind}s at", ""]
     share = found.error / found.random_error
     facts = [
-        ("told", f"{found.parameters} parameters of the robot"),
+        ("identifiable", f"{found.parameters} parameters of the robot"),
         ("the tool", f"known to {found.error:.2f} of the noise, rms inside the limits"),
         (
             "at random",
@@ -383,7 +383,7 @@ def _lines(found: Calibration) -> list[str]:
     lines += ["", *_error_lines(found)]
     lines += ["", *_parameter_lines(found)]
     for title, which in (("Folded", "folded"), ("Without effect", "unseen"), ("Held", "held")):
-        lines += _told_lines(found, title, which)
+        lines += _status_lines(found, title, which)
     lines += _outlier_lines(found)
     for note in found.notes:
         lines += wrapped(f"Note: {note}", rest="      ")
@@ -433,7 +433,7 @@ def _parameter_lines(found: Calibration) -> list[str]:
     units = found.original.units
     rows = [("parameter", f"was ({units.angle}, {units.length})", "change", "sigma", "")]
     for parameter in found.parameters:
-        if parameter.told.value == "fitted" and parameter.sigma is not None:
+        if parameter.status.value == "fitted" and parameter.sigma is not None:
             unit = "mrad" if parameter.is_angle else "mm"
             rows.append(
                 (
@@ -447,11 +447,11 @@ def _parameter_lines(found: Calibration) -> list[str]:
     return [line.rstrip() for line in table_lines(rows, left=1)]
 
 
-def _told_lines(found: Calibration, title: str, which: str) -> list[str]:
+def _status_lines(found: Calibration, title: str, which: str) -> list[str]:
     """Return which parameters stay as they were, and why: those with the same reason together."""
     reasons: dict[str, list[str]] = {}
     for parameter in found.parameters:
-        if parameter.told.value == which:
+        if parameter.status.value == which:
             reason = parameter.reason if which == "held" else ", ".join(parameter.into)
             reasons.setdefault(reason, []).append(parameter.name)
     lines = []

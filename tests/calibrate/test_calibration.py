@@ -10,7 +10,7 @@ import pytest
 
 from dh2sim.calibrate.calibration import calibrate
 from dh2sim.calibrate.measurements import measurements
-from dh2sim.calibrate.result import Calibration, Told
+from dh2sim.calibrate.result import Calibration, ParameterStatus
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import Pose, RobotSpec
@@ -47,14 +47,18 @@ def test_poses_tell_four_numbers_a_turning_joint_two_a_sliding_one_and_six(
     assert 0.5 * found.predicted.length < rms < 2.0 * found.predicted.length < 1e-4
     _, found = fitted(name, "position")
     assert (found.identifiable, found.possible) == (positions, positions)
-    assert {each.name for each in found.parameters if each.told is Told.UNSEEN} == {"tool.rx", "tool.ry", "tool.rz"}
+    assert {each.name for each in found.parameters if each.status is ParameterStatus.UNSEEN} == {
+        "tool.rx",
+        "tool.ry",
+        "tool.rz",
+    }
 
 
 def test_distances_from_four_unknown_points_tell_the_arm_but_not_where_it_is() -> None:
     true, found = fitted("stanford", "distance", 120)
     assert found.identifiable == found.possible == 25 - 6
     assert abs(found.fit.chi2_per_dof - 1.0) < 4.0 * found.chi2_spread
-    assert {each.told for each in found.parameters if each.group == "base"} == {Told.HELD}
+    assert {each.status for each in found.parameters if each.group == "base"} == {ParameterStatus.HELD}
     q = random_q(true, 60, 9)
     shape = [table_tool_pose(spec, q)[:, :3, 3] for spec in (found.robot, true)]
     lengths = [np.linalg.norm(points[:, None] - points[None], axis=2) for points in shape]
@@ -63,12 +67,12 @@ def test_distances_from_four_unknown_points_tell_the_arm_but_not_where_it_is() -
 
 def test_what_folds_into_what_is_named() -> None:
     _, found = fitted("stanford", "pose")
-    into = {each.name: each.into for each in found.parameters if each.told is Told.FOLDED}
+    into = {each.name: each.into for each in found.parameters if each.status is ParameterStatus.FOLDED}
     assert into["joint_1.d"] == ("base.z",)
     assert "base.rz" in into["joint_1.theta"]
     assert into["joint_6.d"] == ("tool.z",)
     assert len(into) == 36 - 28 + 1  # the Hayati row of the sliding joint has one number more
-    unchanged = [each for each in found.parameters if each.told is Told.FOLDED]
+    unchanged = [each for each in found.parameters if each.status is ParameterStatus.FOLDED]
     assert all(each.change == 0.0 and each.value == each.nominal for each in unchanged)
 
 
@@ -189,7 +193,9 @@ def test_outliers_are_named_and_left_out() -> None:
 def test_a_prior_keeps_what_measurements_do_not_tell() -> None:
     _, found = fitted("puma560", "pose", 8, prior={"length": 1e-3, "angle": 1e-3})
     assert found.identifiable == 30
-    changed = [each for each in found.parameters if each.told is Told.FITTED and each.nominal is not None]
+    changed = [
+        each for each in found.parameters if each.status is ParameterStatus.FITTED and each.nominal is not None
+    ]
     assert all(abs(each.change) < 5e-3 for each in changed)
     assert all(each.sigma is not None and each.sigma < 1.0001e-3 for each in changed)
 
@@ -215,9 +221,29 @@ def test_too_few_measurements_are_refused_in_words() -> None:
     text = refusal(CalibrationError, calibrate, nominal, given)
     assert "40 poses cannot fix 30 parameters of the robot: they tell only" in text
     assert "joint_4 does not move." in text
+    text = refusal(CalibrationError, calibrate, nominal, given.rows([0] * 40))
+    assert "not also joint_1.a, joint_1.alpha, joint_2.theta, joint_2.a, joint_2.alpha, joint_2.beta and " in text
+    assert " others. No joint moves." in text
     narrow = random_q(nominal, 40, 2) * 1e-3
     given = measured(nominal, off(nominal, 1e-3, 1), "position", narrow, seed=3)
     assert "the tool would be known to" in refusal(CalibrationError, calibrate, nominal, given, noise=SIGMA)
+
+
+def test_positions_in_another_unit_are_refused() -> None:
+    nominal = robot("scara")
+    given = measured(nominal, off(nominal, 1e-3, 1), "position", random_q(nominal, 40, 2), seed=3)
+    assert given.position is not None
+    for factor, said in ((1e3, "mm taken for m"), (0.0254, "m taken for inches")):
+        text = refusal(CalibrationError, calibrate, nominal, replace(given, position=factor * given.position))
+        assert text.startswith("40 positions: positions are spread over ")
+        assert text.endswith(f", where the table says 0.354 m: they look like {said}")
+
+
+def test_copied_rows_are_noted() -> None:
+    nominal = robot("scara")
+    given = measured(nominal, off(nominal, 1e-3, 1), "pose", random_q(nominal, 30, 2), seed=3)
+    found = calibrate(nominal, given.rows([*range(30), 3, 7]), held_out=False)
+    assert any(note.startswith("2 rows are exact copies of another:") for note in found.notes)
 
 
 def test_odd_robots_of_mixed_conventions_with_fixed_and_flipped_rows_are_fitted() -> None:

@@ -70,6 +70,15 @@ def test_transforms_semicolons_and_decimal_commas_are_read(tmp_path: Path) -> No
     assert np.abs(found.position - T[:, :3, 3]).max() < 1e-14
 
 
+def test_units_may_stand_behind_names_and_tabs_go_with_decimal_commas(tmp_path: Path) -> None:
+    arm = robot("scara")
+    header = "x_mm\ty_cm\tz_m\tjoint_1_deg\tq2_rad\tjoint_3_mm\tj4_mrad"
+    found = read_measurements(write(tmp_path, header, "1,5\t2,5\t0,5\t90\t0,1\t25\t-7"), arm)
+    assert found.position is not None
+    assert np.allclose(found.position, [[0.0015, 0.025, 0.5]])
+    assert np.allclose(found.q, [[np.pi / 2, 0.1, 0.025, -0.007]])
+
+
 def test_sockets_have_placements_and_distances(tmp_path: Path) -> None:
     lines = [f"{JOINTS},placement,socket,distance [mm]"]
     lines += [

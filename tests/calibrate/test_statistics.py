@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dh2sim.calibrate.statistics import chi2_quantile
+from dh2sim.calibrate.outliers import chi2_quantile
 from scripts.calibration_statistics import simulate
 
 

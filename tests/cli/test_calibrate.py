@@ -44,7 +44,7 @@ def test_the_report_says_what_is_told_and_how_well(points: Path, tmp_path: Path)
     assert (run.status, run.err) == (0, "")
     lines = run.out.splitlines()
     assert lines[0] == "stanford: calibrated with 60 positions, 6 placements"
-    assert any(line.startswith("told          25 parameters of the robot, 25 at most") for line in lines)
+    assert any(line.startswith("identifiable  25 parameters of the robot, 25 at most") for line in lines)
     assert any(line.startswith("held out by placement: as it was") for line in lines)
     assert "Folded: joint_1.d into base.z" in lines
     assert max(map(len, lines[:-1])) <= 80
