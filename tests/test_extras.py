@@ -29,6 +29,7 @@ MODULES = {
     "s3": {"obstore"},
     "cluster": {"distributed"},
     "fast": {"numba"},
+    "warp": {"warp", "mujoco_warp"},
 }
 """What is imported of each extra's libraries."""
 BROUGHT = {
@@ -206,5 +207,5 @@ def test_every_extra_asked_for_is_one_of_the_package() -> None:
 
 def test_all_holds_every_extra_but_the_largest_and_the_tests_need_that_too() -> None:
     extras = PROJECT["optional-dependencies"]
-    assert extras["all"] == [f"dh2sim[{','.join(name for name in MODULES if name != 'fast')}]"]
+    assert extras["all"] == [f"dh2sim[{','.join(name for name in MODULES if name not in ('fast', 'warp'))}]"]
     assert "dh2sim[all,fast]" in extras["test"]

@@ -107,6 +107,13 @@ def rollout(
     per_design: Annotated[
         int | None, typer.Option(metavar="N", help="Successive rollouts that have one design. [default: 1]")
     ] = None,
+    engine: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="mujoco, or warp: MuJoCo Warp, for GPUs, in single precision (extra 'warp', see docs/warp.md).",
+        ),
+    ] = "mujoco",
     floating_base: Annotated[bool, typer.Option("--floating-base", help="Let base_link move freely.")] = False,
     executor: Annotated[
         str | None,
@@ -191,13 +198,14 @@ def rollout(
         vary=named_values(vary, "--vary", "name=how, as in a2=0.05"),
         designs=None if designs is None else str(designs),
         per_design=per_design,
+        engine=engine,
         floating_base=floating_base,
     )
     part, named, sharing = _share(share), _blocks(blocks), bool(share or blocks)
     check_share(part, alone=named is None)
     job = with_block_size(prepare(model, options, command=shlex.join(["dh2sim", *sys.argv[1:]])), block_size)
     with (
-        workers_of(executor) as workers,
+        workers_of(executor, job) as workers,
         open_run(job, out, resume=resume, overwrite=overwrite, join=sharing) as writer,
     ):
         count = writer.layout.blocks

@@ -226,6 +226,8 @@ def _sections(description: RunDescription, *, verified: bool) -> Iterator[tuple[
         [f"{description.steps:,} of {description.timestep:g} s = {description.duration:g} s, {every} recorded"],
     )
     yield "integrator", [description.integrator]
+    if description.device:
+        yield "engine", [f"{description.engine}, on {description.device}"]
     yield "start", [f"{description.start}, seed {description.seed}"]
     yield "recorded", list(_recorded(description))
     yield "size", [_sizes(description)]
@@ -240,7 +242,13 @@ def _sections(description: RunDescription, *, verified: bool) -> Iterator[tuple[
 
 
 def _versions(description: RunDescription) -> Iterator[str]:
-    packages = {"dh2sim": "dh2sim", "mujoco": "MuJoCo", "numpy": "NumPy", "python": "Python"}
+    packages = {
+        "mujoco": "MuJoCo",
+        "numpy": "NumPy",
+        "python": "Python",
+        "mujoco_warp": "MuJoCo Warp",
+        "warp": "Warp",
+    }
     source = description.versions.get("mujoco_package", "")
     for name, version in description.versions.items():
         if name != "mujoco_package":

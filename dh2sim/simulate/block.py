@@ -10,7 +10,7 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from dh2sim.errors import ControllerError
+from dh2sim.errors import ControllerError, EngineError
 from dh2sim.messages import listed
 from dh2sim.processors import available_processors
 from dh2sim.robot.variation import CELLS
@@ -31,11 +31,12 @@ from dh2sim.simulate.disturbances import (
 from dh2sim.simulate.initial_states import InitialStates
 from dh2sim.simulate.loops import Observed, Scheduled, checked, simulate_closed_loop, simulate_open_loop
 from dh2sim.simulate.mujoco_runtime import quiet_engine, set_models
-from dh2sim.simulate.options import RolloutOptions
+from dh2sim.simulate.options import ENGINES, WARP, RolloutOptions
 from dh2sim.simulate.plant import Plant, batch_plant
 from dh2sim.simulate.randomization import Draws, Generators, Purpose, draw, push_time
 from dh2sim.simulate.randomized_models import apply_draws
 from dh2sim.simulate.records import Recorder
+from dh2sim.simulate.warp_batch import TOLERANCE, WarpBatch
 from dh2sim.typing import Array, read_only
 
 BATCH_SIZE = 128
@@ -85,8 +86,9 @@ def simulate_block(
     made: dict[int, DesignPlant] = {}
     threads = threads or available_processors()
     with quiet_engine():
-        for first in range(rollouts.start, rollouts.stop, BATCH_SIZE):
-            part = range(first, min(first + BATCH_SIZE, rollouts.stop))
+        size = len(rollouts) if job.options.engine == WARP else BATCH_SIZE  # a device is to be filled
+        for first in range(rollouts.start, rollouts.stop, size):
+            part = range(first, min(first + size, rollouts.stop))
             rows = slice(part.start - rollouts.start, part.stop - rollouts.start)
             own = {name: array[rows] for name, array in arrays.items()}
             _simulate(job, part, threads, own, job.options.steps, made)
@@ -98,12 +100,36 @@ def simulate_block(
 def rehearse(job: Job) -> None:
     """Simulate one step of the first rollouts, so that a controller that fails does so before a run is made.
 
+    With MuJoCo Warp that step is compared with MuJoCo's, where no links touch: where they do, contacts that are found
+    in single precision differ by more.
+
     Raises:
         ControllerError: It fails.
+        EngineError: MuJoCo Warp cannot simulate the robot, or not as MuJoCo does.
     """
     short, first = replace(job, options=job.options.replace(steps=1, every=1)), range(min(2, job.options.rollouts))
     with quiet_engine():
-        _simulate(short, first, 1, _empty(short, first), job.options.steps, {})
+        found = _first_positions(short, first, job.options.steps)
+        if job.options.engine == WARP:
+            mujoco = replace(short, options=short.options.replace(engine=ENGINES[0]))
+            _check_near(found, _first_positions(mujoco, first, job.options.steps))
+
+
+def _first_positions(short: Job, first: range, run_steps: int) -> Array:
+    """Return positions after a step, shape (rollouts, n); NaN for rollouts whose links touch in it."""
+    arrays = {**_empty(short, first), "qpos": np.empty((len(first), 2, short.plant.n))}
+    _simulate(short, first, 1, arrays, run_steps, {})
+    return np.where((arrays["contact_step"] == 0)[:, None], np.nan, arrays["qpos"][:, 1])
+
+
+def _check_near(found: Array, expected: Array) -> None:
+    away = np.abs(found - expected) / (1.0 + np.abs(expected))
+    most = float(np.max(away[np.isfinite(away)], initial=0.0))
+    if most > TOLERANCE:
+        raise EngineError(
+            f"MuJoCo Warp is {most:.1g} away from MuJoCo after the first time step, and {TOLERANCE:g} is allowed: "
+            "single precision does not suffice for this robot. Use the engine 'mujoco'"
+        )
 
 
 def _empty(job: Job, rollouts: range) -> dict[str, NDArray[Any]]:
@@ -186,10 +212,13 @@ def _simulate_batch(
         )
     recorder = Recorder(plant, arrays, options.every)
     stepwise = isinstance(controller, ClosedLoop) or recorder.looks_between_steps or "push_force" in drawn
-    # between the steps of a closed loop an MjData keeps what it has computed already
-    batch = Batch(plant.model, len(rollouts), threads, persistent=stepwise)
-    set_models(batch, plant, as_fields=bool(drawn))
-    apply_draws(batch, plant, drawn)
+    if options.engine == WARP:
+        batch: Any = _warp_batch(plant, len(rollouts), controller, name)
+    else:
+        # between the steps of a closed loop an MjData keeps what it has computed already
+        batch = Batch(plant.model, len(rollouts), threads, persistent=stepwise)
+        set_models(batch, plant, as_fields=bool(drawn))
+        apply_draws(batch, plant, drawn)
     batch.bind("qpos")[:] = qpos0
     batch.bind("qvel")[:] = qvel0
     monitored = MonitoredBatch(plant, batch, recorder, options.steps, drawn.get("effort_scale"))
@@ -225,6 +254,16 @@ def _simulate_batch(
     arrays["contact_link_a"][:], arrays["contact_link_b"][:] = monitored.contacts.links.T
     for variable, values in drawn.items():
         arrays[variable][:] = values
+
+
+def _warp_batch(plant: Plant, simulations: int, controller: Controller, name: str) -> WarpBatch:
+    """Return a batch on the device, if its controller need not be asked between steps."""
+    if isinstance(controller, ClosedLoop):
+        raise ControllerError(
+            f"controller '{name}' looks at the state before every time step, which the engine 'warp' keeps on its "
+            "device. Use hold, passive, sine, random or replay, or the engine 'mujoco'"
+        )
+    return WarpBatch(plant, simulations)
 
 
 def _delayed(controller: Controller, started: RolloutBatch, drawn: Draws, name: str) -> Controller:

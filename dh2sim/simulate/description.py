@@ -115,6 +115,10 @@ class RunDescription:
     complete: bool
     """Whether every block is committed."""
     integrator: str
+    engine: str
+    """'mujoco' or 'warp'."""
+    device: str
+    """What Warp computed on; empty for MuJoCo."""
     start: str
     randomize: Mapping[str, float | str]
     vary: Mapping[str, str]
@@ -196,6 +200,8 @@ def describe(path: str | PathLike[str]) -> RunDescription:
         versions=MappingProxyType(dict(attributes["versions"])),
         complete=complete,
         integrator=attributes["integrator"],
+        engine=settings.get("engine", "mujoco"),
+        device=str(attributes.get("device", "")),
         start=settings["start"],
         randomize=MappingProxyType(dict(attributes["randomize"])),
         vary=MappingProxyType(dict(settings.get("vary", {}))),

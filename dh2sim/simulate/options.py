@@ -25,6 +25,9 @@ STARTS: Final = ("home", "zero", "random")
 AUTO: Final = "auto"
 REFERENCE: Final = "reference"
 INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
+WARP: Final = "warp"
+ENGINES: Final = ("mujoco", WARP)
+"""What simulates: MuJoCo, or MuJoCo Warp on a GPU."""
 DEFAULT_DURATION: Final = 2.0
 """s."""
 MOST_STEPS: Final = 10**12
@@ -58,6 +61,7 @@ class RolloutKeywords(TypedDict, total=False):
     vary: Mapping[str, str | float | Draw]
     designs: str | PathLike[str] | Mapping[str, Any] | DesignTable | None
     per_design: SupportsIndex | None
+    engine: str
 
 
 class _OptionError(Exception):
@@ -116,12 +120,12 @@ def _controller(value: object) -> str | type:
     return value if isinstance(value, type) else _text(value)
 
 
-def _integrator(value: object) -> str:
-    """Return an integrator as MuJoCo spells it."""
-    found = [name for name in INTEGRATORS if name.lower() == _text(value).lower()]
+def _one_of(names: Sequence[str], value: object) -> str:
+    """Return one of some names as it is spelt there."""
+    found = [name for name in names if name.lower() == _text(value).lower()]
     if not found:
-        guess = did_you_mean(_text(value), INTEGRATORS)
-        raise _OptionError(f"must be one of {listed(INTEGRATORS)}, got {value!r}.{guess}".rstrip("."))
+        guess = did_you_mean(_text(value), names)
+        raise _OptionError(f"must be one of {listed(names)}, got {value!r}.{guess}".rstrip("."))
     return found[0]
 
 
@@ -182,7 +186,7 @@ class RolloutOptions:
     """Time steps of each rollout; by default as many as ``duration`` takes, 2 s."""
     timestep: float = _option(0.002, _timestep)
     """s."""
-    integrator: str = _option("implicitfast", _integrator)
+    integrator: str = _option("implicitfast", partial(_one_of, INTEGRATORS))
     """'Euler', 'RK4', 'implicit' or 'implicitfast'."""
     controller: str | type = field(default="sine", metadata={"read": _controller})
     """``NAME`` or ``NAME:key=value,…``; of your own ``MODULE:CLASS``, ``MODULE:CLASS:key=value,…``, or the class."""
@@ -209,6 +213,8 @@ class RolloutOptions:
     """A CSV file of designs, or a mapping of names to values: a column for each number that differs."""
     per_design: int = _option(1, partial(_whole, least=1, most=MOST_ROLLOUTS))
     """Successive rollouts that have one design; with ``designs`` by default as many as ``rollouts`` allows."""
+    engine: str = _option("mujoco", partial(_one_of, ENGINES))
+    """'mujoco', or 'warp': MuJoCo Warp, on a GPU, whose numbers are near MuJoCo's and never the same bits."""
 
     def __init__(self, **given: Unpack[RolloutKeywords]) -> None:
         """Check the options.
@@ -244,6 +250,8 @@ class RolloutOptions:
         if not {"steps", "duration", "timestep", "every"} & {*wrong} and self.steps % self.every:
             wrong["every"] = [f"must divide the {self.steps} steps of a rollout, got {self.every}"]
         wrong |= self._count_designs({*values} - {*wrong})
+        if self.engine == WARP and self.integrator == "RK4" and {"energy", "contacts"} & {*self.record}:
+            wrong["record"] = ["must not contain 'energy' or 'contacts' with RK4 and the engine 'warp'; use Euler"]
         if self.integrator == "RK4" and "qacc" in self.record:
             wrong["record"] = ["must not contain 'qacc' with RK4, which overwrites the acceleration; use Euler"]
         if wrong:
@@ -287,6 +295,8 @@ class RolloutOptions:
         values = {option.name: getattr(self, option.name) for option in fields(self)}
         vary, designs, per_design = (values.pop(name) for name in ("vary", "designs", "per_design"))
         values |= {"record": list(self.record), "randomize": dict(self.randomize)}
+        if self.engine == ENGINES[0]:
+            del values["engine"]  # as in runs from before there was another one
         if vary:
             values["vary"] = {name: str(draw) for name, draw in vary.items()}
         if designs is not None:

@@ -26,16 +26,19 @@ from dh2sim.simulate.design_plants import DesignPlants, PlantRecipe
 from dh2sim.simulate.designs import Designs
 from dh2sim.simulate.initial_states import InitialStates, read_initial_states, reference_start
 from dh2sim.simulate.mujoco_runtime import mujoco_package
-from dh2sim.simulate.options import AUTO, REFERENCE, RolloutOptions
+from dh2sim.simulate.options import AUTO, ENGINES, REFERENCE, WARP, RolloutOptions
 from dh2sim.simulate.plant import Plant, compile_plant
 from dh2sim.simulate.quantities import randomized, unknown_labels
 from dh2sim.simulate.randomization import owners, push_time
 from dh2sim.simulate.randomized_models import motors
 from dh2sim.simulate.records import SENSED
+from dh2sim.simulate.warp_batch import require_warp, warp_device, warp_versions
 from dh2sim.typing import Array
 
 BLOCK_BYTES = 2**26
 """Most that a block of rollouts records; two of them are in memory at a time."""
+WARP_BLOCKS = 8
+"""Times as much with the engine 'warp', to fill a device."""
 BLOCK_STEPS = 2**21
 """Most time steps of all rollouts of a block together: some seconds, after which it is safe on disk."""
 MOST_BYTES = 2**30
@@ -58,7 +61,11 @@ def prepare(model: RobotModel | MechanismModel, options: RolloutOptions, *, comm
         SettingsError: Options do not fit the robot; the error reports all that are wrong.
         ControllerError: The controller fails at once.
         ModelError: An MJCF cannot hold the robot.
+        MissingExtraError, EngineError: The engine is not installed, or cannot simulate the robot.
     """
+    if options.engine == WARP:
+        require_warp()
+        _check_warp(model, options)
     controller, initial = _resolved(model, options)
     options = options.replace(controller=controller.text, start=initial.name)
     if isinstance(model, MechanismModel):
@@ -138,6 +145,21 @@ def _designs(model: RobotModel | MechanismModel, options: RolloutOptions) -> Des
         raise SettingsError(("vary" if options.designs is None else "designs", problem) for problem in problems)
     designs.check()
     return designs
+
+
+def _check_warp(model: RobotModel | MechanismModel, options: RolloutOptions) -> None:
+    """Refuse what is not done on a device.
+
+    Raises:
+        SettingsError: The error names each option.
+    """
+    problem = f"must not be given with the engine '{WARP}': all rollouts have one model there"
+    given = {"randomize": options.randomize, "vary": options.vary, "designs": options.designs}
+    problems = [(name, problem) for name, value in given.items() if value]
+    if isinstance(model, MechanismModel):
+        problems.append(("engine", f"must be '{ENGINES[0]}' for {model.name}: it is a mechanism"))
+    if problems:
+        raise SettingsError(problems)
 
 
 INDEPENDENT = frozenset({"sine", "random", "pd", "computed-torque", "gravity-compensation"})
@@ -307,7 +329,9 @@ def _attributes(
             "mujoco_package": mujoco_package(),
             "numpy": np.__version__,
             "python": platform.python_version(),
+            **(warp_versions() if options.engine == WARP else {}),
         },
+        **({"device": warp_device()} if options.engine == WARP else {}),
     }
 
 
@@ -328,4 +352,5 @@ def _block_size(recorded: int, options: RolloutOptions) -> int:
             "record fewer states (every) or fewer quantities (record)"
         )
         raise SettingsError([("", problem)])
-    return max(1, min(options.rollouts, BLOCK_BYTES // recorded, BLOCK_STEPS // options.steps))
+    more = WARP_BLOCKS if options.engine == WARP else 1
+    return max(1, min(options.rollouts, more * BLOCK_BYTES // recorded, more * BLOCK_STEPS // options.steps))

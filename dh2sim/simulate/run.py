@@ -8,7 +8,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import load_robot
 from dh2sim.simulate.block import Block, Job, simulate_block
 from dh2sim.simulate.dataset_layout import Layout
-from dh2sim.simulate.options import RolloutKeywords, RolloutOptions
+from dh2sim.simulate.options import WARP, RolloutKeywords, RolloutOptions
 from dh2sim.simulate.prepare import prepare
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def rollout(
         **options: What is simulated and recorded, the fields of ``RolloutOptions``: ``rollouts`` (256), ``steps`` or
             ``duration`` (2 s), ``timestep`` (0.002 s), ``integrator``, ``controller`` ('sine'), ``start`` ('home'),
             ``seed`` (0), ``record``, ``every`` (1), ``randomize``, ``floating_base``, ``vary``, ``designs``,
-            ``per_design`` (1).
+            ``per_design`` (1), ``engine`` ('mujoco').
 
     Returns:
         The dataset, as ``docs/dataset.md`` describes it; read lazily from ``out`` if that is given.
@@ -129,7 +129,7 @@ def rollout(
     check_share(share, alone=blocks is None)
     part = share is not None or blocks is not None
     with (
-        workers_of(executor) as workers,
+        workers_of(executor, job) as workers,
         open_run(job, out, resume=resume, overwrite=overwrite, join=part) as writer,
     ):
         chosen = choose_blocks(writer.layout.blocks, share=share, blocks=blocks)
@@ -137,8 +137,17 @@ def rollout(
     return open_dataset(out)
 
 
-def workers_of(executor: Executor | Client | str | None) -> AbstractContextManager[Executor | None]:
-    """Return a context with what simulates blocks in place of this process; with None if nothing is to.
+_ONE_PROCESS: Final = (
+    f"must not be given with the engine '{WARP}': its numbers differ in last bits from one time to the next, so that "
+    "one process must make them all"
+)
+
+
+def workers_of(executor: Executor | Client | str | None, job: Job) -> AbstractContextManager[Executor | None]:
+    """Return a context with what simulates a job's blocks in place of this process; with None if nothing is to.
+
+    Raises:
+        SettingsError: One process must simulate them.
 
     Raises, when it is entered:
         SettingsError: It is none of what ``rollout`` takes.
@@ -147,13 +156,15 @@ def workers_of(executor: Executor | Client | str | None) -> AbstractContextManag
     """
     if executor is None:
         return nullcontext()
+    if job.options.engine == WARP:
+        raise SettingsError([("executor", _ONE_PROCESS)])
     from dh2sim.simulate.cluster import opened
 
     return opened(executor)
 
 
 def _in_memory(job: Job, *, threads: int, executor: Executor | Client | str | None, advance: Advance | None) -> Block:
-    with workers_of(executor) as workers:
+    with workers_of(executor, job) as workers:
         if workers is None:
             return simulate_block(job, range(job.options.rollouts), threads=threads, advance=advance)
         from dh2sim.simulate.cluster import simulate_on
@@ -251,6 +262,8 @@ def open_run(
     if join and overwrite:
         problem = "must not be given with a part of the blocks: each part would remove what the others have written"
         raise SettingsError([("overwrite", problem)])
+    if join and job.options.engine == WARP:
+        raise SettingsError([("share", _ONE_PROCESS)])
     if join:
         return RunWriter.join(path, job.layout)
     if resume:

@@ -119,6 +119,8 @@ def test_json_tells_the_same_alone(run: Path, arrays: Arrays) -> None:
         "every": 2,
         "duration": 0.016,
         "integrator": "implicitfast",
+        "engine": "mujoco",
+        "device": "",
         "start": "home",
         "randomize": {"mass": 0.1},
         "vary": {},

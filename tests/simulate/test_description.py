@@ -48,6 +48,8 @@ def test_a_finished_run_is_described(tmp_path: Path) -> None:
         "versions": {"dh2sim": "0.1.0", "mujoco": "3.17.0", "numpy": "2.4.0", "python": "3.11.0"},
         "complete": True,
         "integrator": "Euler",
+        "engine": "mujoco",
+        "device": "",
         "start": "home",
         "randomize": {},
         "vary": {},

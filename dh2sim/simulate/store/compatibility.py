@@ -16,6 +16,7 @@ _CONSEQUENCES: Final = {
     "robot_file_sha256": _OF_ROBOT,
     "controller": ("controller_digest",),
     "start": ("start_digest",),
+    "engine": ("mujoco_warp", "warp"),
 }
 """What changes with another setting, and is not reported beside it."""
 _PHRASES: Final = {
@@ -26,6 +27,8 @@ _PHRASES: Final = {
     "velocity_limits": "velocity limit was {} and is now {}",
     "mujoco": "MuJoCo was {} and is now {}",
     "numpy": "NumPy was {} and is now {}",
+    "mujoco_warp": "MuJoCo Warp was {} and is now {}",
+    "warp": "Warp was {} and is now {}",
 }
 _SHOWN_DIGITS: Final = 12
 
@@ -57,9 +60,10 @@ def _compared(attributes: Mapping[str, Any]) -> dict[str, Any]:
     versions = attributes.get("versions") or {}
     return {
         **{name: attributes.get(name) for name in ("robot", "robot_file_sha256")},
+        "engine": "mujoco",
         **(attributes.get("settings") or {}),
         **{name: attributes.get(name) for name in ("timestep", "integrator")},
-        **{name: versions.get(name) for name in ("dh2sim", "mujoco", "numpy")},
+        **{name: versions.get(name) for name in ("dh2sim", "mujoco", "numpy", "mujoco_warp", "warp")},
         "mjcf": attributes.get("mjcf"),
     }
 
