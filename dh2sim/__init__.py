@@ -63,6 +63,7 @@ _HOMES = {
     "load_robot": "robot.read",
     "measurements": "calibrate.measurements",
     "parse_robot": "robot.read",
+    "plan_mechanism_trajectory": "trajectory.mechanism",
     "plan_trajectory": "trajectory.plan",
     "read_measurements": "calibrate.data_file",
     "read_trajectory": "trajectory.files",
@@ -138,6 +139,7 @@ if TYPE_CHECKING:
     from dh2sim.symbolic.request import symbolic_form as symbolic_form
     from dh2sim.trajectory.files import SampledTrajectory as SampledTrajectory
     from dh2sim.trajectory.files import read_trajectory as read_trajectory
+    from dh2sim.trajectory.mechanism import plan_mechanism_trajectory as plan_mechanism_trajectory
     from dh2sim.trajectory.plan import plan_trajectory as plan_trajectory
     from dh2sim.trajectory.trajectory import Trajectory as Trajectory
     from dh2sim.workspace.workspace import Workspace as Workspace

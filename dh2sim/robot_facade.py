@@ -659,7 +659,8 @@ class Robot:
 
         Args:
             waypoints: At least two: names of configurations, joint vectors (n,), poses of tool0 in base_link (4, 4),
-                or mappings with the keys of a waypoint file, in rad and m.
+                or mappings with the keys of a waypoint file, in rad and m. Of a mechanism, coordinates of the driven
+                joints.
             **options: As for :func:`dh2sim.plan_trajectory`: ``kind`` ('joint', 'line' or 'arc'), ``profile``
                 ('quintic', 'trapezoid', 'jerk' or 'optimal'), ``duration``, ``limits``, ``through``, ``free``.
 
@@ -673,6 +674,10 @@ class Robot:
         """
         from dh2sim.trajectory.plan import plan_trajectory
 
+        if self.spec.is_mechanism:
+            from dh2sim.trajectory.mechanism import plan_mechanism_trajectory
+
+            return plan_mechanism_trajectory(self.mechanism, waypoints, **options)
         return plan_trajectory(self.model, waypoints, **options)
 
     def rollout(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import MANY, ForceOption, JsonOption, RobotArgument, build_all
+from dh2sim.cli.common import MANY, ForceOption, JsonOption, RobotArgument, build_any
 from dh2sim.cli.output import json_text, require_free, table_lines, wrapped
 from dh2sim.errors import ConfigurationError, SettingsError, TrajectoryError
 from dh2sim.messages import did_you_mean, listed, printable, shown
@@ -17,6 +17,7 @@ from dh2sim.messages import did_you_mean, listed, printable, shown
 if TYPE_CHECKING:
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.robot.spec import RobotSpec, Units
+    from dh2sim.trajectory.mechanism import MechanismTrajectory
     from dh2sim.trajectory.trajectory import Trajectory
     from dh2sim.trajectory.waypoints import WaypointFile
 
@@ -74,7 +75,9 @@ def trajectory(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FILE", help="Write samples: .csv or .npz.")
     ] = None,
-    rate: Annotated[float | None, typer.Option(metavar="HZ", help="Samples per second. [default: 1000]")] = None,
+    rate: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Samples per second. [default: 1000; mechanisms: 100]")
+    ] = None,
     samples: Annotated[int | None, typer.Option(metavar="N", help="Number of samples, instead.")] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -84,7 +87,8 @@ def trajectory(
     Motions start and stop at rest at each waypoint; a waypoint file may let them pass (stop: false), and name times,
     poses of the tool, and its own limits. Limits of position, velocity, acceleration and jerk hold at all times;
     lines and arcs of the tool are exact at all times. A path that would jump to another branch of the inverse
-    kinematics, or that crosses a singularity, is refused with the place.
+    kinematics, or that crosses a singularity, is refused with the place. Of a mechanism the driven joints are
+    planned, by joint motions, and all joints are written: the passive ones follow.
 
     \b
     Examples:
@@ -92,12 +96,15 @@ def trajectory(
       dh2sim trajectory stanford home 20 40 0.5 -30 45 -10 --profile jerk
       dh2sim trajectory ur5e waypoints.yaml --limits velocity=50% tool_speed=0.25
       dh2sim trajectory scara home 30 60 0.1 0 --kind line --duration 2
+      dh2sim trajectory four_bar home 200 -o motion.csv
     Then:
       dh2sim view puma560 motion.csv
       dh2sim plot motion.csv
       dh2sim rollout puma560 --out run.zarr --controller replay:motion.csv
     """
+    from dh2sim.model.mechanism import MechanismModel
     from dh2sim.trajectory.files import require_suffix
+    from dh2sim.trajectory.mechanism import driven_joints, plan_mechanism_trajectory
     from dh2sim.trajectory.plan import plan_trajectory
 
     if out is None:
@@ -107,7 +114,8 @@ def trajectory(
     else:
         require_suffix(out)
     require_free(out, force=force)
-    [model] = build_all([robot])
+    [built] = build_any([robot])
+    model = driven_joints(built) if isinstance(built, MechanismModel) else built
     file, points = _waypoints(model.spec, waypoints)
     request: dict[str, Any] = {
         "kind": kind or (file and file.kind),
@@ -118,7 +126,12 @@ def trajectory(
         "free": free or (file and file.free),
     }
     try:
-        planned = plan_trajectory(model, points, **{k: v for k, v in request.items() if v is not None})
+        wanted: Any = {k: v for k, v in request.items() if v is not None}
+        planned = (
+            plan_mechanism_trajectory(built, points, **wanted)
+            if isinstance(built, MechanismModel)
+            else plan_trajectory(built, points, **wanted)
+        )
     except TrajectoryError as error:
         raise TrajectoryError(_as_option(str(error))) from None
     if out is not None:
@@ -235,6 +248,8 @@ def _limits(model: RobotModel, text: str | None) -> dict[str, Any]:
 
 def _report(model: RobotModel, planned: Trajectory) -> list[str]:
     """Return what is to be said of a trajectory, at most 80 columns wide."""
+    from dh2sim.trajectory.mechanism import MechanismTrajectory
+
     units = model.spec.units
     lines = [
         f"{model.name}: {len(planned.waypoints)} waypoints, {planned.profile.value}, {planned.duration:.4g} s",
@@ -242,11 +257,15 @@ def _report(model: RobotModel, planned: Trajectory) -> list[str]:
     ]
     lines += _passages(planned)
     lines += ["", *(f"  {line}" for line in _table(planned, units))]
+    if isinstance(planned, MechanismTrajectory) and planned.passive:
+        lines += ["", *(f"  {line}" for line in _passive_table(planned, units))]
     joint, quantity, share = planned.limiting
     lines += ["", *_filled(f"Nearest to a limit: {joint}, {100 * share:.4g} % of its {quantity}.")]
     speed, turn = planned.tool_peaks
     rate = turn / units.coordinate(1.0, turns=True)
-    lines += _filled(f"The tool moves at up to {speed:.4g} m/s and turns at up to {rate:.4g} {units.angle.value}/s.")
+    lines += _filled(
+        f"The tool moves at up to {_short(speed)} m/s and turns at up to {_short(rate)} {units.angle.value}/s."
+    )
     optimal = planned.profile.value == "optimal"
     for name in planned.limits.assumed:
         lines += [] if optimal and name != "velocity" else _filled(_ASSUMED[name])
@@ -297,6 +316,21 @@ def _table(planned: Trajectory, units: Units) -> list[str]:
                 share = "free"
             cells += [_short(peaks.rates[order, i] / scale), share]
         rows.append([name if len(name) <= 16 else f"{name[:15]}…", unit, *cells])
+    return table_lines(rows, left=2)
+
+
+_CLOSED = 1e-7
+"""rad and m: where loops determine a joint to the second order only, no smaller number means anything."""
+
+
+def _passive_table(planned: MechanismTrajectory, units: Units) -> list[str]:
+    rows = [["passive joint", "unit", "from", "to", "velocity"]]
+    turns = {joint.name: joint.type.turns for joint in planned.mechanism.moving_joints}
+    for name, values in planned.passive.items():
+        unit = units.angle.value if turns[name] else units.length.value
+        scale = units.coordinate(1.0, turns=turns[name])
+        shown = [0.0 if abs(value) < _CLOSED else value / scale for value in values]
+        rows.append([name, unit, *map(_short, shown)])
     return table_lines(rows, left=2)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -99,6 +99,41 @@ def driven_motion(robot: SpecLike, q: ArrayLike, target: ArrayLike) -> Array:
     start = np.array(joint_values(tree, q))
     motion = _Motion(spec, tree, sorted(actuated_joints(spec)))
     return read_only(motion.follow(start, np.asarray(target, dtype=np.float64)))
+
+
+class DrivenPath(NamedTuple):
+    """Where a mechanism goes as its driven joints go through targets."""
+
+    q: Array
+    """Joint vectors at which the loops are closed, rad and m, shape (N, n)."""
+    rates: Array
+    """Velocities of all joints for a unit velocity of each driven one, shape (N, n, k)."""
+    tool: Array
+    """Twist of tool0 for the same, shape (N, 6, k), as ``mechanism_jacobian``."""
+
+
+def driven_path(robot: SpecLike, q: ArrayLike, targets: ArrayLike) -> DrivenPath:
+    """Return where moving the driven joints straight from one target to the next leads.
+
+    Args:
+        robot: The robot.
+        q: Joint vector at which the loops are closed, rad and m, shape (n,).
+        targets: Coordinates of the driven joints in the order of ``actuated``, shape (N, k).
+
+    Raises:
+        SingularPositionError: On the way there is a dead or singular position; the text says where.
+        ConfigurationError: ``q`` has another shape or is not finite.
+    """
+    spec = spec_of(robot)
+    tree, _ = assembly(spec)
+    motion = _Motion(spec, tree, actuated_joints(spec))
+    place, found, rates, tool = np.array(joint_values(tree, q)), [], [], []
+    for target in np.asarray(targets, dtype=np.float64):
+        place = motion.follow(place, target)
+        found.append(place)
+        rates.append(motion.followed(place))
+        tool.append(_twists(tree, body_poses(tree, place), tree.frame("tool0")) @ rates[-1])
+    return DrivenPath(read_only(found), read_only(rates), read_only(tool))
 
 
 def named_configuration(robot: SpecLike, name: str) -> Array:
@@ -337,7 +372,7 @@ class _Motion:
             shown_value = f"{math.degrees(value):.6g} deg" if joint.type.turns else f"{value:.6g} m"
             at.append(f"{joint.name} = {shown_value}")
         return SingularPositionError(
-            f"{self._spec.name}: the way from the assembly comes to a dead or singular position at {listed(at)}, "
+            f"{self._spec.name}: the way there comes to a dead or singular position at {listed(at)}, "
             "where the driven joints do not determine how the passive ones go on"
         )
 

@@ -124,6 +124,11 @@ class Plant:
         return len(self.joints)
 
     @property
+    def following(self) -> frozenset[str]:
+        """Names of the joints of a mechanism that follow those that a controller sees."""
+        return frozenset(row.name for row in self.spec.moving_rows) - set(self.joints)
+
+    @property
     def controlled(self) -> Plant:
         """The robot as a controller sees it: of a mechanism, the joints that are driven."""
         if self.independent is None:

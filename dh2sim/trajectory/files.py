@@ -8,7 +8,7 @@ import io
 import math
 import os
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
@@ -114,13 +114,17 @@ class SampledTrajectory:
         )
         return q, qd, qdd, qddd
 
-    def ordered(self, joints: Sequence[str]) -> Self:
+    def ordered(self, joints: Sequence[str], *, besides: Collection[str] = ()) -> Self:
         """Return the same trajectory with its joints in another order.
+
+        Args:
+            joints: Names of all joints.
+            besides: Of joints that are left out: they follow.
 
         Raises:
             TrajectoryError: They are not the same joints.
         """
-        if set(joints) != set(self.joints):
+        if set(joints) != set(self.joints) - set(besides):
             raise TrajectoryError(f"its joints are {listed(self.joints)}; the robot has {listed(joints)}")
         order = [self.joints.index(joint) for joint in joints]
         rates = [None if each is None else each[:, order] for each in (self.qd, self.qdd, self.qddd)]

@@ -18,7 +18,6 @@ REFUSED = (
     "symbolic four_bar --as c -o arm.c",
     "symbolic four_bar --as python --what inverse-dynamics -o arm.py",
     "workspace four_bar -o reach.csv",
-    "trajectory four_bar home home -o motion.csv",
     "convert four_bar --to modified -o other.yaml",
 )
 

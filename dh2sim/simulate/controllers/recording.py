@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -80,13 +80,16 @@ class Recording:
             )
         return replace(self, rollouts=None, read=functools.partial(_the_same, data))
 
-    def columns(self, wanted: Sequence[str], what: str, *, joints: Sequence[str]) -> list[int]:
+    def columns(
+        self, wanted: Sequence[str], what: str, *, joints: Sequence[str], besides: Collection[str] = ()
+    ) -> list[int]:
         """Return which column belongs to each of the robot's joints or actuators.
 
         Args:
             wanted: The robot's names, in its order.
             what: 'joints' or 'actuators', for messages.
             joints: The robot's joints.
+            besides: Names of columns that are left out: passive joints, which follow.
 
         Raises:
             ControllerError: Columns are missing, or there is one that the robot does not have.
@@ -98,7 +101,7 @@ class Recording:
                 )
             return list(range(self.width))
         missing = [name for name in wanted if name not in self.names]
-        unknown = [name for name in self.names if name not in wanted]
+        unknown = [name for name in self.names if name not in wanted and name not in besides]
         if not missing and not unknown:
             return [self.names.index(name) for name in wanted]
         problems = []

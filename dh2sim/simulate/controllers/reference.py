@@ -37,7 +37,7 @@ class SampledReference:
             ControllerError: They are not the robot's joints.
         """
         try:
-            self._trajectory = trajectory.ordered(batch.plant.joints)
+            self._trajectory = trajectory.ordered(batch.plant.joints, besides=batch.plant.following)
         except TrajectoryError as error:
             raise ControllerError(f"reference: {error}") from None
         self._timestep, self._batch = batch.plant.timestep, len(batch.rollouts)

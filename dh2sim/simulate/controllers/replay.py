@@ -106,7 +106,7 @@ class ReplayedPositions:
 
 def _rows(batch: RolloutBatch, recording: Recording, names: tuple[str, ...], what: str) -> Array:
     """Return the numbers of a batch in the order of ``names``, shape (batch or 1, K, names)."""
-    columns = recording.columns(names, what, joints=batch.plant.joints)
+    columns = recording.columns(names, what, joints=batch.plant.joints, besides=batch.plant.following)
     if recording.rollouts is None:
         return recording.read(range(1))[:, :, columns]
     first, last = min(batch.rollouts), max(batch.rollouts)

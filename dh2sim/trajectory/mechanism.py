@@ -1,0 +1,324 @@
+"""Trajectories of mechanisms: the driven joints are planned like those of an arm, and the passive ones follow.
+
+A motion goes from rest to rest through waypoints of the driven joints. The loops are closed by continuation along it,
+so that dead positions, and limits of passive joints, are found on the way and not by whoever drives there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Final, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dh2sim.errors import SettingsError, SingularPositionError, TrajectoryError
+from dh2sim.kinematics.loop_motion import DrivenPath, actuated_joints, driven_path, mechanism_configuration
+from dh2sim.messages import listed
+from dh2sim.model.mechanism import MechanismModel
+from dh2sim.model.robot_model import RobotModel
+from dh2sim.trajectory.files import SampledTrajectory
+from dh2sim.trajectory.limits import INSIDE
+from dh2sim.trajectory.plan import TrajectoryKeywords, plan_trajectory
+from dh2sim.trajectory.profiles import Profile
+from dh2sim.trajectory.trajectory import Trajectory
+from dh2sim.trajectory.waypoints import MoveKind, Waypoint, waypoints_of
+from dh2sim.typing import Array, read_only
+
+RATE: Final = 100.0
+"""Hz, of samples: closing loops takes longer than evaluating polynomials."""
+_KNOTS: Final = 40
+"""Places in each motion at which the loops are closed to see whether it is possible."""
+_BRANCH: Final = 1e-6
+"""rad or sizes: configurations nearer to each other are the same."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MechanismTrajectory(Trajectory):
+    """Positions of the driven joints over time within limits; ``sample`` has those of the passive ones, too."""
+
+    mechanism: MechanismModel = field(repr=False)
+    start: Array = field(repr=False)
+    """Joint vector of all joints at the beginning, shape (n,)."""
+
+    @cached_property
+    def knots(self) -> tuple[Array, DrivenPath]:
+        """Times, s, that show the motion, and the mechanism at them.
+
+        Raises:
+            TrajectoryError: The driven joints come to a dead or singular position.
+        """
+        inner = [
+            start + motion.duration * np.linspace(0.0, 1.0, _KNOTS + 1)
+            for start, motion in zip(self.starts, self.motions, strict=False)
+        ]
+        times = np.unique(np.concatenate([*inner, [passage.time for passage in self.waypoints]]))
+        return read_only(times), self._followed(self.start, times)
+
+    def _followed(self, q: Array, times: Array) -> DrivenPath:
+        try:
+            return driven_path(self.mechanism.spec, q, self.at(times)[0])
+        except SingularPositionError as error:
+            raise TrajectoryError(str(error)) from None
+
+    def all_joints(self, t: ArrayLike) -> tuple[Array, Array]:
+        """Return positions and velocities of all joints at times, with the loops closed.
+
+        Args:
+            t: s, shape (N,).
+
+        Returns:
+            Shapes (N, n), in the order of the mechanism's joint vector.
+        """
+        times = np.clip(np.asarray(t, dtype=np.float64), 0.0, self.duration)
+        knots, path = self.knots
+        before = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, None)
+        q, qd, _, _ = self.at(times)
+        found, rates = np.empty((len(times), len(self.start))), np.empty((len(times), len(self.start)))
+        for k in np.unique(before).tolist():
+            here = np.flatnonzero(before == k)
+            order = here[np.argsort(times[here])]
+            followed = driven_path(self.mechanism.spec, path.q[k], q[order])
+            found[order] = followed.q
+            rates[order] = (followed.rates @ qd[order][:, :, None])[:, :, 0]
+        return found, rates
+
+    def sample(self, rate: float | None = None, samples: int | None = None) -> SampledTrajectory:
+        """Return all joints at evenly spaced times, the last of which is the end.
+
+        Args:
+            rate: Samples per second, 100 by default.
+            samples: Their number, instead, at least 2.
+
+        Raises:
+            SettingsError: Both are given, one is not possible, or there would be more than ten million.
+        """
+        times = self.sample_times(rate, samples)
+        q, qd = self.all_joints(times)
+        joints = self.mechanism.moving_joints
+        return SampledTrajectory.of(
+            [joint.name for joint in joints],
+            times,
+            q,
+            qd=qd,
+            turns=tuple(joint.type.turns for joint in joints),
+            robot=self.mechanism.name,
+        )
+
+    def sample_times(self, rate: float | None = None, samples: int | None = None) -> Array:
+        """Return the times of :meth:`sample`, s."""
+        return super().sample_times(RATE if rate is None and samples is None else rate, samples)
+
+    @cached_property
+    def tool_peaks(self) -> tuple[float, float]:
+        """The greatest speed of tool0's origin, m/s, and of its turning, rad/s, at the knots."""
+        times, path = self.knots
+        twists = (path.tool @ self.at(times)[1][:, :, None])[:, :, 0]
+        speed, turn = (float(np.linalg.norm(part, axis=1).max()) for part in (twists[:, :3], twists[:, 3:]))
+        return speed, turn
+
+    def tool_path(self, count: int = 200) -> Array:
+        """Return positions of tool0 in base_link at even times, m, shape (count, 3)."""
+        from dh2sim.kinematics.tree import body_poses, placed
+
+        tree = self.mechanism.tree
+        q, _ = self.all_joints(np.linspace(0.0, self.duration, count))
+        return np.array([placed(body_poses(tree, each), tree.frame("tool0"))[:3, 3] for each in q])
+
+    @cached_property
+    def passive(self) -> dict[str, tuple[float, float, float]]:
+        """Least and greatest position, and the greatest velocity, of each passive joint at the knots, rad and m."""
+        times, path = self.knots
+        qd = np.abs(path.rates @ self.at(times)[1][:, :, None])[:, :, 0].max(axis=0)
+        low, high = path.q.min(axis=0), path.q.max(axis=0)
+        return {
+            joint.name: (float(low[k]), float(high[k]), float(qd[k]))
+            for k, joint in enumerate(self.mechanism.moving_joints)
+            if joint.name not in self.joints
+        }
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what is to be said of the trajectory as JSON values, in s, rad and m."""
+        passive = [
+            {"name": name, "lower": low, "upper": high, "velocity": {"peak": peak}}
+            for name, (low, high, peak) in self.passive.items()
+        ]
+        return {**super().to_json(), "passive": passive}
+
+
+def plan_mechanism_trajectory(
+    model: MechanismModel, waypoints: Iterable[Any], **options: Unpack[TrajectoryKeywords]
+) -> MechanismTrajectory:
+    """Return the trajectory of a mechanism through waypoints, from rest to rest.
+
+    Args:
+        model: The mechanism.
+        waypoints: As for :func:`plan_trajectory`: names of configurations, or coordinates of the driven joints in the
+            order of ``actuated``. The mechanism starts at the first, on the branch of motion of its assembly or of
+            the configuration that is named.
+        **options: As for :func:`plan_trajectory`: ``profile`` ('quintic', 'trapezoid' or 'jerk'), ``duration``, and
+            ``limits`` of the driven joints. Where a passive joint would exceed the limit that its file gives, all
+            is slowed down, or refused if it leaves its range.
+
+    Raises:
+        SettingsError: Waypoints or options are wrong; the error holds everything that is.
+        TrajectoryError: There is no such trajectory; the text says why.
+    """
+    _refuse(options)
+    if not actuated_joints(model.spec):
+        raise TrajectoryError(f"{model.name} has no driven joint: its file says 'actuated: []'")
+    stand_in = driven_joints(model)
+    points = waypoints_of(stand_in.spec, waypoints)
+    for number, point in enumerate(points, start=1):
+        if point.q is None or point.via is not None or point.kind not in (None, MoveKind.JOINT):
+            raise TrajectoryError(
+                f"waypoint {number}: a mechanism is moved by its driven joints; give the coordinates of "
+                f"{listed(joint.name for joint in stand_in.moving_joints)}, or the name of a configuration"
+            )
+    start = _start(model, points[0]) if points else model.q
+    planned = _planned(model, stand_in, start, points, options)
+    excess = _excess(planned)
+    if excess > 1.0:
+        if options.get("duration") is not None:
+            raise TrajectoryError(
+                f"{planned.duration:.6g} s are too short: a passive joint would need {excess:.3g} times its velocity "
+                "limit"
+            )
+        slower: TrajectoryKeywords = {**options, "duration": planned.duration * excess}
+        planned = _planned(model, stand_in, start, points, slower)
+        if (left := _excess(planned)) > 1.0 + 1e-9:
+            raise TrajectoryError(f"a passive joint would need {left:.3g} times its velocity limit")
+    _check_ranges(planned)
+    _check_branches(planned, points)
+    return planned
+
+
+def driven_joints(model: MechanismModel) -> RobotModel:
+    """Return the driven joints of a mechanism as if they were a robot, whose frames mean nothing."""
+    spec = model.spec
+    driven = actuated_joints(spec)
+    rows, joints = spec.moving_rows, model.moving_joints
+    configurations = {name: read_only(q[list(driven)]) for name, q in model.configurations().items()}
+    alone = replace(
+        spec,
+        rows=tuple(rows[k] for k in driven),
+        branches=MappingProxyType({}),
+        closures=(),
+        actuated=None,
+        assembly=None,
+        configurations=MappingProxyType(configurations),
+        source_file=None,
+    )
+    return replace(model.main, spec=alone, joints=tuple(joints[k] for k in driven), home=configurations["home"])
+
+
+def _refuse(options: Mapping[str, Any]) -> None:
+    """Refuse what is of serial robots.
+
+    Raises:
+        SettingsError: There is such an option.
+    """
+    problems = []
+    if str(options.get("profile") or "") == Profile.OPTIMAL:
+        problems.append(("profile", "must be one of quintic, trapezoid, jerk for a mechanism, got 'optimal'"))
+    if str(options.get("kind") or MoveKind.JOINT) != MoveKind.JOINT:
+        problems.append(("kind", f"must be 'joint' for a mechanism, got {str(options['kind'])!r}"))
+    problems += [
+        (name, "is of lines and arcs, which mechanisms do not follow")
+        for name in ("through", "free")
+        if options.get(name)
+    ]
+    given = options.get("limits")
+    if isinstance(given, Mapping):
+        problems += [
+            ("limits", f"must not contain {name!r} for a mechanism")
+            for name in ("tool_speed", "tool_turn")
+            if name in given
+        ]
+    if problems:
+        raise SettingsError(problems)
+
+
+def _start(model: MechanismModel, point: Waypoint) -> Array:
+    named = model.configurations().get(point.name)
+    driven = list(actuated_joints(model.spec))
+    if named is not None and np.array_equal(named[driven], np.asarray(point.q)):
+        return read_only(named)
+    try:
+        return mechanism_configuration(model.spec, np.asarray(point.q)) if len(driven) < model.tree.n else model.q
+    except SingularPositionError as error:
+        raise TrajectoryError(f"waypoint 1: {error}") from None
+
+
+def _planned(
+    model: MechanismModel,
+    stand_in: RobotModel,
+    start: Array,
+    points: tuple[Waypoint, ...],
+    options: TrajectoryKeywords,
+) -> MechanismTrajectory:
+    plan = plan_trajectory(stand_in, points, **options)
+    given = {each.name: getattr(plan, each.name) for each in fields(Trajectory)}
+    return MechanismTrajectory(**given, mechanism=model, start=start)
+
+
+def _excess(planned: MechanismTrajectory) -> float:
+    """Return the greatest velocity of a passive joint as a share of the limit that its file gives."""
+    limits = {joint.name: joint for joint in planned.mechanism.moving_joints}
+    shares = [
+        peak / (limits[name].velocity * INSIDE)
+        for name, (_, _, peak) in planned.passive.items()
+        if "velocity" not in limits[name].assumed
+    ]
+    return max(shares, default=0.0)
+
+
+def _check_ranges(planned: MechanismTrajectory) -> None:
+    """Refuse a motion on which a passive joint leaves its limits.
+
+    Raises:
+        TrajectoryError: One does.
+    """
+    times, path = planned.knots
+    units = planned.mechanism.spec.units
+    for k, joint in enumerate(planned.mechanism.moving_joints):
+        if joint.name in planned.joints or joint.limits.position is None:
+            continue
+        lower, upper = joint.limits.position
+        slack = 1e-9 * max(1.0, abs(lower), abs(upper))
+        outside = np.flatnonzero((path.q[:, k] < lower - slack) | (path.q[:, k] > upper + slack))
+        if outside.size:
+            scale = units.coordinate(1.0, turns=joint.type.turns)
+            at, low, high = (value / scale for value in (float(path.q[outside[0], k]), lower, upper))
+            unit = units.angle.value if joint.type.turns else units.length.value
+            raise TrajectoryError(
+                f"passive joint {joint.name} leaves its limits of {low:.6g} to {high:.6g} {unit} at "
+                f"{times[outside[0]]:.4g} s: it is at {at:.6g} {unit}"
+            )
+
+
+def _check_branches(planned: MechanismTrajectory, points: tuple[Waypoint, ...]) -> None:
+    """Refuse a motion to a configuration that is named but on another branch of motion.
+
+    Raises:
+        TrajectoryError: One is.
+    """
+    times, path = planned.knots
+    known = planned.mechanism.configurations()
+    joints = planned.mechanism.moving_joints
+    for number, (point, passage) in enumerate(zip(points, planned.waypoints, strict=True), start=1):
+        goal = known.get(point.name)
+        if goal is None or number == 1:
+            continue
+        here = path.q[int(np.argmin(np.abs(times - passage.time)))]
+        for k, joint in enumerate(joints):
+            off = abs(float(here[k] - goal[k]))
+            off = min(off % (2.0 * np.pi), -off % (2.0 * np.pi)) if joint.type.turns else off
+            if joint.name not in planned.joints and off > _BRANCH:
+                raise TrajectoryError(
+                    f"waypoint {number}: the driven joints lead to another assembly than configuration "
+                    f"'{point.name}' has: {joint.name} differs"
+                )
