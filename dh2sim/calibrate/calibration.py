@@ -297,7 +297,7 @@ class _Task:
         else:
             why = f" {listed(still)} {'does' if len(still) == 1 else 'do'} not move." if still else ""
         raise CalibrationError(
-            f"{self._what(measured)} cannot fix {count}: they tell only {len(mine)} of the robot apart, not also "
+            f"{self._what(measured)} cannot fix {count}: they determine only {len(mine)} of them, not "
             f"{_some(missing)}.{why} {_ADVICE}"
         )
 
@@ -471,7 +471,7 @@ class _Task:
         if copies:
             notes.append(
                 f"{counted(copies, 'row')} {'is an exact copy' if copies == 1 else 'are exact copies'} of another: "
-                "remove what was not measured anew, since each row counts."
+                "remove what was not measured again, since each row counts."
             )
         if outliers and not self.robust:
             notes.append("There are outliers; a robust fit leaves them out.")

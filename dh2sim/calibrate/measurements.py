@@ -250,7 +250,7 @@ def problems_of(given: Measurements) -> list[tuple[int, str, str]]:
         for name in names:
             count[name] = count.get(name, 0) + 1
         found += [
-            (names.index(name), "socket", f"socket '{name}' has one row, which tells nothing; two are needed")
+            (names.index(name), "socket", f"socket '{name}' has one row; at least two are needed")
             for name, times in count.items()
             if times == 1
         ]

@@ -122,8 +122,8 @@ def plan_measurements(
     if count * design.equations < design.unknowns:
         least = math.ceil(design.unknowns / design.equations)
         raise CalibrationError(
-            f"{count} configurations give {count * design.equations} equations, which cannot tell {design.unknowns} "
-            f"parameters: at least {least} are needed, and more to find out the noise"
+            f"{count} configurations give {count * design.equations} equations, which cannot determine "
+            f"{design.unknowns} parameters: at least {least} are needed, and more to estimate the noise"
         )
     rows, target = design.rows(q), design.target
     rng = np.random.default_rng(seed)

@@ -99,7 +99,7 @@ def _git(folder: Path, *arguments: str, of: str | None = None) -> bytes:
         if of is not None:
             raise Dh2simError(f"git knows no revision {shown(of)} in {str(folder)!r}; a shallow clone has only one")
         detail = done.stderr.decode("utf-8", "replace").strip().removeprefix("fatal: ")
-        raise Dh2simError(f"git cannot tell what changed in {str(folder)!r}: {detail}")
+        raise Dh2simError(f"git cannot say what changed in {str(folder)!r}: {detail}")
     return done.stdout
 
 
@@ -109,4 +109,4 @@ def _call(folder: Path, *arguments: str) -> subprocess.CompletedProcess[bytes]:
     try:
         return subprocess.run(command, capture_output=True, check=False)
     except FileNotFoundError:
-        raise Dh2simError("git is not installed, which tells what changed since a revision") from None
+        raise Dh2simError("git, which knows what changed since a revision, is not installed") from None

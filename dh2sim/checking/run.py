@@ -57,7 +57,7 @@ def check_files(
 
     Raises:
         UnknownRobotError: A path does not exist.
-        Dh2simError: git cannot tell what changed, or a part is unknown.
+        Dh2simError: git cannot say what changed, or a part is unknown.
     """
     chosen = tuple(CheckPart(part) for part in parts)
     files = find_robot_files([Path(path) for path in paths])

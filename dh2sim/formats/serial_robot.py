@@ -152,7 +152,7 @@ def can_show(suffix: str, scale: Sequence[float], name: str, notes: Notes) -> bo
         notes: Takes what is left out.
     """
     if suffix.lower() not in MESH_SUFFIXES:
-        sentence = f"Meshes are not carried over that are none of {listed(MESH_SUFFIXES)}: those of links {{}}."
+        sentence = f"Meshes in formats other than {listed(MESH_SUFFIXES)} are not carried over, of links {{}}."
         notes.group(sentence, name, suffix[:20] or "no suffix")
         return False
     if min(scale) <= 0.0 or max(scale) - min(scale) > _SAME_SCALE * max(scale):

@@ -313,7 +313,7 @@ def _of_markup(builder: _Builder, data: bytes) -> str | None:
         line = data.count(b"\n", 0, start) + 1
         return f"not well-formed XML: the comment that begins on line {line} has no end '-->'"
     if data.startswith(b"<!--", at):
-        return "not well-formed XML: a comment cannot stand inside a tag"
+        return "not well-formed XML: a comment cannot be inside a tag"
     if re.search(rb"<!(?!--)[ \t]*-", data[max(at - 3, 0) : at + 3]):
         return "not well-formed XML: a comment begins with '<!--'"
     return None

@@ -140,7 +140,7 @@ def import_data(data: bytes, file: str, options: ImportOptions, *, folder: Path 
     if root is None and is_calibration(data):
         return _calibration(data, file, options, folder)
     if options.nominal is not None:
-        raise Dh2simError(f"{file}: nominal is for makers' calibration files; this is none")
+        raise Dh2simError(f"{file}: nominal is for makers' calibration files; this is not one")
     if root is None and file.lower().endswith((".yaml", ".yml")):
         _refuse_yaml(data, file)
     match root:

@@ -92,7 +92,12 @@ class AxesSpec:
     source: Annotated[str, Text("Where the numbers come from.")] = ""
     convention: Annotated[
         Convention | None,
-        Choice("Of the table that is asked for.", Convention, without=("hayati",), other_names=CONVENTIONS),
+        Choice(
+            "Convention of the table to make.",
+            Convention,
+            without=("hayati",),
+            other_names=CONVENTIONS,
+        ),
     ] = None
     units: Annotated[Units, Part("Units of this file.", Units)] = field(default_factory=Units)
     """Of the file; everything else here is in SI units."""

@@ -219,7 +219,7 @@ def test_too_few_measurements_are_refused_in_words() -> None:
     q[:, 3] = 0.3
     given = measured(nominal, off(nominal, 1e-3, 1), "pose", q, seed=3)
     text = refusal(CalibrationError, calibrate, nominal, given)
-    assert "40 poses cannot fix 30 parameters of the robot: they tell only" in text
+    assert "40 poses cannot fix 30 parameters of the robot: they determine only" in text
     assert "joint_4 does not move." in text
     text = refusal(CalibrationError, calibrate, nominal, given.rows([0] * 40))
     assert "not also joint_1.a, joint_1.alpha, joint_2.theta, joint_2.a, joint_2.alpha, joint_2.beta and " in text

@@ -136,7 +136,7 @@ def test_radians_that_are_called_degrees_are_noticed(tmp_path: Path) -> None:
         (["0.1,0.2"], ":1:1: expected the name of a column, found '0.1': the first line must name the columns"),
         ([f"{JOINTS},x [m],y [m],z [m]"], ":1:1: there are no measurements below the header"),
         (["a"] * 20_002, ":1:1: the file has 20001 measurements; at most 20000 are fitted: choose some"),
-        ([f"{JOINTS},socket", "1,1,1,1,a", "1,1,1,1,a", "1,1,1,1,b"], ":4:9: socket: socket 'b' has one row, which"),
+        ([f"{JOINTS},socket", "1,1,1,1,a", "1,1,1,1,a", "1,1,1,1,b"], ":4:9: socket: socket 'b' has one row; at"),
         ([f"{JOINTS},distance [mm]", "1,1,1,1,-5"], ":2:9: distance [mm]: a distance must be a positive number"),
         ([f"{JOINTS},x [m],y [m],z [m],qw,qx,qy,qz", "1,1,1,1,0,0,0,1,1,0,0"], "a quaternion must have length 1"),
     ],

@@ -78,8 +78,9 @@ def test_what_a_plan_predicts_is_what_fits_show() -> None:
 
 
 def test_what_cannot_be_planned_is_refused() -> None:
-    assert "8 configurations give 24 equations, which cannot tell 27 parameters: at least 9 are needed" in refusal(
-        CalibrationError, plan_measurements, robot("puma560"), 8
+    assert (
+        "8 configurations give 24 equations, which cannot determine 27 parameters: at least 9 are needed"
+        in refusal(CalibrationError, plan_measurements, robot("puma560"), 8)
     )
     assert refusal(CalibrationError, plan_measurements, robot("puma560"), 1001) == (
         "the number of configurations must be at most 1000, got 1001"

@@ -173,5 +173,5 @@ def test_a_revision_that_git_does_not_know_is_an_error(committed: Path) -> None:
 def test_outside_a_repository_git_cannot_tell_what_changed(repository: Path) -> None:
     if shutil.which("git") is None:
         pytest.skip("git is not installed")
-    with pytest.raises(Dh2simError, match="git cannot tell what changed"):
+    with pytest.raises(Dh2simError, match="git cannot say what changed"):
         check_files(changed_since="main")

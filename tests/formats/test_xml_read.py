@@ -145,7 +145,7 @@ def test_an_encoding_that_is_not_read_is_named() -> None:
         ),
         ("<a>\n<!-- x <b/></a>", "2:1: not well-formed XML: the comment that begins on line 2 has no end '-->'"),
         ("<a>\n<!--\n-- > <b/></a>", "3:3: not well-formed XML: the comment that begins on line 2 has no end '-->'"),
-        ("<a>\n<b <!-- x --> c='d'/></a>", "2:4: not well-formed XML: a comment cannot stand inside a tag"),
+        ("<a>\n<b <!-- x --> c='d'/></a>", "2:4: not well-formed XML: a comment cannot be inside a tag"),
         ("<a>\n<! -- x --></a>", "2:3: not well-formed XML: a comment begins with '<!--'"),
         ("<a>\n<<<<<<< HEAD\n</a>", "2:2: not well-formed XML: a line of a merge that was not resolved"),
         ("<a>\n<!- x --></a>", "2:4: not well-formed XML: a comment begins with '<!--'"),

@@ -313,7 +313,7 @@ def test_options_of_other_files_are_refused() -> None:
     assert "angle and length are units of tables" in refusal(Dh2simError, made, data, angle="deg")
     table = b"| theta | d | a | alpha |\n|---|---|---|---|\n| q1 | 0 | 0.3 | 90 |\n"
     assert refusal(Dh2simError, made, table, "t.md", nominal="ur5e") == (
-        "t.md: nominal is for makers' calibration files; this is none"
+        "t.md: nominal is for makers' calibration files; this is not one"
     )
 
 

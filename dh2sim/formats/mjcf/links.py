@@ -104,7 +104,7 @@ def read_look(compiled: Compiled, tree: MjcfTree, body: MjcfBody, name: str, not
         elif mesh is None:
             colors.append(_color(model, geom))
     if shapes := list(dict.fromkeys(kind for _, geom in geoms if (kind := _primitive(compiled, geom)))):
-        notes.group("Shapes that are no meshes are not carried over, of links {}.", name, listed(shapes))
+        notes.group("Shapes other than meshes are not carried over, of links {}.", name, listed(shapes))
     return Look(mesh=mesh, color=next((color for color in colors if color is not None), None))
 
 

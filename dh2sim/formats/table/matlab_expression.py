@@ -64,7 +64,7 @@ class MatlabParser:
         if self._take(text) is None:
             token = self.next
             found = shown(token.text) if token is not END else "the end"
-            raise ScriptError(f"{shown(text)} is wanted, found {found}", token.line, token.column)
+            raise ScriptError(f"expected {shown(text)}, found {found}", token.line, token.column)
 
     def sum(self) -> object:
         """Return the value of a sum."""

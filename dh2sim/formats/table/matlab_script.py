@@ -301,7 +301,7 @@ def _link(token: Token, arguments: Sequence[object]) -> ToolboxLink:
         while rest:
             key = rest.pop(0)
             if not isinstance(key, str):
-                raise ScriptError(f"the name of a property is wanted, found {described(key)}")
+                raise ScriptError(f"expected the name of a property, found {described(key)}")
             match key.lower():
                 case "standard" | "sta" | "stddh":
                     link.modified = False
@@ -356,7 +356,7 @@ def _robot(token: Token, arguments: Sequence[object]) -> ToolboxRobot:
     while rest:
         key = rest.pop(0)
         if not isinstance(key, str):
-            raise ScriptError(f"the name of an option is wanted, found {described(key)}")
+            raise ScriptError(f"expected the name of an option, found {described(key)}")
         if key.lower() in ("modified", "standard"):
             for link in links:
                 link.modified = key.lower() == "modified"

@@ -150,7 +150,7 @@ def number(value: object) -> float:
     if isinstance(value, Unknown):
         raise ScriptError(value.why, reported=value.reported)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ScriptError(f"a number is wanted, found {described(value)}")
+        raise ScriptError(f"expected a number, found {described(value)}")
     return float(value)
 
 
@@ -163,7 +163,7 @@ def numbers_of(value: object) -> list[float]:
     if isinstance(value, Unknown):
         raise ScriptError(value.why, reported=value.reported)
     if not isinstance(value, list):
-        raise ScriptError(f"a list of numbers is wanted, found {described(value)}")
+        raise ScriptError(f"expected a list of numbers, found {described(value)}")
     if len(value) == 1 and isinstance(value[0], list):
         value = value[0]
     return [number(item) for item in value]
@@ -236,7 +236,7 @@ def transform(value: object) -> Matrix:
         return rows
     if not isinstance(value, tuple):
         raise ScriptError(
-            f"a pose is wanted, found {described(value)}; write it with transl, trotx, troty, trotz, SE3 or numbers"
+            f"expected a pose, found {described(value)}; write it with transl, trotx, troty, trotz, SE3 or numbers"
         )
     return value
 
@@ -298,7 +298,7 @@ def _is_square(value: object) -> bool:
 
 def _three(values: Sequence[float]) -> Sequence[float]:
     if len(values) != 3:
-        raise ScriptError(f"three numbers are wanted, found {len(values)}")
+        raise ScriptError(f"expected three numbers, found {len(values)}")
     return values
 
 
@@ -331,7 +331,7 @@ def set_property(link: ToolboxLink, key: str, value: object) -> None:
             return
         limits = numbers_of(value)
         if len(limits) != 2:
-            raise ScriptError(f"qlim: two numbers are wanted, found {len(limits)}")
+            raise ScriptError(f"qlim: expected two numbers, found {len(limits)}")
         link.limits = (limits[0], limits[1])
     elif name not in _IGNORED:
         link.unused.add(key)
@@ -358,7 +358,7 @@ def links_in(value: object, *, depth: int = 0) -> list[ToolboxLink]:
         case Unknown():
             raise ScriptError(f"the links cannot be read: {value.why}", reported=value.reported)
         case _:
-            raise ScriptError(f"links are wanted, found {described(value)}")
+            raise ScriptError(f"expected links, found {described(value)}")
 
 
 _HEADINGS: Final = ("theta (rad)", "d", "a", "alpha (rad)", "offset (rad)", "type", "flip", "min (rad)", "max (rad)")

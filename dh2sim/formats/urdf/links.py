@@ -239,7 +239,7 @@ def _mesh(
     mesh = None if geometry is None else geometry.first("mesh")
     if mesh is None:
         for shape in () if geometry is None else geometry.children:
-            notes.group("Shapes that are no meshes are not carried over: {}.", part.name, shape.tag[:60])
+            notes.group("Shapes other than meshes are not carried over: {}.", part.name, shape.tag[:60])
         return None
     uri = mesh.attributes.get("filename", "")
     scale = read_numbers(mesh, "scale", f"{path}.geometry.mesh", report, count=3, default=(1.0, 1.0, 1.0))

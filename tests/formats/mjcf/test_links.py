@@ -104,7 +104,7 @@ def test_a_mesh_is_where_mujoco_shows_it(suffix: str, ref: str, tmp_path: Path) 
     distances = np.linalg.norm(corners[:, None] - vertices[None], axis=2)
     assert distances.min(axis=1).max() < 1e-6  # MuJoCo keeps vertices in single precision
     assert distances.min(axis=0).max() < 1e-6
-    assert "Shapes that are no meshes are not carried over, of links 'one' (sphere)." in robot.notes
+    assert "Shapes other than meshes are not carried over, of links 'one' (sphere)." in robot.notes
 
 
 def test_meshes_that_a_robot_file_cannot_hold_are_noted(tmp_path: Path) -> None:

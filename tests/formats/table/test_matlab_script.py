@@ -220,4 +220,4 @@ def test_nothing_of_a_script_is_run() -> None:
 
 def test_a_list_of_links_that_holds_itself_is_refused() -> None:
     text = "L(1) = Link([0 1 0 0]);\nL(2) = L;\nr = SerialLink(L);"
-    assert complaints(text, "arm.m") == ["arm.m:3:5: links are wanted, found a list"]
+    assert complaints(text, "arm.m") == ["arm.m:3:5: expected links, found a list"]

@@ -139,7 +139,7 @@ def test_links_as_people_write_them(text: str) -> None:
         ("r = DHRobot([RevoluteDH(**p)])", ["arm.py:1:14: arguments behind ** cannot be read"]),
         ("r = DHRobot([RevoluteDH(d=9**9**9)])", ["arm.py:1:14: d: the number is too large"]),
         ("r = DHRobot([RevoluteDH(d=[1] * (1e308 * 10))])", ["arm.py:1:14: d: a list times something is not read"]),
-        ("r = DHRobot([RevoluteDH(qlim=[1])])", ["arm.py:1:14: qlim: two numbers are wanted, found 1"]),
+        ("r = DHRobot([RevoluteDH(qlim=[1])])", ["arm.py:1:14: qlim: expected two numbers, found 1"]),
         ("r = DHRobot([RevoluteDH(d=sqrt(1, 2))])",
          ["arm.py:1:14: d: math.sqrt() takes exactly one argument (2 given)"]),
         ("r = DHRobot([])", ["arm.py:1:5: there are no links"]),

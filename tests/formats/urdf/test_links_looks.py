@@ -64,8 +64,8 @@ def test_the_first_mesh_that_can_be_used_is_carried_over() -> None:
     assert (chosen.uri, chosen.path, chosen.scale) == ("found/b.STL", Path("/m/found/b.STL"), 0.001)
     np.testing.assert_array_equal(chosen.T_link_mesh, pose_from_rpy([1, 2, 3], [0, 0, 0.5]))
     assert notes(found) == [
-        "Shapes that are no meshes are not carried over: 'b' (box).",
-        "Meshes are not carried over that are none of .stl, .obj, .ply, .glb, .dae: those of links 'b' (.step).",
+        "Shapes other than meshes are not carried over: 'b' (box).",
+        "Meshes in formats other than .stl, .obj, .ply, .glb, .dae are not carried over, of links 'b' (.step).",
         "Meshes were not found in 'package://pkg', of links 'b'.",
         "Meshes were not found in 'meshes', of links 'b'.",
         "Meshes were not found in the file's folder, of links 'b'.",
