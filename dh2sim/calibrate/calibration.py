@@ -40,6 +40,10 @@ _SPREAD: Final = 0.01
 """m, over which the tool must have moved for a unit to show."""
 _GROWTH: Final = 2.0
 """Times the size of its table, that no arm is built off."""
+_COARSE: Final = 0.05
+"""Of the arm's size, that no measurement is as uncertain as."""
+_TWISTED: Final = 0.2
+"""rad."""
 _MOST_NAMED: Final = 6
 """Parameters in a message."""
 _ADVICE: Final = (
@@ -307,11 +311,18 @@ class _Task:
             return
         measured = whole.observations.measured
         q = random_vectors(self.robot.spec, self.measured.q, _TRIES, self.seed)
-        growth = _extent(self.robot, whole.state.values, q) / max(_extent(self.robot, self.robot.start, q), 1e-12)
+        extent = _extent(self.robot, self.robot.start, q)
+        growth = _extent(self.robot, whole.state.values, q) / max(extent, 1e-12)
         if not 1.0 / _GROWTH < growth < _GROWTH:
             raise CalibrationError(
                 f"{self._what(measured)}: they would make the arm {growth:.4g} times as large as its table says: "
                 "lengths are in another unit, or the robot is not the one that was measured"
+            )
+        if whole.sigma.length > _COARSE * extent and not whole.sigma.length_known:
+            raise CalibrationError(
+                f"{self._what(measured)}: what is left is {1e3 * whole.sigma.length:.3g} mm a component, of an arm "
+                f"that gets around by {1e3 * extent:.3g} mm: columns or rows are exchanged, a sign is wrong, or the "
+                "robot is not the one that was measured"
             )
         known = self._predicted(whole, q).length
         was = errors_of(before.observations, before.state).length
@@ -466,6 +477,17 @@ class _Task:
                 f"{listed(vague)} {'is' if len(vague) == 1 else 'are'} determined to no better than "
                 f"{1e3 * _VAGUE:g} mm or mrad: only together do these numbers mean anything. A prior keeps them near "
                 "the robot file's."
+            )
+        change = self.robot.change(whole.state.values, self.robot.start)
+        twisted = [
+            parameter.name
+            for k, parameter in enumerate(self.parameters)
+            if parameter.group in (Group.ALPHA, Group.BETA) and abs(change[k]) > _TWISTED
+        ]
+        if twisted:
+            notes.append(
+                f"{listed(twisted)} changed by more than any arm is built off: columns may be exchanged, a joint may "
+                "turn the other way, or the robot is not the one that was measured."
             )
         copies = _copies(whole.observations.measured)
         if copies:

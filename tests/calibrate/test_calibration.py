@@ -239,6 +239,15 @@ def test_positions_in_another_unit_are_refused() -> None:
         assert text.endswith(f", where the table says 0.354 m: they look like {said}")
 
 
+def test_positions_whose_columns_are_exchanged_are_refused() -> None:
+    nominal = robot("stanford")
+    given = measured(nominal, off(nominal, 1e-3, 1), "position", random_q(nominal, 24, 2), seed=3)
+    assert given.position is not None
+    swapped = replace(given, position=given.position[:, [1, 0, 2]], station=("tracker",) * 24)
+    text = refusal(CalibrationError, calibrate, nominal, swapped, held_out=False)
+    assert "a component, of an arm that gets around by 954 mm: columns or rows are exchanged" in text
+
+
 def test_copied_rows_are_noted() -> None:
     nominal = robot("scara")
     given = measured(nominal, off(nominal, 1e-3, 1), "pose", random_q(nominal, 30, 2), seed=3)
