@@ -112,16 +112,16 @@ def _closest(name: str, known: tuple[str, ...], likeness: float) -> str | None:
 Choice = TypeVar("Choice", bound=StrEnum)
 
 
-def member(kind: type[Choice], value: Choice | str, what: str) -> Choice:
+def member(kind: type[Choice], value: Choice | str, what: str, error: type[Dh2simError] = Dh2simError) -> Choice:
     """Return the member of an enumeration that a value names; ``what`` is its name for the message.
 
     Raises:
-        Dh2simError: There is none.
+        Dh2simError: There is none; of the class ``error``.
     """
     for choice in kind:
         if choice == value:
             return choice
-    raise Dh2simError(f"unknown {what} {value!r}.{did_you_mean(str(value), kind)} Allowed: {listed(kind)}")
+    raise error(f"unknown {what} {value!r}.{did_you_mean(str(value), kind)} Allowed: {listed(kind)}")
 
 
 class Notes:

@@ -73,8 +73,9 @@ def draw(
       dh2sim draw stanford 45 60 0.2 45 0 -60 --style stick
         --workspace -1 1 -1 1 -1 1 --reach 1 -o stanford.png
     """
-    from dh2sim.draw.diagram.drawing import DrawingFormat, draw_robot, format_named, format_of
+    from dh2sim.draw.diagram.drawing import DrawingFormat, draw_robot, format_of
     from dh2sim.kinematics.tree import build_tree
+    from dh2sim.messages import member
 
     if q and configuration is not None:
         raise typer.BadParameter("gives the configuration already; leave Q out", param_hint="--configuration")
@@ -84,7 +85,7 @@ def draw(
     vector = read_joint_vector(spec, texts, degrees=degrees, radians=radians, command="draw", options=options)
     if spec.is_mechanism:
         warn_open_loops(build_tree(spec), vector)
-    format_ = format_named(kind) if kind is not None else DrawingFormat.SVG
+    format_ = DrawingFormat.SVG if kind is None else member(DrawingFormat, kind, "format")
     path = None if out == "-" else Path(f"{spec.name}.{format_.value}") if out is None else Path(out)
     if kind is None and path is not None:
         format_ = format_of(path)

@@ -1,4 +1,4 @@
-"""Which reader a file needs, and what is asked of it."""
+"""Files are read by the reader that their content needs, with the options that apply to them."""
 
 from __future__ import annotations
 
@@ -188,32 +188,6 @@ def test_a_residual_above_the_tolerance_is_an_error(monkeypatch: pytest.MonkeyPa
         import_data(ARM.encode(), "arm.urdf", ImportOptions())
     assert str(caught.value).startswith("URDF arm.urdf, from ground to hand: the table is off by 1.0e-03 m and ")
     assert "at the tip; allowed is 1e-09. Nothing was written." in str(caught.value)
-
-
-ROUNDED = b"theta,d (m),a (m),alpha (rad)\nq1,0.4,0,-1.571\nq2,0.15000004,0.3,0.5\n"
-
-
-def test_numbers_stay_as_printed_and_what_was_assumed_is_noted_in_sentences() -> None:
-    imported = import_table(ROUNDED, file="t.csv", convention=Convention.STANDARD)
-    assert [row.alpha for row in imported.spec.rows] == [-1.571, 0.5]
-    assert imported.residual is None
-    assert all(note[0].isupper() and note.endswith(".") for note in imported.notes)
-
-
-def test_a_tolerance_makes_rounded_numbers_simple_and_says_so() -> None:
-    imported = import_table(ROUNDED, file="t.csv", convention=Convention.STANDARD, tolerance=1e-3)
-    first, second = imported.spec.rows
-    assert first.alpha == -math.pi / 2
-    assert (second.d, second.a) == (0.15, 0.3)
-    assert abs(second.alpha - 0.5) < 1e-3
-    assert imported.notes[-1] == "Numbers within 0.001 rad or m of a simple one were made simple."
-
-
-def test_the_file_names_the_robot_unless_another_name_is_asked_for() -> None:
-    assert import_table(ROUNDED, file="folder/my arm.csv", convention=Convention.STANDARD).spec.name == "my_arm"
-    assert import_table(ROUNDED, file="-", convention=Convention.STANDARD).spec.name == "robot"
-    named = import_table(ROUNDED, file="-", convention=Convention.STANDARD, name="scara")
-    assert named.spec.name == "scara"
 
 
 TWO = "## Standard DH\n\n|θ|d|a|α|\n|-|-|-|-|\n|q1|0|1|0|\n\n## Modified DH\n\n|θ|d|a|α|\n|-|-|-|-|\n|q1|0|2|0|\n"

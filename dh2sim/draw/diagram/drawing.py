@@ -21,7 +21,7 @@ from dh2sim.errors import PictureError
 from dh2sim.extras import require_extra
 from dh2sim.files import atomic_file
 from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, spec_of
-from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.messages import member, shown
 
 _DPI = 200
 
@@ -84,7 +84,7 @@ class RobotDrawing:
             OutputError: The file cannot be written.
         """
         file = Path(path)
-        kind = format_of(file) if format is None else format_named(format)
+        kind = format_of(file) if format is None else member(DrawingFormat, format, "format", PictureError)
         if kind in (DrawingFormat.SVG, DrawingFormat.TIKZ):
             text = self.svg if kind is DrawingFormat.SVG else self.tikz
             with atomic_file(file) as draft:
@@ -126,7 +126,7 @@ def draw_robot(
         SingularPositionError: A mechanism cannot be moved to ``q`` from its assembly.
     """
     spec = spec_of(robot)
-    kind = _choice(DrawingStyle, style, "style")
+    kind = member(DrawingStyle, style, "style", PictureError)
     if kind is not DrawingStyle.STICK and (workspace is not None or reach is not None):
         raise PictureError("workspace and reach are of the style 'stick'")
     vector = "home" if q is None else q
@@ -142,16 +142,6 @@ def draw_robot(
     return RobotDrawing(sheet=draw_stick(arm, None if workspace is None else _box(workspace), reach))
 
 
-def format_named(name: str) -> DrawingFormat:
-    """Return a format by its name.
-
-    Raises:
-        PictureError: There is none of that name.
-    """
-    found: DrawingFormat = _choice(DrawingFormat, name, "format")
-    return found
-
-
 def format_of(path: Path) -> DrawingFormat:
     """Return the format that the ending of a file's name stands for.
 
@@ -162,13 +152,6 @@ def format_of(path: Path) -> DrawingFormat:
     if found is None:
         raise PictureError(f"cannot write {shown(path.name)} as a drawing; allowed endings: {', '.join(ENDINGS)}")
     return found
-
-
-def _choice(kind: Any, value: str, what: str) -> Any:
-    if value not in list(kind):
-        hint = did_you_mean(value, list(kind))
-        raise PictureError(f"unknown {what} {shown(value)}.{hint} Allowed: {listed(kind)}")
-    return kind(value)
 
 
 def _box(numbers: Sequence[float]) -> tuple[float, float, float, float, float, float]:
