@@ -79,6 +79,18 @@ def signals_deferred() -> Iterator[None]:
             signal.raise_signal(number)
 
 
+def require_folder(path: Path) -> None:
+    """Check that a file can be written somewhere: its folder exists, as no command makes folders for single files.
+
+    Raises:
+        OutputError: It does not, or there is a folder in the file's place.
+    """
+    if path.is_dir():
+        raise OutputError(f"cannot write '{path}': that is a folder")
+    if not path.parent.is_dir():
+        raise OutputError(f"cannot write '{path}': there is no folder '{path.parent}'")
+
+
 @contextmanager
 def atomic_file(path: Path) -> Iterator[Path]:
     """Yield a temporary file to write to; it replaces ``path`` when the block ends well, and is removed otherwise.
@@ -92,10 +104,7 @@ def atomic_file(path: Path) -> Iterator[Path]:
     Raises:
         OutputError: The file cannot be written; what was at ``path`` is unchanged.
     """
-    if path.is_dir():
-        raise OutputError(f"cannot write '{path}': that is a folder")
-    if not path.parent.is_dir():
-        raise OutputError(f"cannot write '{path}': there is no folder '{path.parent}'")
+    require_folder(path)
     temporary = path.with_name(f".{path.stem[:80]}-{secrets.token_hex(4)}{path.suffix}")
     try:
         try:

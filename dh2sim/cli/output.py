@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from dh2sim.errors import NotFiniteError, OutputError
+from dh2sim.files import require_folder
 from dh2sim.messages import printable
 
 WIDTH: Final = 80
@@ -150,10 +151,7 @@ def require_free(out: Path | None, *, force: bool) -> None:
     """
     if out is None:
         return
-    if out.is_dir():
-        raise OutputError(f"cannot write '{out}': that is a folder")
-    if not out.parent.is_dir():
-        raise OutputError(f"cannot write '{out}': there is no folder '{out.parent}'")
+    require_folder(out)
     if out.exists() and not force:
         raise OutputError(f"'{out}' exists already; choose another name, or overwrite it with --force")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import signal
 import sys
@@ -204,12 +205,14 @@ def rollout(
     part, named, sharing = _share(share), _blocks(blocks), bool(share or blocks)
     check_share(part, alone=named is None)
     job = with_block_size(prepare(model, options, command=shlex.join(["dh2sim", *sys.argv[1:]])), block_size)
+    if not os.path.lexists(out):
+        _named(named, job.layout.blocks)  # makes no run that nothing is put into
     with (
         workers_of(executor, job) as workers,
         open_run(job, out, resume=resume, overwrite=overwrite, join=sharing) as writer,
     ):
         count = writer.layout.blocks
-        chosen = choose_blocks(count, share=part, blocks=None if named is None else range(count)[named])
+        chosen = choose_blocks(count, share=part, blocks=_named(named, count))
         total = sum(len(writer.layout.rollouts(block)) for block in chosen)
         with _patient(quiet) as patience, progress_bar("simulating", "rollouts", total, quiet=quiet) as advance:
             progress = fill(
@@ -263,6 +266,16 @@ def _blocks(text: str) -> slice | None:
     if first and end and int(first) >= int(end):
         raise typer.BadParameter(f"'{text}' ends before it begins", param_hint="--blocks")
     return slice(int(first or 0), int(end) if end else None)
+
+
+def _named(blocks: slice | None, count: int) -> range | None:
+    """Return the blocks of a run of ``count`` that are named, of which there must be some; None if none are."""
+    chosen = None if blocks is None else range(count)[blocks]
+    if blocks is not None and not chosen:
+        there = "only block 0" if count == 1 else f"blocks 0 to {count - 1}"
+        found = f"{blocks.start}:{blocks.stop or ''}"
+        raise typer.BadParameter(f"the run has {there}, got {found}", param_hint="--blocks")
+    return chosen
 
 
 def _is_number(text: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from dh2sim.trajectory.waypoints import WaypointFile
 
 _FILES = (".yaml", ".yml", ".json")
+_OTHER_FILES = (".csv", ".txt", ".toml", ".parquet")
 
 
 def trajectory(
@@ -162,6 +164,9 @@ def _waypoints(spec: RobotSpec, words: Sequence[str]) -> tuple[WaypointFile | No
         return file, file.waypoints
     if named:
         raise ConfigurationError(f"{named[0]} is a waypoint file: it cannot be combined with other waypoints")
+    if other := [word for word in words if os.path.isfile(word) or word.lower().endswith(_OTHER_FILES)]:
+        wanted = f"these are YAML with a list 'waypoints', and end in {listed(_FILES)}"
+        raise ConfigurationError(f"{shown(other[0])} is not a waypoint file: {wanted}")
     return None, _typed(spec, words)
 
 

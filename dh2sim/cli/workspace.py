@@ -10,6 +10,7 @@ import typer
 from dh2sim.cli.common import JsonOption, QuietOption, RobotArgument, build_all
 from dh2sim.cli.output import json_text, progress_bar, table_lines, wrapped
 from dh2sim.errors import OutputError
+from dh2sim.files import require_folder
 from dh2sim.messages import printable, shown
 
 if TYPE_CHECKING:
@@ -123,10 +124,7 @@ def _require_file(out: Path | None) -> bool:
     ending = out.suffix.lower()
     if ending not in (*PICTURES, *DATA):
         raise OutputError(f"cannot write {shown(out.name)}: allowed endings: {', '.join((*PICTURES, *DATA))}")
-    if out.is_dir():
-        raise OutputError(f"cannot write '{out}': that is a folder")
-    if not out.parent.is_dir():
-        raise OutputError(f"cannot write '{out}': there is no folder '{out.parent}'")
+    require_folder(out)
     if ending in PICTURES:
         from dh2sim.draw.plot_style import require_plot
 

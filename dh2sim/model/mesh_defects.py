@@ -62,7 +62,7 @@ def defect_of(suffix: str, data: bytes) -> str | None:
 
 def reason_of(suffix: str, data: bytes) -> str:
     """Return why a mesh file, without plain defects, could not be read."""
-    reason = _obj(data) if suffix == ".obj" else _ascii_stl(data) if suffix == ".stl" else None
+    reason = _obj(data) if suffix == ".obj" else ascii_stl_defect(data) if suffix == ".stl" else None
     return reason or f"it is not a valid {suffix[1:].upper()} file, or only a part of one: {_AGAIN}"
 
 
@@ -98,7 +98,7 @@ def _stl(data: bytes) -> str | None:
     )
 
 
-def _ascii_stl(data: bytes) -> str | None:
+def ascii_stl_defect(data: bytes) -> str | None:
     """Return the first corner of an STL file in text that has no three numbers."""
     for number, line in enumerate(data.splitlines(), start=1):
         words = line.split()

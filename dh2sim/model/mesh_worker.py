@@ -17,7 +17,7 @@ import trimesh
 
 from dh2sim.messages import shown
 from dh2sim.model.collada import read_collada
-from dh2sim.model.mesh_defects import defect_of, reason_of
+from dh2sim.model.mesh_defects import ascii_stl_defect, defect_of, reason_of
 from dh2sim.model.meshes import MAX_FACES
 from dh2sim.typing import Array
 
@@ -61,7 +61,10 @@ def _surface(suffix: str, data: bytes) -> tuple[dict[str, Any], bytes]:
         raise _UnreadableError(str(error)) from error
     try:
         surface = trimesh.Trimesh(vertices, faces, process=False) if suffix == ".dae" else _read(suffix, data)
-        return _measured(surface)
+        facts, stl = _measured(surface)
+        if facts["faces"] == 0 and suffix == ".stl" and (defect := ascii_stl_defect(data)) is not None:
+            raise _UnreadableError(defect)  # some versions of trimesh pass over what they cannot read
+        return facts, stl
     except MemoryError:
         raise
     except _UnreadableError:

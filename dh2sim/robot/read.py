@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
+from typing import Final
 
 from dh2sim.errors import Dh2simError, RobotError, UnknownRobotError
 from dh2sim.input_files import read_input
@@ -31,6 +32,9 @@ from dh2sim.robot.spec import (
     robot_of_checked,
 )
 from dh2sim.robot.yaml_tree import MAX_BYTES, Entry, Node, Report, check_size, compose, decode
+
+_MOST_NAMED: Final = 8
+"""Robots that an error names."""
 
 
 def load_robot(path_or_name: str | os.PathLike[str]) -> RobotSpec:
@@ -301,5 +305,11 @@ def _find(given: str) -> tuple[Path, str]:
         if given and os.path.isfile(here)
         else did_you_mean(given.removesuffix(".yaml"), known)
     )
-    list_of_them = f"Robots that come with dh2sim: {listed(known)}"
-    raise UnknownRobotError(f"no file or robot named {shown(given)}.{hint} {list_of_them}")
+    raise UnknownRobotError(f"no file or robot named {shown(given)}.{hint} {_robots(known)}")
+
+
+def _robots(known: Sequence[str]) -> str:
+    """Return which robots there are, or how to list them where they are many."""
+    if len(known) <= _MOST_NAMED:
+        return f"Robots that come with dh2sim: {listed(known)}"
+    return f"'dh2sim list' lists the {len(known)} robots that come with dh2sim, such as {listed(known[:3])}"

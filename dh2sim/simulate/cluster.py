@@ -39,6 +39,8 @@ _A_MOMENT: Final = 0.2
 """s between two questions whether to stop."""
 _LOCAL: Final = "local"
 _DASK: Final = "dask://"
+_CONNECT: Final = 5
+"""Seconds in which a scheduler must answer."""
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
@@ -82,7 +84,7 @@ def _dask(address: str) -> Iterator[Client]:
     from distributed import Client
 
     try:
-        client = Client(f"tcp://{address.removeprefix(_DASK)}", timeout=20)
+        client = Client(f"tcp://{address.removeprefix(_DASK)}", timeout=_CONNECT)
     except (OSError, ValueError) as error:
         raise ExecutorError(f"there is no scheduler of Dask at {address}: {error}") from error
     with client:

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO, Final
 
 from dh2sim.errors import OutputError, RunDamagedError, RunDiffersError
 from dh2sim.extras import require_extra
-from dh2sim.files import atomic_file
+from dh2sim.files import atomic_file, require_folder
 from dh2sim.messages import listed, shown
 
 ENDINGS: Final = (".parquet", ".csv")
@@ -36,10 +36,7 @@ def require_table(out: Path) -> None:
     """
     if out.suffix.lower() not in ENDINGS:
         raise OutputError(f"cannot write {shown(out.name)}: allowed endings: {listed(ENDINGS)}")
-    if out.is_dir():
-        raise OutputError(f"cannot write '{out}': that is a folder")
-    if not out.parent.is_dir():
-        raise OutputError(f"cannot write '{out}': there is no folder '{out.parent}'")
+    require_folder(out)
     if out.suffix.lower() == ".parquet":
         require_extra("data", "pyarrow", what="a table in Parquet")
     if out.exists() and not journal_path(out).exists():

@@ -137,6 +137,7 @@ def test_the_report_fits_into_80_columns(name: str) -> None:
         (["home", "zero", "--kind", "line"], "the line reaches the pose at its end in another configuration"),
         (["points.yaml", "home"], "points.yaml is a waypoint file: it cannot be combined with other waypoints"),
         (["points.yaml"], "points.yaml: cannot be read"),
+        (["points.csv"], "'points.csv' is not a waypoint file: these are YAML with a list 'waypoints'"),
     ],
 )
 def test_wrong_arguments_exit_2_with_a_sentence(words: list[str], said: str) -> None:

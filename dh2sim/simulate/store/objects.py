@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
+import socket
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -26,6 +27,18 @@ _WHOLE: Final = 2**28
 """Bytes of objects that are sent in one request; larger ones in several, at whose end they appear."""
 _PATIENCE: Final = timedelta(seconds=60)
 """For a request that fails and is sent again."""
+_CREDENTIALS: Final = (
+    "AWS_ACCESS_KEY_ID",
+    "AWS_WEB_IDENTITY_TOKEN_FILE",
+    "AWS_CONTAINER_CREDENTIALS_RELATIVE_URI",
+    "AWS_CONTAINER_CREDENTIALS_FULL_URI",
+    "AWS_METADATA_ENDPOINT",
+    "AWS_SKIP_SIGNATURE",
+)
+"""Variables of which one says how requests are signed; without any, the cloud's machine itself is asked."""
+_METADATA: Final = "169.254.169.254"
+"""Where machines of a cloud are asked for credentials."""
+_NO_CREDENTIALS: Final = "no credentials were found: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY"
 _TIMEOUT: Final = timedelta(seconds=120)
 """For a single request."""
 _MANIFEST: Final = f"{BLOCKS}/{METADATA}"
@@ -51,6 +64,8 @@ class ObjectStore:
         endpoint = os.environ.get("AWS_ENDPOINT_URL_S3") or os.environ.get("AWS_ENDPOINT_URL")
         more: dict[str, Any] = {"endpoint": endpoint} if endpoint else {}
         self.name = url
+        if not any(os.environ.get(name) for name in _CREDENTIALS) and not _reaches_metadata():
+            raise RunError(f"cannot use '{url}': {_NO_CREDENTIALS}")
         try:
             self._objects = S3Store(
                 bucket,
@@ -231,4 +246,14 @@ def _writing() -> Iterator[None]:
 
 def _first_line(error: BaseException) -> str:
     """Return what obstore says, without its source code's words."""
-    return str(error).partition("\n")[0].rstrip(" .")
+    first = str(error).partition("\n")[0].rstrip(" .")
+    return _NO_CREDENTIALS if f"//{_METADATA}/" in first else first
+
+
+def _reaches_metadata() -> bool:
+    """Whether this may be a machine of a cloud, which has credentials of its own; obstore would ask for a minute."""
+    try:
+        socket.create_connection((_METADATA, 80), timeout=1).close()
+    except OSError:
+        return False
+    return True

@@ -10,6 +10,7 @@ import pytest
 
 from dh2sim.errors import RunDiffersError, RunError, RunExistsError
 from dh2sim.simulate.description import describe
+from dh2sim.simulate.store import objects as objects_module
 from dh2sim.simulate.store.codec import encode_text
 from dh2sim.simulate.store.metadata import make_metadata
 from dh2sim.simulate.store.objects import ObjectStore
@@ -54,6 +55,13 @@ def _bucket(server: str, monkeypatch: pytest.MonkeyPatch) -> None:
             client.delete_object(Bucket="rollouts", Key=each["Key"])
     else:
         client.create_bucket(Bucket="rollouts")
+
+
+def test_without_credentials_the_error_says_what_to_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("AWS_ACCESS_KEY_ID")
+    monkeypatch.setattr(objects_module, "_METADATA", "127.0.0.1")  # where nothing serves credentials
+    with pytest.raises(RunError, match="no credentials were found: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY"):
+        ObjectStore(RUN)
 
 
 def objects(url: str = RUN) -> dict[str, bytes]:
