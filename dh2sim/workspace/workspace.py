@@ -31,6 +31,8 @@ _ROUND: Final = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 SAMPLES: Final = 200_000
 ORIENTATIONS: Final = 24
 MOST_SAMPLES: Final = 100_000_000
+MOST_JOINTS: Final = 30
+"""That move the point: the work grows with the third power of their number."""
 MOST_POSES: Final = 2_000_000
 """Of inverse kinematics, half a millisecond each."""
 MOST_NODES: Final = 1_000_000
@@ -149,7 +151,7 @@ def compute_workspace(
     Raises:
         SettingsError: An argument is wrong, or asks for too much; the text says what would do.
         UnknownFrameError: There is no such frame.
-        ConfigurationError: The arm has no section, or no choice of orientations.
+        ConfigurationError: The arm has no section, no choice of orientations, or more than ``MOST_JOINTS`` joints.
     """
     model = _model_of(robot)
     spec, chain = model.spec, model.chain
@@ -159,6 +161,12 @@ def compute_workspace(
     workers = threads or os.cpu_count() or 1
     show: Stage = stage or (lambda *_: nullcontext(lambda _: None))
     point = PointMap(chain, frame, [joint.travel for joint in model.moving_joints], model.home, model.extent)
+    if len(point.joints) > MOST_JOINTS:
+        moving = len(point.joints)
+        raise ConfigurationError(
+            f"{spec.name}: {moving} joints move {frame}; workspaces are found for at most {MOST_JOINTS}. Take a "
+            "frame nearer to the base, or fix joints"
+        )
     names = tuple(joint.name for joint in model.moving_joints)
     q = random_configurations(point.sample_low, point.sample_high, _SPREAD, [seed, 2])
     p = point.positions(q)

@@ -10,6 +10,8 @@ import pytest
 from dh2sim import Continuous, Fixed, Prismatic, Revolute, Robot
 from dh2sim.errors import ConfigurationError, SettingsError, UnknownFrameError
 from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.read import parse_robot
+from dh2sim.workspace.workspace import compute_workspace
 
 QUICKLY = ("so101", "ssrms")
 
@@ -154,3 +156,11 @@ def test_voxels_are_as_fine_as_the_arm_is_large_unless_a_size_is_given() -> None
     assert sizes[1000.0].size == pytest.approx(1000.0 * sizes[1.0].size)
     assert 10_000 < len(sizes[1.0].centers) < 100_000
     assert scaled(1.0).workspace(samples=500, size=0.1, threads=1).size == 0.1
+
+
+def test_an_arm_of_very_many_joints_is_refused_at_once() -> None:
+    rows = "\n".join("  - {type: revolute, a: 0.1, alpha: 1.0}" for _ in range(31))
+    spec = parse_robot(f"name: long\nconvention: standard\njoints:\n{rows}\n")
+    with pytest.raises(ConfigurationError, match=r"long: 31 joints move tool0; workspaces are found for at most 30"):
+        compute_workspace(spec, section=True, dexterity=True)
+    assert len(compute_workspace(spec, frame="dh_3", samples=1000).joints) == 31
