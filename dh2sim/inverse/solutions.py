@@ -46,7 +46,7 @@ class Solutions:
     branch: tuple[str, ...]
     """Name of each one's branch, '' where no name applies."""
     complete: bool
-    """Whether every isolated solution is here, as far as trials can show."""
+    """Whether every isolated solution is here, as far as trials can show; false where joints to spare were held."""
     found_share: float = 1.0
     """Share of trial configurations that the solver found again when it was built."""
     curves: tuple[Curve, ...] = ()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Final
 
@@ -31,11 +30,12 @@ from dh2sim.inverse.reach import limits_reason, position_limits, why_unreachable
 from dh2sim.inverse.redundancy import SAMPLES, curves_and_nearest, joints_to_lock, self_motions
 from dh2sim.inverse.self_motion import LONGEST, SELF_MOTION, Path
 from dh2sim.inverse.solutions import Solutions
+from dh2sim.inverse.table import bare_table, shared_builds
 from dh2sim.inverse.trial import choose_method
 from dh2sim.inverse.turns import Turns
 from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, spec_of
 from dh2sim.messages import did_you_mean, listed, shown
-from dh2sim.robot.spec import BaseSpec, Limits, RobotSpec, Row, ToolSpec
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
 VERIFIED: Final = 1e-10
@@ -73,7 +73,7 @@ class InverseSolver:
         """
         if not spec_of(robot).moving_rows:
             raise ConfigurationError(f"{spec_of(robot).name} has no joint that moves")
-        self._prepare(_bare(spec_of(robot)))
+        self._prepare(bare_table(spec_of(robot)))
 
     def _prepare(self, spec: RobotSpec) -> None:
         self._spec = spec
@@ -83,7 +83,7 @@ class InverseSolver:
         self._limits = tuple(row.limits.position for row in rows)
         self._home = spec.named_configurations["home"]
         self._chain = build_chain(spec)
-        self._built = _shared(_key(spec))
+        self._built = shared_builds(spec)
         lower, upper = position_limits(rows)
         self.size = arm_size(self._chain, lower, upper)
         """Unit of length of residuals and singular values, m: a bound on the distance from base_link to tool0."""
@@ -271,7 +271,7 @@ class InverseSolver:
             [result] = self._results(method, found, T[None], q0, free, limits=limits)
             names = listed(self.names[joint] for joint in sorted(held))
             note = f"{surplus} joints to spare: {names} are held where a solution near the start has them."
-            return replace(result, notes=(*result.notes, note))
+            return replace(result, complete=False, notes=(*result.notes, note))
         fixed, shares = _scaled_locks(arm, given), [1.0]
         sampled: list[str] = []
 
@@ -500,46 +500,3 @@ def _first_of_equal(pose: Indices, q: Array, turns: Turns) -> Flags:
 def _scaled_locks(arm: Arm, locked: Mapping[int, Array]) -> dict[int, Array]:
     """Return locked coordinates in the arm's units."""
     return {j: q if arm.turns[j] else (q + arm.offsets[j]) / arm.length for j, q in locked.items()}
-
-
-@lru_cache(maxsize=64)
-def _shared(key: tuple[object, ...]) -> dict[Any, Any]:  # noqa: ARG001
-    """Return what is built for a table, the same for equal tables."""
-    return {}
-
-
-def _key(spec: RobotSpec) -> tuple[object, ...]:
-    """Return the numbers of a table, which tell it from others."""
-    poses = (spec.base.pose, spec.tool)
-    return (
-        *(tuple(values.tolist()) for pose in poses for values in (pose.xyz, pose.rpy)),
-        *((r.type, r.convention, r.a, r.alpha, r.d, r.theta, r.beta, r.flip, r.limits.position) for r in spec.rows),
-    )
-
-
-def _bare(spec: RobotSpec) -> RobotSpec:
-    """Return a robot without all that does not count here."""
-
-    def bare(row: Row) -> Row:
-        return Row(
-            name=row.name,
-            type=row.type,
-            convention=row.convention,
-            a=row.a,
-            alpha=row.alpha,
-            d=row.d,
-            theta=row.theta,
-            beta=row.beta,
-            flip=row.flip,
-            limits=Limits(position=row.limits.position),
-        )
-
-    home = {name: q for name, q in spec.configurations.items() if name == "home"}
-    return RobotSpec(
-        name=spec.name,
-        units=spec.units,
-        base=BaseSpec(pose=spec.base.pose),
-        tool=ToolSpec.at(spec.tool),
-        rows=tuple(bare(row) for row in spec.rows),
-        configurations=home,
-    )

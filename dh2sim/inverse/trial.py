@@ -6,6 +6,7 @@ configurations reach, and the best two are kept. What the trial shows that they 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, product
@@ -23,6 +24,10 @@ _TRIALS: Final = 40
 """Poses of the trial."""
 _FIRST: Final = 8
 """Of them on which a hopeless elimination is told from others."""
+_MORE: Final = 4
+"""Eliminations of a kind that are tried in full where those of the kind before may miss solutions, or all must."""
+_ROUNDED: Final = 1e-6
+"""Least share of singular values, below which the joints are independent by rounding of the table alone."""
 _NUDGE: Final = 1e-6
 """Size of changes, in lengths of the arm and rad, that make singular eliminations regular."""
 _SEED: Final = 2026
@@ -62,23 +67,29 @@ def _tried(
     J = pose_and_jacobian(arm, q)[1]
     drawn = Found(pose=np.arange(len(q)), q=q, sigma=np.ones(len(q)), error=np.zeros(len(q)), J=J)
     bare = Method(arm=arm, moving=moving, ranges=ranges, virtual=virtual, eliminations=(), found_share=0.0)
+    values = np.linalg.svd(J[:, :, moving], compute_uv=False)
+    rounded = bool((values[:, -1] < _ROUNDED * values[:, 0]).all())
     trials: list[_Trial] = []
     share = 0.0
     nudges = small_motions(rng, 6, _NUDGE)
     nudged = loop.moved(nudges)
-    for seen, hidden in ((loop, (0,)), (loop, (1, 2)), (nudged, (0,)), (nudged, (1, 2))):
+    for number, (seen, hidden) in enumerate(product((loop, nudged), ((0,), (1, 2)))):
+        more = _MORE if number or rounded else math.inf  # where all is rounded, none is better
         for elimination in _eliminations(seen, hidden, rng):
+            if not more:
+                break
             used = elimination if seen is loop else Nudged(elimination=elimination, nudges=nudges)
             few = bare.solve_by(used, T[:_FIRST], {joint: value[:_FIRST] for joint, value in locked.items()})
             if _own(bare, few, drawn) >= _FIRST // 2:
                 found = bare.solve_by(used, T, locked)
                 own, condition = _own(bare, found, drawn), float(np.median(elimination.condition(seen)))
                 trials.append(_Trial(elimination=used, found=found, own=own, condition=condition))
+                more -= 1
         trials.sort(key=lambda trial: trial.rank)
         union = bare.distinct(joined([drawn, *(trial.found for trial in trials)], arm.n))
         ours = bare.distinct(joined([trial.found for trial in trials[:2]], arm.n))
         share = len(ours.pose) / len(union.pose)
-        if share == 1.0 and not bare.doubtful(ours, len(q)).any():
+        if rounded or (share == 1.0 and not bare.doubtful(ours, len(q)).any()):
             break
     best = [trial.elimination for trial in trials[:2]]
     # near a singularity another kind may be regular, and at one an arm that is nearly the same

@@ -120,6 +120,7 @@ def test_of_several_joints_to_spare_those_at_the_tool_are_held() -> None:
     q = np.array([0.3, 0.4, -0.6, 0.5, 0.2])
     answer = solved(spec, q)
     assert answer.notes == ("2 joints to spare: j3, j4 are held where a solution near the start has them.",)
+    assert not answer.complete
     assert answer.q[0] == pytest.approx(q, abs=1e-9)
     assert len(answer) == 2  # elbow up and down
 
