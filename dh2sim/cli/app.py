@@ -82,7 +82,7 @@ Examples:
   dh2sim new my_arm                  a robot file to start from
   dh2sim list                        the robots that come with dh2sim
   dh2sim info stanford               its table, frames, mass and reach
-  dh2sim export stanford             write URDF and MJCF to generated/stanford/
+  dh2sim export stanford             its URDF and MJCF, in generated/stanford/
   dh2sim validate stanford           check every engine against the table
   dh2sim check robots                all files, exports and poses of a folder
   dh2sim fk stanford 17 -40 0.5 63 34 -23

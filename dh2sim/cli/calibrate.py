@@ -122,10 +122,10 @@ def calibrate(
 
     \b
     Examples:
-      dh2sim calibrate franka_panda sockets.csv --groups placement -o my_panda.yaml
+      dh2sim calibrate franka_panda sockets.csv --groups placement -o panda.yaml
       dh2sim calibrate ur5e poses.csv --noise 0.05mm,0.1mrad
-      dh2sim calibrate puma560 points.csv --unknown base,tool,theta --robust --json
-      dh2sim calibrate stanford --from-run run.zarr --noise 5e-5 -o calibrated.yaml
+      dh2sim calibrate puma560 points.csv --unknown base,tool,theta --robust
+      dh2sim calibrate stanford --from-run run.zarr --noise 5e-5 -o fitted.yaml
       dh2sim calibrate ur5e poses.csv -o my_ur5e.yaml --report report.html
       dh2sim calibrate ur5e --plan 30 -o configurations.csv
     """
