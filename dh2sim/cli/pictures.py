@@ -81,7 +81,7 @@ def render(
       dh2sim render run.zarr --out end.png --time 1.5
       dh2sim render stanford --frames --configuration printed
     """
-    of_run = source.endswith(".zarr") or Path(source).is_dir()
+    of_run = source.endswith(".zarr") or source.lower().startswith("s3://") or Path(source).is_dir()
     if of_run:
         refuse_options("a run", {"--configuration": configuration})
     else:
@@ -130,6 +130,8 @@ def render(
 def _beside(run: Path, ending: str) -> Path:
     """Return the path of a file beside a run, named after it; the run may be given as '.', from inside."""
     named = run.resolve() if run.name in ("", "..") else run
+    if run.parts[:1] in (("s3:",), ("S3:",)):  # nothing is written beside a run in an object store
+        return Path(f"{named.stem}{ending}")
     return named.parent / f"{named.stem}{ending}"
 
 

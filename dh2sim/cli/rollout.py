@@ -269,9 +269,9 @@ def _blocks(text: str) -> slice | None:
 
 
 def _named(blocks: slice | None, count: int) -> range | None:
-    """Return the blocks of a run of ``count`` that are named, of which there must be some; None if none are."""
+    """Return the blocks of a run of ``count`` that are named, of which there must be some but for ``:0``."""
     chosen = None if blocks is None else range(count)[blocks]
-    if blocks is not None and not chosen:
+    if blocks is not None and not chosen and blocks.stop != 0:
         there = "only block 0" if count == 1 else f"blocks 0 to {count - 1}"
         found = f"{blocks.start}:{blocks.stop or ''}"
         raise typer.BadParameter(f"the run has {there}, got {found}", param_hint="--blocks")

@@ -234,7 +234,8 @@ def choose_blocks(
         return range(count)
     wrong = [block for block in blocks if not 0 <= block < count]
     if wrong:
-        raise SettingsError([("blocks", f"must be from 0 to {count - 1}, got {wrong[0]}")])
+        allowed = f"from 0 to {count - 1}" if count > 1 else "0, the only block of this run"
+        raise SettingsError([("blocks", f"must be {allowed}, got {wrong[0]}")])
     return blocks
 
 

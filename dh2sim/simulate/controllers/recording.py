@@ -225,6 +225,8 @@ def read_recording(file: str, kind: str) -> Recording:
         there, folder = path.exists(), path.is_dir()
     except (OSError, RuntimeError) as error:
         raise ControllerError(f"cannot read '{file}': {error}") from error
+    if not there and "://" in file:
+        raise ControllerError(f"'{file}' cannot be replayed from an object store: copy the run into a folder first")
     if not there:
         raise ControllerError(f"no such file '{file}'")
     if folder:

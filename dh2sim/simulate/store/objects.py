@@ -41,6 +41,17 @@ _METADATA: Final = "169.254.169.254"
 _NO_CREDENTIALS: Final = "no credentials were found: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY"
 _TIMEOUT: Final = timedelta(seconds=120)
 """For a single request."""
+_CONNECTING: Final = timedelta(seconds=5)
+"""For a server to answer at all."""
+_CAUSES: Final = {
+    (f"//{_METADATA}/",): _NO_CREDENTIALS,
+    ("NoSuchBucket",): "there is no such bucket",
+    ("error sending request",): "the server does not answer; see AWS_ENDPOINT_URL, AWS_REGION and the network",
+    ("InvalidAccessKeyId", "SignatureDoesNotMatch", "AccessDenied", "403 Forbidden"): "access is denied; see "
+    "AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, and what they may do",
+    ("PermanentRedirect", "AuthorizationHeaderMalformed"): "the bucket is in another region; set AWS_REGION",
+}
+"""What parts of obstore's messages mean for who has typed a place."""
 _MANIFEST: Final = f"{BLOCKS}/{METADATA}"
 """The object of a new run that is written last."""
 
@@ -70,12 +81,16 @@ class ObjectStore:
             self._objects = S3Store(
                 bucket,
                 prefix=prefix.strip("/"),
-                client_options={"allow_http": bool(endpoint and endpoint.startswith("http://")), "timeout": _TIMEOUT},
+                client_options={
+                    "allow_http": bool(endpoint and endpoint.startswith("http://")),
+                    "timeout": _TIMEOUT,
+                    "connect_timeout": _CONNECTING,
+                },
                 retry_config={"max_retries": 10, "retry_timeout": _PATIENCE},
                 **more,
             )
         except Exception as error:
-            raise RunError(f"cannot use '{url}': {_first_line(error)}") from error
+            raise RunError(f"cannot use '{url}': {_cause(error)}") from error
 
     @property
     def zarr(self) -> Any:
@@ -184,7 +199,7 @@ class ObjectStore:
                 raise RunError(f"cannot read '{self.name}': there is no such bucket") from error
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT)) from error
         except BaseError as error:
-            raise RunError(f"cannot read '{self.name}': {_first_line(error)}") from error
+            raise RunError(f"cannot read '{self.name}': {_cause(error)}") from error
 
 
 def create_objects(store: ObjectStore, files: Mapping[str, bytes], *, overwrite: bool) -> None:
@@ -241,13 +256,16 @@ def _writing() -> Iterator[None]:
     try:
         yield
     except BaseError as error:
-        raise OSError(errno.EIO, _first_line(error)) from error
+        raise OSError(errno.EIO, _cause(error)) from error
 
 
-def _first_line(error: BaseException) -> str:
-    """Return what obstore says, without its source code's words."""
-    first = str(error).partition("\n")[0].rstrip(" .")
-    return _NO_CREDENTIALS if f"//{_METADATA}/" in first else first
+def _cause(error: BaseException) -> str:
+    """Return what obstore says, in words for users where it is one of the usual causes."""
+    text = str(error)
+    for parts, words in _CAUSES.items():
+        if any(part in text for part in parts):
+            return words
+    return text.partition("\n")[0].rstrip(" .")
 
 
 def _reaches_metadata() -> bool:

@@ -12,6 +12,7 @@ from dh2sim.simulate.store.local import LocalStore
 from dh2sim.simulate.store.objects import ObjectStore
 from dh2sim.simulate.store.storage import Place
 
+_LOST_SLASH: Final = re.compile(r"^(s3:)/(?=[^/])", re.IGNORECASE)
 _SCHEME: Final = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")
 
 
@@ -23,6 +24,8 @@ def open_store(place: Place) -> LocalStore | ObjectStore:
         MissingExtraError: It is an object store, and the library for those is not installed.
     """
     text = fspath(place)
+    if isinstance(place, Path):  # which makes one slash of two
+        text = _LOST_SLASH.sub(r"\1//", text)
     scheme = _SCHEME.match(text)
     if scheme is None:
         return LocalStore(Path(text))

@@ -169,3 +169,29 @@ def test_where_there_is_no_run_the_place_is_named(place: str, reported: str) -> 
     shown = dh2sim("runs", place)
     assert (shown.status, shown.out) == (2, "")
     assert shown.err.startswith(f"dh2sim: {reported}")
+
+
+def test_commands_read_a_run_where_it_is(tmp_path: Path) -> None:
+    made = "rollout planar_2r --rollouts 2 --steps 4 --record qpos,qvel,ctrl,tool_pose --out"
+    assert dh2sim(*made.split(), RUN).status == 0
+    drawn = dh2sim("plot", RUN, "--what", "joints", "--out", tmp_path / "joints.png")
+    assert (drawn.status, drawn.err) == (0, "")
+    assert (tmp_path / "joints.png").stat().st_size > 1000
+    page = dh2sim("view", "planar_2r", RUN, "--export", tmp_path / "page.html")
+    assert (page.status, page.err) == (0, "")
+    refused = dh2sim("rollout", "planar_2r", "--controller", f"replay:file={RUN}", "--out", tmp_path / "new.zarr")
+    assert (refused.status, refused.err) == (
+        2,
+        f"dh2sim: controller 'replay': '{RUN}' cannot be replayed from an object store: copy the run into a folder "
+        "first\n",
+    )
+
+
+@pytest.mark.parametrize("command", ["runs {}", "plot {}", "rollout planar_2r --rollouts 2 --steps 4 --out {}"])
+def test_a_server_that_does_not_answer_is_reported_within_seconds(
+    command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
+    shown = dh2sim(*command.format(RUN).split())
+    told = "the server does not answer; see AWS_ENDPOINT_URL, AWS_REGION and the network"
+    assert (shown.status, shown.err) == (2, f"dh2sim: cannot read '{RUN}': {told}\n")

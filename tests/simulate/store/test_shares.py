@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import fcntl
 import os
+import re
 import shutil
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +20,7 @@ from dh2sim.errors import RunBusyError, RunDiffersError, RunError
 from dh2sim.simulate.store import directory
 from dh2sim.simulate.store.reader import damaged_blocks
 from dh2sim.simulate.store.writer import RunWriter
-from tests.program import contents
+from tests.program import contents, dh2sim, environment
 from tests.simulate.store.runs import SECONDS, block_of, copy, finish, lasting, layout, make, resume
 
 OF = layout(rollouts=8, block=2)
@@ -172,3 +177,42 @@ def test_a_run_that_another_process_has_made_meanwhile_is_joined_and_not_replace
     with RunWriter.join(path, OF) as writer:
         assert writer.pending() == ()
     assert os.listdir(tmp_path) == ["run.zarr"]
+
+
+RUN = "rollout planar_2r --controller random --rollouts 192 --steps 2000 --every 100 --block-size 4 --threads 1 -q -o"
+
+
+def _share(folder: Path, share: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "dh2sim", *RUN.split(), "run.zarr", "--share", share]
+    return subprocess.Popen(command, cwd=folder, env=environment())
+
+
+def _made_of(run: Path) -> dict[str, bytes]:
+    """Files of a run without when, how fast and by which command it was made, and what sums up these."""
+    files = {name: data for name, data in contents(run).items() if not name.endswith("zarr.json")}
+    for name, data in files.items():
+        if name.startswith("blocks/record/c."):
+            files[name] = re.sub(rb'"(seconds|run)": [^,]*', b"", data[8:-4])
+    return files
+
+
+@pytest.mark.slow
+def test_four_shares_of_which_one_is_killed_and_started_again_make_the_run_of_one_process(tmp_path: Path) -> None:
+    shares = [_share(tmp_path, f"{i}/4") for i in (1, 2, 3, 4)]
+    records, end = tmp_path / "run.zarr" / "blocks" / "record", time.monotonic() + 60
+    while not list(records.glob("c.*")) and time.monotonic() < end:
+        time.sleep(0.005)
+    own = {f"c.{block}" for block in range(1, 48, 4)}
+    while not own & {path.name for path in records.glob("c.*")} and time.monotonic() < end:
+        time.sleep(0.002)
+    shares[1].kill()
+    assert [share.wait(60) for share in shares] == [0, -signal.SIGKILL, 0, 0]
+    missing = own - {path.name for path in records.glob("c.*")}
+    assert 0 < len(missing) < len(own)
+    assert dh2sim("runs", tmp_path / "run.zarr", "--verify").status == 1
+    assert _share(tmp_path, "2/4").wait(60) == 0
+    assert dh2sim("runs", tmp_path / "run.zarr", "--verify").status == 0
+    assert dh2sim(*RUN.split(), tmp_path / "one.zarr").status == 0
+    many, one = (_made_of(tmp_path / name) for name in ("run.zarr", "one.zarr"))
+    left = {name for name in many if name.endswith(".partial")}  # of the process that was killed
+    assert {name: many[name] for name in many.keys() - left} == one
