@@ -90,9 +90,14 @@ def arc(start: Array, via: Array, end: Array) -> ToolPath:
         end: Pose, shape (4, 4).
 
     Raises:
-        TrajectoryError: The three points lie on a line.
+        TrajectoryError: The three points lie on a line, or two of them are the same.
     """
     a, b = via - start[:3, 3], end[:3, 3] - start[:3, 3]
+    sides = [float(np.linalg.norm(side)) for side in (a, b, b - a)]
+    if min(sides) <= _ON_LINE * max(sides):
+        raise TrajectoryError(
+            "start, via and end of an arc must be different points; a whole circle has centre and angle instead"
+        )
     normal = np.cross(a, b)
     size = float(np.linalg.norm(normal))
     if size <= _ON_LINE * float(np.linalg.norm(a)) * float(np.linalg.norm(b)) or size == 0.0:

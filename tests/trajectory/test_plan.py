@@ -102,6 +102,14 @@ def test_a_whole_circle_comes_back_to_its_start() -> None:
     np.testing.assert_allclose(planned.at(planned.duration)[0], home, atol=1e-8)
 
 
+def test_an_arc_whose_points_are_one_but_for_rounding_is_refused() -> None:
+    home = np.array(model("puma560").home)
+    start = table_tool_pose(robot("puma560"), home[None])[0, :3, 3]
+    for xyz, via in ((start + 1e-14, start + 0.1), (start + 0.1, start + 1e-14), (start + 0.1, start + 0.1)):
+        with pytest.raises(TrajectoryError, match="a whole circle has centre and angle instead"):
+            plan_trajectory(model("puma560"), [home, {"xyz": xyz, "via": via}])
+
+
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("kind", ["joint", "line"])
 def test_velocity_acceleration_and_jerk_are_the_derivatives(profile: str, kind: str) -> None:
