@@ -40,6 +40,8 @@ LARGEST: Final = 1.6e6
 bits are exact."""
 _LANES: Final = 16
 """Joint vectors at a time: a few vector registers of each number."""
+_COPIED: Final = 48
+"""Results that are copied in one loop: the time to compile a loop grows faster than its length."""
 _SOURCE: Final = '''\
 """Made by dh2sim: poses or Jacobians of a robot, for Numba. May be deleted at any time."""
 from numba import njit
@@ -88,14 +90,16 @@ def sine_and_cosine(x):
 def kernel(q, out):
     far = 0
     a = zeros({inputs})
+    sines, cosines = empty({angles}), empty({angles})
     b = empty({outputs})
     for start in range(0, len(q), {lanes}):
         count = min({lanes}, len(q) - start)
         for i in range(count):
 {gather}
+        for i in range({angles}):
+            sines[i], cosines[i] = sine_and_cosine(a[i])
         for i in range({lanes}):
 {compute}
-        for i in range(count):
 {scatter}
     return far == 0
 '''
@@ -182,31 +186,37 @@ def _kept(source: str) -> Path:
 def _source(trace: Trace, entries: list[Any], *, cache: bool) -> str:
     """Return the text of a module with a function ``kernel``."""
     live = live_nodes(trace, entries)
-    variables = [i for i, node in enumerate(trace.nodes) if node.kind == VARIABLE]
-    compute = [f"v{i} = a[i + {_LANES * k}]" for k, i in enumerate(variables)]
-    compute += [f"far |= not abs(v{i}) <= {LARGEST!r}" for i in variables]
-    turned: dict[int, dict[str, str]] = {}
+    functions = {SINE: "sines", COSINE: "cosines"}
+    turned = {trace.nodes[i].operands[0]: None for i in live if trace.nodes[i].kind in functions}
+    others = (i for i, node in enumerate(trace.nodes) if node.kind == VARIABLE and i not in turned)
+    place = {i: _LANES * k for k, i in enumerate([*turned, *others])}
+    compute = [f"v{i} = a[i + {start}]" for i, start in place.items()]
+    compute += [f"far |= not abs(v{i}) <= {LARGEST!r}" for i in place]
     for i in live:
-        if trace.nodes[i].kind in (SINE, COSINE):
-            turned.setdefault(trace.nodes[i].operands[0], {})[trace.nodes[i].kind] = f"v{i}"
-    for angle, names in turned.items():
-        compute.append(f"{names.get(SINE, '_')}, {names.get(COSINE, '_')} = sine_and_cosine(v{angle})")
+        if (kind := trace.nodes[i].kind) in functions:
+            compute.append(f"v{i} = {functions[kind]}[i + {place[trace.nodes[i].operands[0]]}]")
     compute += [text for _, text in statements(trace, live)]
     varying = {k: j for j, k in enumerate(k for k, entry in enumerate(entries) if isinstance(entry, Token))}
     # four results of one joint vector stand side by side: so they are transposed by registers, and copied as one
     places = [f"b[4 * i + {4 * _LANES * (j // 4) + j % 4}]" for j in varying.values()]
     compute += [f"{place} = {number_text(entries[k])} + 0.0" for place, k in zip(places, varying, strict=True)]
-    scatter = [f"r{j} = {place}" for j, place in enumerate(places)]  # all read before any is written
-    values = (f"r{varying[k]}" if k in varying else repr(entry + 0.0) for k, entry in enumerate(entries))
-    scatter += [f"out[start + i, {k}] = {value}" for k, value in enumerate(values)]
+    scatter = []
+    for start in range(0, len(entries), _COPIED):
+        part = range(start, min(start + _COPIED, len(entries)))
+        scatter.append("        for i in range(count):")
+        scatter += [f"            r{k} = {places[varying[k]]}" for k in part if k in varying]  # read before written
+        scatter += [
+            f"            out[start + i, {k}] = {f'r{k}' if k in varying else repr(entries[k] + 0.0)}" for k in part
+        ]
     return _SOURCE.format(
         cache=cache,
         lanes=_LANES,
-        inputs=_LANES * len(variables),
+        inputs=_LANES * len(place),
+        angles=_LANES * len(turned),
         outputs=4 * _LANES * -(-len(varying) // 4),
-        gather=_indented(f"a[i + {_LANES * k}] = q[start + i, {k}]" for k in range(len(variables))),
+        gather=_indented(f"a[i + {start}] = q[start + i, {int(trace.nodes[i].value)}]" for i, start in place.items()),
         compute=_indented(compute),
-        scatter=_indented(scatter),
+        scatter="\n".join(scatter),
     )
 
 
