@@ -84,7 +84,7 @@ Examples:
   dh2sim info stanford               its table, frames, mass and reach
   dh2sim export stanford             its URDF and MJCF, in generated/stanford/
   dh2sim validate stanford           check every engine against the table
-  dh2sim check robots                all files, exports and poses of a folder
+  dh2sim check my_arm.yaml           its file, exports and poses; or a folder's
   dh2sim fk stanford 17 -40 0.5 63 34 -23
   dh2sim jacobian stanford home
   dh2sim ik puma560 --at home        all ways to get there

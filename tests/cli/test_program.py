@@ -84,13 +84,14 @@ def test_every_example_of_the_programs_help_works(tmp_path: Path, monkeypatch: p
         run = dh2sim(*command, *quicker.get(command[0], []))
         assert run.status == 0, line
         assert run.err == "" or command[0] in talkative, line
-    assert len(lines) == 24
+    assert len(lines) == 25
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "arm.urdf",
         "arm.yaml",
         "arms.csv",
         "arms.csv.journal",
         "axes.yaml",
+        "configurations.csv",
         "generated",
         "motion.csv",
         "my_arm.yaml",
