@@ -211,6 +211,8 @@ def test_what_makes_mujoco_work_without_bound_is_refused_at_its_place(
     ],
 )
 def test_such_parts_of_moderate_size_are_read(before: str, inside: str, tmp_path: Path) -> None:
+    if "<composite" in inside and mujoco.mj_version() >= 4_000_000:
+        pytest.skip("MuJoCo has no composites since 4.0")
     assert read_text(tmp_path, model_text(ARM + inside, before), tip="one").chain.n == 1
 
 
