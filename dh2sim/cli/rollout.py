@@ -204,7 +204,11 @@ def rollout(
     )
     part, named, sharing = _share(share), _blocks(blocks), bool(share or blocks)
     check_share(part, alone=named is None)
-    job = with_block_size(prepare(model, options, command=shlex.join(["dh2sim", *sys.argv[1:]])), block_size)
+    count = -(-options.rollouts // options.per_design)
+    one = not options.vary and options.designs is None
+    with progress_bar("checking", "designs", count, quiet=quiet or one) as checked:
+        job = prepare(model, options, command=shlex.join(["dh2sim", *sys.argv[1:]]), checked=checked)
+    job = with_block_size(job, block_size)
     if not os.path.lexists(out):
         _named(named, job.layout.blocks)  # makes no run that nothing is put into
     with (

@@ -80,29 +80,27 @@ def sweep(
         raise Dh2simError("there is nothing to vary: give --vary or --designs")
     model = build_all([robot])[0]
     from dh2sim.robot_facade import Robot
-    from dh2sim.sweep.sweep import DEFAULT_COUNT, sweep
+    from dh2sim.simulate.designs import read_design_table
+    from dh2sim.sweep.sweep import DEFAULT_COUNT, measure_designs, prepare_task
 
-    total = DEFAULT_COUNT if count is None else count
-    if designs is not None:
-        from dh2sim.simulate.designs import read_design_table
-
-        total = len(read_design_table(designs))
-    with progress_bar("measuring", "designs", total, quiet=quiet) as advance:
-        found = sweep(
+    draws = named_values(vary, "--vary", "name=how, as in a2=0.05")
+    table = None if designs is None else read_design_table(designs)
+    total = len(table) if table is not None else DEFAULT_COUNT if count is None else count
+    with progress_bar("checking", "designs", total, quiet=quiet) as checked:
+        task = prepare_task(
             model,
-            vary=named_values(vary, "--vary", "name=how, as in a2=0.05"),
-            designs=designs,
+            vary=draws,
+            designs=table,
             count=count,
-            measure=measure,
+            names=measure,
             samples=samples,
             voxel=voxel,
             seed=seed,
-            jobs=jobs,
-            out=out,
-            overwrite=overwrite,
-            advance=advance,
             wrap=Robot.of_model,
+            checked=checked,
         )
+    with progress_bar("measuring", "designs", total, quiet=quiet) as advance:
+        found = measure_designs(model, task, jobs=jobs, out=out, overwrite=overwrite, advance=advance)
     if as_json:
         print(json_text({**_as_json(found), "out": None if out is None else str(out)}))
     elif not quiet:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import math
 import zlib
+from array import array
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from os import PathLike, fspath
@@ -27,11 +29,13 @@ STREAM: Final = 16
 """Of random numbers, beside those of ``Purpose``; each name has one of its own below it."""
 _MOST_PROBLEMS: Final = 50
 """Of a file, that are reported."""
-MOST_FILE_BYTES: Final = 2**28
+MOST_FILE_BYTES: Final = 2**27
 """Largest file of designs that is read."""
 MOST_NAMES: Final = 1000
+MOST_DESIGNS: Final = 10**6
+"""Of a file; to check as many takes some minutes."""
 MOST_REPORTED: Final = 20
-"""Designs that are wrong and reported one by one."""
+"""Designs that are wrong and reported; those after them are not checked."""
 _FORMS: Final = "X (a factor from 1 - X to 1 + X), normal:SD, uniform:LOW:HIGH or loguniform:LOW:HIGH"
 
 
@@ -133,10 +137,10 @@ class DesignTable:
     """In the units of the robot file, shape (designs, columns)."""
     name: str = ""
     """The file; empty for designs made in code."""
-    lines: tuple[int, ...] = field(default=(), repr=False)
-    """Of the file: that of the names and those of the designs, from 1."""
-    places: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 0), np.int32), repr=False)
-    """Where the cells begin in their lines, from 1, shape (1 + designs, columns)."""
+    lines: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32), repr=False)
+    """Of the file: that of the names and those of the designs, from 1, shape (1 + designs,)."""
+    places: tuple[int, ...] = field(default=(), repr=False)
+    """Where the names begin in their line, from 1."""
 
     @property
     def digest(self) -> str:
@@ -200,26 +204,26 @@ def _read_csv(name: str) -> DesignTable:
     except OSError as error:
         raise _refused(f"cannot be read: {name}: {error.strerror or error}") from error
     if len(data) > MOST_FILE_BYTES:
-        raise _refused(f"must be a file of at most {MOST_FILE_BYTES / 2**20:g} MB, got {name}")
+        raise _refused(f"must be a file of at most {MOST_FILE_BYTES / 2**20:g} MB, got {name}: give it in parts")
     problems: list[Problem] = []
 
     def wrong(line: int, column: int, message: str, path: str = "") -> None:
         problems.append(Problem(file=name, line=line, column=column, path=path, message=message))
 
     try:
-        text = data.decode("utf-8-sig")
+        data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = data[: error.start]
         wrong(before.count(b"\n") + 1, error.start - before.rfind(b"\n"), "is not UTF-8 text")
         raise DesignFileError(problems) from None
-    rows = []
-    for line, row in enumerate(text.splitlines(), start=1):
-        if row.strip(" ,;\t") and not row.lstrip().startswith("#"):
-            rows.append((line, _cells(row)))
-    if len(rows) < 2:
-        wrong(rows[0][0] if rows else 1, 1, "expected a line of names, and a line of numbers for each design")
-        raise DesignFileError(problems)
-    (first, head), *designs = rows
+    text = io.TextIOWrapper(io.BytesIO(data), "utf-8-sig")
+    rows = (
+        (line, row.rstrip("\n"))
+        for line, row in enumerate(text, start=1)
+        if row.strip(" ,;\t\n") and not row.lstrip().startswith("#")
+    )
+    first, names = next(rows, (1, ""))
+    head = _cells(names)
     columns = [cell for _, cell in head]
     for index, (place, cell) in enumerate(head):
         if not cell:
@@ -228,32 +232,42 @@ def _read_csv(name: str) -> DesignTable:
             wrong(first, place, f"duplicate column {shown(cell)}")
     if len(columns) > MOST_NAMES:
         wrong(first, 1, f"found {len(columns)} columns; at most {MOST_NAMES} are allowed")
-    values, places = np.zeros((len(designs), len(columns))), np.ones((len(rows), len(columns)), np.int32)
-    places[0] = [place for place, _ in head]
-    for design, (line, cells) in enumerate(designs):
+    values, lines = array("d"), array("i", [first])
+    for line, row in rows:
+        if len(lines) > MOST_DESIGNS:
+            wrong(line, 1, f"at most {MOST_DESIGNS:,} designs are allowed in a file: give them in parts")
+            break
+        if len(problems) >= _MOST_PROBLEMS:
+            wrong(line, 1, "nothing was read from here on: too many errors")
+            break
+        lines.append(line)
+        try:  # most rows are nothing but plain numbers
+            numbers = [float(cell) for cell in row.split(_separator(row))]
+        except ValueError:
+            numbers = []
+        if len(numbers) == len(columns) and math.isfinite(sum(numbers)):
+            values.extend(numbers)
+            continue
+        cells = _cells(row)
         if len(cells) != len(columns):
             wrong(line, 1, f"expected {len(columns)} cells, as in line {first}, found {len(cells)}")
             continue
-        places[design + 1] = [place for place, _ in cells]
-        for column, (place, cell) in enumerate(cells):
+        for (place, cell), column in zip(cells, columns, strict=True):
             try:
-                values[design, column] = _number(cell)
+                values.append(_number(cell))
             except NumberError as error:
-                wrong(line, place, str(error), columns[column])
-    if len(problems) > _MOST_PROBLEMS:
-        left = len(problems) - _MOST_PROBLEMS
-        problems = [
-            *problems[:_MOST_PROBLEMS],
-            replace(problems[_MOST_PROBLEMS], path="", message=f"and {left} more"),
-        ]
+                wrong(line, place, str(error), column)
+    if len(lines) < 2:
+        del problems[:]
+        wrong(first, 1, "expected a line of names, and a line of numbers for each design")
     if problems:
         raise DesignFileError(problems)
     return DesignTable(
         columns=tuple(columns),
-        values=read_only(values),
+        values=read_only(np.array(values).reshape(-1, len(columns))),
         name=name,
-        lines=tuple(line for line, _ in rows),
-        places=places,
+        lines=np.array(lines, dtype=np.int32),
+        places=tuple(place for place, _ in head),
     )
 
 
@@ -270,11 +284,14 @@ def _number(text: str) -> float:
     return to_number(number, {})
 
 
+def _separator(row: str) -> str:
+    return next((mark for mark in "\t;," if mark in row), ",")
+
+
 def _cells(row: str) -> list[tuple[int, str]]:
     """Return where the cells of a line begin, from 1, and their texts."""
-    separator = next((mark for mark in "\t;," if mark in row), ",")
     found, place = [], 0
-    for part in row.split(separator):
+    for part in row.split(_separator(row)):
         inner = part.strip()
         found.append((place + len(part) - len(part.lstrip()) + 1, inner.strip('"')))
         place += len(part) + 1
@@ -326,8 +343,8 @@ class Designs:
         table = self._table
         if table is None or problem.path not in table.columns:
             return problem
-        column = int(table.places[0, table.columns.index(problem.path)])
-        return replace(problem, file=table.name, line=table.lines[0], column=column)
+        column = table.places[table.columns.index(problem.path)]
+        return replace(problem, file=table.name, line=int(table.lines[0]), column=column)
 
     def settings(self) -> dict[str, Any]:
         """Return what the designs are made from, JSON values; not how many of them there are."""
@@ -355,7 +372,7 @@ class Designs:
         table = self._table
         if table is None or not table.name:
             return {}
-        return {"file": table.name, "line": table.lines[design + 1], "column": 1}
+        return {"file": table.name, "line": int(table.lines[design + 1]), "column": 1}
 
     def spec(self, design: int) -> RobotSpec:
         """Return the robot of a design.
@@ -372,7 +389,7 @@ class Designs:
             advance: Called with the number of designs that were checked since the last call.
 
         Raises:
-            DesignFileError: There is none of some; the error names them.
+            DesignFileError: There is none of some; the error names the first ``MOST_REPORTED`` of them.
             SettingsError: Likewise, for designs that come from no file.
         """
         problems: list[Problem] = []
@@ -382,12 +399,13 @@ class Designs:
                 self.variation.check(self.values(design))
             except RobotError as error:
                 wrong += 1
-                if wrong <= MOST_REPORTED:
-                    problems += [self.problem(design, each) for each in error.problems]
+                problems += [self.problem(design, each) for each in error.problems]
+                left = self.count - design - 1
+                if wrong == MOST_REPORTED and left:
+                    rest = f"too many designs are wrong: the {left:,} from here on were not checked"
+                    problems.append(Problem(**self.place(design + 1), path="", message=rest))
+                    break
             advance(1)
-        if wrong > MOST_REPORTED:
-            rest = f"{wrong - MOST_REPORTED:,} more of {self.count:,} designs are wrong"
-            problems.append(replace(problems[-1], path="", message=rest))
         if problems:
             raise self.error(problems)
 

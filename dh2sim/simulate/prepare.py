@@ -49,13 +49,20 @@ TIME_BYTES = 16
 T = TypeVar("T")
 
 
-def prepare(model: RobotModel | MechanismModel, options: RolloutOptions, *, command: str = "") -> Job:
+def prepare(
+    model: RobotModel | MechanismModel,
+    options: RolloutOptions,
+    *,
+    command: str = "",
+    checked: Callable[[int], None] = lambda _: None,
+) -> Job:
     """Make a robot ready to be simulated.
 
     Args:
         model: The robot.
         options: What is simulated and recorded.
         command: The command line, for the run's attributes.
+        checked: Called with the number of designs that were checked since the last call.
 
     Raises:
         SettingsError: Options do not fit the robot; the error reports all that are wrong.
@@ -95,7 +102,7 @@ def prepare(model: RobotModel | MechanismModel, options: RolloutOptions, *, comm
     designs = None
     if options.vary or options.designs is not None:
         designs = DesignPlants(
-            designs=_designs(model, options),
+            designs=_designs(model, options, checked),
             recipe=replace(recipe, mjcf=replace(recipe.mjcf, keyframes=False)),
             per_design=options.per_design,
             start=initial.name,
@@ -123,7 +130,7 @@ def prepare(model: RobotModel | MechanismModel, options: RolloutOptions, *, comm
     return job
 
 
-def _designs(model: RobotModel | MechanismModel, options: RolloutOptions) -> Designs:
+def _designs(model: RobotModel | MechanismModel, options: RolloutOptions, checked: Callable[[int], None]) -> Designs:
     """Return the designs of a run, each of which there is a robot of.
 
     Raises:
@@ -143,7 +150,7 @@ def _designs(model: RobotModel | MechanismModel, options: RolloutOptions) -> Des
         problems.append(f"must have names that differ in letters and digits, got {listed(designs.names)}")
     if problems:
         raise SettingsError(("vary" if options.designs is None else "designs", problem) for problem in problems)
-    designs.check()
+    designs.check(checked)
     return designs
 
 

@@ -185,6 +185,23 @@ def sweep(
         seed=seed,
         wrap=wrap,
     )
+    return measure_designs(model, task, jobs=jobs, out=out, overwrite=overwrite, advance=advance)
+
+
+def measure_designs(
+    model: RobotModel,
+    task: Task,
+    *,
+    jobs: SupportsIndex = 1,
+    out: str | PathLike[str] | None = None,
+    overwrite: bool = False,
+    advance: Callable[[int], None] | None = None,
+) -> Sweep:
+    """Measure the designs that ``prepare_task`` has checked; the arguments are those of ``sweep``.
+
+    Raises:
+        Dh2simError: As ``sweep``.
+    """
     processes = _whole("jobs", jobs, 0, 1024) or len(os.sched_getaffinity(0))
     path = None if out is None else Path(out)
     if path is not None:
@@ -237,8 +254,11 @@ def prepare_task(
     voxel: float | None,
     seed: SupportsIndex,
     wrap: Callable[[RobotModel], object],
+    checked: Callable[[int], None] = lambda _: None,
 ) -> Task:
     """Check what a sweep is made from; the arguments are those of ``sweep``.
+
+    ``checked`` is called with the number of designs that were checked since the last call.
 
     Raises:
         SettingsError: An option is wrong.
@@ -266,7 +286,7 @@ def prepare_task(
         voxel=edge,
         wrap=wrap,
     )
-    task.designs.check()
+    task.designs.check(checked)
     return task
 
 

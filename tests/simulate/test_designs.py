@@ -22,6 +22,7 @@ from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate import rollout
 from dh2sim.simulate.block import simulate_block
 from dh2sim.simulate.design_plants import groups
+from dh2sim.simulate.designs import Designs, read_design_table
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.recorded_model import recorded_model
@@ -191,7 +192,43 @@ def test_of_a_file_that_is_wrong_throughout_the_first_problems_are_reported(tmp_
     with pytest.raises(DesignFileError) as caught:
         rollout("planar_2r", designs=path, steps=1)
     assert len(caught.value.problems) == 51
-    assert str(caught.value.problems[-1]) == f"{path}:52:1: and 950 more"
+    assert str(caught.value.problems[-1]) == f"{path}:52:1: nothing was read from here on: too many errors"
+
+
+def test_designs_are_no_longer_checked_when_many_are_wrong(tmp_path: Path) -> None:
+    path = tmp_path / "designs.csv"
+    path.write_text("a1\n" + "0.4\n" + "1e300\n" * 1000)
+    checked: list[int] = []
+    designs = Designs(load_robot("planar_2r"), draws={}, table=read_design_table(path), count=1, seed=0)
+    with pytest.raises(DesignFileError) as caught:
+        designs.check(checked.append)
+    assert sum(checked) == 20
+    assert len(caught.value.problems) == 21
+    assert (
+        str(caught.value.problems[-1])
+        == f"{path}:23:1: too many designs are wrong: the 980 from here on were not checked"
+    )
+
+
+def test_a_file_of_more_designs_than_can_be_checked_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dh2sim.simulate.designs.MOST_DESIGNS", 3)
+    path = tmp_path / "designs.csv"
+    path.write_text("a1\n1\n2\n3\n")
+    assert len(read_design_table(path)) == 3
+    path.write_text("a1\n1\n2\n3\n4\n5\n")
+    with pytest.raises(DesignFileError, match=r":5:1: at most 3 designs are allowed in a file: give them in parts"):
+        read_design_table(path)
+
+
+def test_cells_are_plain_numbers_or_expressions(tmp_path: Path) -> None:
+    path = tmp_path / "designs.csv"
+    path.write_bytes(b'\xef\xbb\xbfa1,alpha1\r\n# a remark\r\n0.5, 90\r\n"1/4",2*pi\r\n')
+    table = read_design_table(path)
+    np.testing.assert_array_equal(table.values, [[0.5, 90.0], [0.25, 2.0 * np.pi]])
+    assert table.lines.tolist() == [1, 3, 4]
+    assert table.places == (1, 4)
 
 
 @pytest.mark.parametrize(
