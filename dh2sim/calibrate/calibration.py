@@ -10,7 +10,7 @@ from typing import Final, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.calibrate.fit import Fit, Sigma, fit, weighted_jacobian
+from dh2sim.calibrate.fit import NOISY, Fit, Sigma, fit, weighted_jacobian
 from dh2sim.calibrate.hayati_rows import fit_rows
 from dh2sim.calibrate.held_out import Errors, errors_of, held_out_errors
 from dh2sim.calibrate.identify import find_basis
@@ -281,7 +281,7 @@ class _Task:
         measured, robot = observations.measured, len(self.parameters)
         J = weighted_jacobian(observations, state, self.sigma)
         basis = find_basis(J, observations.unknowns, columns)
-        could = self.possible(observations, state)
+        could = self.possible(observations, state, self.sigma)
         mine = {k for k in basis.kept if k < robot}
         count = f"{len(could)} parameters of the robot" + (
             f" and {len(observations.unknowns) - robot} of the measurement"
@@ -333,14 +333,14 @@ class _Task:
                 f"the limits, and is {1e3 * was:.3g} mm off as it is. {_ADVICE}"
             )
 
-    def possible(self, observations: Observations, state: State) -> set[int]:
-        """Return the parameters that measurements of this kind could tell, at configurations all over the limits."""
+    def possible(self, observations: Observations, state: State, sigma: Sigma) -> set[int]:
+        """Return the parameters that as many measurements could tell, at configurations all over the limits."""
         columns = self._columns(observations)
         count = max(200, 4 * len(columns))
         anywhere = observations.with_random_rows(random_vectors(self.robot.spec, self.measured.q, count, self.seed))
         points = len(anywhere.point_names)
         there = replace(state, points=state.points[:points] if points <= len(state.points) else state.points)
-        J = weighted_jacobian(anywhere, there, self.sigma)
+        J = weighted_jacobian(anywhere, there, sigma.at_most(NOISY))
         names = {parameter.name for parameter in observations.unknowns}
         extra = [
             k
@@ -348,7 +348,9 @@ class _Task:
             if parameter.group is None or parameter.name not in names
         ]
         mine = [*sorted(self.free), *extra]
-        return {k for k in find_basis(J, anywhere.unknowns, mine).kept if k < len(self.parameters)}
+        scale = math.sqrt(min(1.0, len(observations.measured) / len(anywhere.measured)))
+        basis = find_basis(J, anywhere.unknowns, mine, scale=scale)
+        return {k for k in basis.kept if k < len(self.parameters)}
 
     # -------------------------------------------------------------------- the result
 
@@ -365,9 +367,8 @@ class _Task:
         errors = errors_of(observations, state)
         errors_before = errors_of(observations, before.state)
         q = random_vectors(self.robot.spec, measured.q, _TRIES, self.seed)
-        alone = find_basis(
-            weighted_jacobian(observations, state, whole.sigma), observations.unknowns, self._columns(observations)
-        )
+        J = weighted_jacobian(observations, state, whole.sigma.at_most(NOISY))
+        alone = find_basis(J, observations.unknowns, self._columns(observations), scale=1.0)
         outliers = find_outliers(whole, dropped, robust=self.robust)
         results = self._parameters(whole, values)
         notes = [*self.notes, *self._remarks(whole, outliers)]
@@ -382,7 +383,7 @@ class _Task:
             errors_before=errors_before,
             errors=errors,
             identifiable=sum(k < len(self.parameters) for k in alone.kept),
-            possible=len(self.possible(observations, state)),
+            possible=len(self.possible(observations, state, whole.sigma)),
             outliers=outliers,
             held_out=None,
             predicted=self._predicted(whole, q),

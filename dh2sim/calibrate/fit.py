@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -17,6 +17,10 @@ _ITERATIONS: Final = 100
 _SETTLED: Final = 1e-9
 """Step in units of the parameters' standard deviations, or of rounding, at which a fit ends."""
 _ROUNDS: Final = 30
+NOISY: Final = 1e-3
+"""m and rad: the greatest noise that makes parameters count as not determined."""
+_STRICTER: Final = (1.0, 0.3, 0.1)
+"""Shares of what parameters must be known to, tried in turn where a fit does not settle with all that are."""
 _SAME: Final = 1e-3
 """Relative change of the estimated noise, or change of a weight, at which a fit ends."""
 HUBER: Final = 1.345
@@ -34,6 +38,10 @@ class Sigma:
     """rad."""
     length_known: bool = True
     angle_known: bool = True
+
+    def at_most(self, size: float) -> Sigma:
+        """Return these, or what is less: a fit that is still far off must not count as noise."""
+        return replace(self, length=min(self.length, size), angle=min(self.angle, size))
 
     def of(self, scale: NDArray[np.intp]) -> Array:
         """Return those of equations."""
@@ -134,38 +142,46 @@ def fit(
         robust: Whether rows that are far off count less, by Huber's function.
     """
     known = weight
-    equations = observations.equations(state)
-    weight = np.ones(len(equations.e)) if known is None else known
+    start, equations = state, observations.equations(state)
+    weights: Array = np.ones(len(equations.e)) if known is None else known
     iterations, settled = 0, False
-    basis = find_basis(
-        _weighted(observations, state, equations, sigma, weight, prior).J, observations.unknowns, columns
-    )
+
+    def determined(scale: float = 1.0) -> Basis:
+        J = _weighted(observations, state, equations, sigma.at_most(NOISY), weights, prior).J
+        return find_basis(J, observations.unknowns, columns, scale=scale)
+
+    basis = determined()
     kept = list(basis.kept)
     for _ in range(_ROUNDS):
-        state, equations, now, steps, settled = _least_squares(observations, state, kept, sigma, weight, prior)
+        state, equations, now, steps, settled = _least_squares(observations, state, kept, sigma, weights, prior)
         iterations += steps
+        fewer = (determined(scale) for scale in ((1.0,) if settled else _STRICTER))
+        found = next((found for found in fewer if len(found.kept) < len(kept)), None)
+        if found is not None:  # what seemed to be determined is not, where the others lead
+            basis, kept, state = found, list(found.kept), start
+            continue
         leverage = _leverage(now, kept)[: now.size]
-        new_sigma = _estimated(equations, sigma, weight, leverage, robust=robust)
-        new_weight = _huber(equations, new_sigma, known) if robust else weight
+        new_sigma = _estimated(equations, sigma, weights, leverage, robust=robust)
+        new_weight = _huber(equations, new_sigma, known) if robust else weights
         ratio = (new_sigma.length / sigma.length, new_sigma.angle / sigma.angle)
         done = (
             max(ratio) < 1.0 + _SAME
             and min(ratio) > 1.0 - _SAME
-            and bool(np.abs(new_weight - weight).max(initial=0.0) < _SAME)
+            and bool(np.abs(new_weight - weights).max(initial=0.0) < _SAME)
         )
-        sigma, weight = new_sigma, new_weight
+        sigma, weights = new_sigma, new_weight
         if done:
             break
-    now = _weighted(observations, state, equations, sigma, weight, prior)
+    now = _weighted(observations, state, equations, sigma, weights, prior)
     leverage = _leverage(now, kept)
-    count = len(now.e) - int((weight == 0.0).sum())
+    count = len(now.e) - int((weights == 0.0).sum())
     return Fit(
         observations=observations,
         state=state,
         basis=basis,
         sigma=sigma,
         equations=equations,
-        weight=weight,
+        weight=weights,
         covariance=_covariance(now.J[:, kept]),
         leverage=leverage[: now.size],
         chi2=now.cost,

@@ -15,6 +15,9 @@ DEPENDENT: Final = 1e-8
 """Of a column's length: what is left of it, when others are taken off, that counts as nothing."""
 _CLEAR: Final = 0.1
 """What is left of a column that is clearly another one."""
+_GUESS: Final = 0.03
+"""m or rad: what is known no better is not determined. A tool that noise has moved off the last axis by 0.01 mm makes
+twists and zeros of the last joints independent, to a fraction of a turn; a fit would go astray."""
 _PART: Final = 0.02
 """Of the greatest share, from which on a parameter is named among those that another one folds into."""
 _ORDER: Final = (None, Group.BASE, Group.TOOL, Group.A, Group.ALPHA, Group.BETA, Group.D, Group.THETA)
@@ -33,7 +36,9 @@ class Basis:
     """Greatest by least singular value of the kept columns, each scaled to length one."""
 
 
-def find_basis(J: Array, unknowns: Sequence[Parameter], columns: Sequence[int]) -> Basis:
+def find_basis(
+    J: Array, unknowns: Sequence[Parameter], columns: Sequence[int], *, scale: float | None = None
+) -> Basis:
     """Choose independent columns of a Jacobian: those of the measurement, of base and tool, then of the table.
 
     A QR factorisation with pivoting that takes the first column of which enough is left, in place of the greatest;
@@ -43,6 +48,8 @@ def find_basis(J: Array, unknowns: Sequence[Parameter], columns: Sequence[int]) 
         J: Weighted derivatives, shape (E, U).
         unknowns: What its columns are.
         columns: Those that may be chosen.
+        scale: What makes of derivatives such in standard deviations; given, what is known no better than to 0.03 m or
+            rad when those before it are known is not chosen.
     """
     order = sorted(columns, key=lambda k: (_ORDER.index(unknowns[k].group), k))
     length = np.linalg.norm(J[:, order], axis=0)
@@ -50,13 +57,16 @@ def find_basis(J: Array, unknowns: Sequence[Parameter], columns: Sequence[int]) 
     present = [k for k, size in zip(order, length.tolist(), strict=True) if size > 1e-12 * greatest]
     # the triangle of a QR factorisation has all scalar products of the columns
     scaled = J[:, present] / np.linalg.norm(J[:, present], axis=0) if present else np.zeros((len(J), 0))
+    least = (
+        np.zeros(len(present)) if scale is None else 1.0 / (_GUESS * scale * np.linalg.norm(J[:, present], axis=0))
+    )
     triangle: Array = np.asarray(np.linalg.qr(scaled)[1]) if len(J) > len(present) else scaled
     kept: list[int] = []
     rest = triangle.copy()
     limit = _CLEAR
     while limit >= DEPENDENT:  # who is first comes first, but not before others that are determined much better
         for k in range(len(present)):
-            if k not in kept and np.linalg.norm(rest[:, k]) > limit:
+            if k not in kept and np.linalg.norm(rest[:, k]) > max(limit, least[k]):
                 kept.append(k)
                 direction = rest[:, k] / np.linalg.norm(rest[:, k])
                 for _ in range(2):  # twice is enough (W. Kahan)

@@ -222,7 +222,7 @@ def test_too_few_measurements_are_refused_in_words() -> None:
     assert "40 poses cannot fix 30 parameters of the robot: they determine only" in text
     assert "joint_4 does not move." in text
     text = refusal(CalibrationError, calibrate, nominal, given.rows([0] * 40))
-    assert "not also joint_1.a, joint_1.alpha, joint_2.theta, joint_2.a, joint_2.alpha, joint_2.beta and " in text
+    assert "them, not joint_1.a, joint_1.alpha, joint_2.theta, joint_2.a, joint_2.alpha, joint_2.beta and " in text
     assert " others. No joint moves." in text
     narrow = random_q(nominal, 40, 2) * 1e-3
     given = measured(nominal, off(nominal, 1e-3, 1), "position", narrow, seed=3)
@@ -253,6 +253,20 @@ def test_copied_rows_are_noted() -> None:
     given = measured(nominal, off(nominal, 1e-3, 1), "pose", random_q(nominal, 30, 2), seed=3)
     found = calibrate(nominal, given.rows([*range(30), 3, 7]), held_out=False)
     assert any(note.startswith("2 rows are exact copies of another:") for note in found.notes)
+
+
+@pytest.mark.parametrize(("name", "size", "seed"), [("puma560", 0.0, 1), ("scara", 5e-5, 1), ("ur5e", 5e-5, 7)])
+def test_a_tool_that_only_noise_moves_off_the_last_axis_is_fitted(name: str, size: float, seed: int) -> None:
+    nominal = robot(name)
+    true = off(nominal, size, seed)
+    given = measured(nominal, true, "position", random_q(nominal, 60, 2), seed=3)
+    found = calibrate(nominal, given, noise=SIGMA, held_out=False)
+    assert found.identifiable <= found.possible < {robot: count for robot, _, count in COUNTS}[name]
+    off_by = [
+        np.linalg.norm((table_tool_pose(found.robot, q) - table_tool_pose(true, q))[:3, 3])
+        for q in random_q(nominal, 50, 4)
+    ]
+    assert np.sqrt(np.mean(np.square(off_by))) < SIGMA
 
 
 def test_odd_robots_of_mixed_conventions_with_fixed_and_flipped_rows_are_fitted() -> None:
