@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from dh2sim.errors import EngineError
+from dh2sim.mujoco_warnings import mujoco_warnings
 from dh2sim.typing import Array
 
 RANK_TOLERANCE = 1e-8
@@ -56,14 +57,21 @@ class MujocoMechanism:
         return gap, self._model.nv - int(np.linalg.matrix_rank(J, tol=RANK_TOLERANCE))
 
     def gap_in_motion(self, duration: float = 2.0) -> float:
-        """Return the greatest gap, m or rad, from the first keyframe on, with the controls swinging by 0.3."""
+        """Return the greatest gap, m or rad, from the first keyframe on, with the controls swinging by 0.3.
+
+        It is infinite where the simulation is unstable, at which MuJoCo starts it again from zero.
+        """
         model, data = self._model, self._data
         mujoco.mj_resetDataKeyframe(model, data, 0)
         home, gap = data.ctrl.copy(), 0.0
-        while data.time < duration:
-            data.ctrl[:] = home + 0.3 * np.sin(2 * np.pi * data.time)
-            mujoco.mj_step(model, data)
-            gap = max(gap, self._gap())
+        with mujoco_warnings():
+            while data.time < duration:
+                data.ctrl[:] = home + 0.3 * np.sin(2 * np.pi * data.time)
+                before = data.time
+                mujoco.mj_step(model, data)
+                if data.time <= before:
+                    return float("inf")
+                gap = max(gap, self._gap())
         return gap
 
     def _equalities(self) -> np.ndarray:

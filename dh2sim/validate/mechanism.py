@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -161,7 +162,7 @@ def _loops(read: MujocoMechanism, model: MechanismModel, tolerance: float) -> li
     return [
         _finding(Quantity.CLOSED, gap, allowed, ""),
         _finding(Quantity.FREEDOMS, float(abs(freedoms - own)), 0.0, rank),
-        _finding(Quantity.LOOP_GAP, moving, GAP_LIMIT, ""),
+        _finding(Quantity.LOOP_GAP, moving, GAP_LIMIT, "" if isfinite(moving) else "the simulation is unstable"),
     ]
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 from dh2sim import Robot
+from dh2sim.engines.mujoco_mechanism import MujocoMechanism
 from dh2sim.robot.catalog import builtin_mechanisms
 from dh2sim.validate.mechanism import validate_mechanism
 from tests.program import dh2sim
@@ -48,6 +50,37 @@ def test_a_constraint_that_is_missing_or_moved_fails(tmp_path: Path) -> None:
     path.write_text(exported, encoding="utf-8")
     _changed(path, '<body name="rocker/link_1" pos="2.0', '<body name="rocker/link_1" pos="2.001')
     assert _failed(tmp_path)[:2] == ["pose", "loops at home"]
+
+
+SPHERICAL = """
+name: balls
+convention: standard
+units: {angle: deg}
+joints: [{type: R, alpha: 40}, {type: R, alpha: 70}]
+branches:
+  rocker: {from: base_link, pose: {rpy: [80, 0, 0]}, joints: [{type: R, alpha: 65}]}
+closures: [{name: C, between: [dh_2, rocker/dh_1], type: revolute}]
+actuated: [joint_1]
+assembly: {q: [70, -60, 110]}
+"""
+
+
+def test_a_spherical_linkage_of_balls_whose_centres_rest_is_simulated(tmp_path: Path) -> None:
+    (tmp_path / "balls.yaml").write_text(SPHERICAL, encoding="utf-8")
+    robot = Robot.load(tmp_path / "balls.yaml")
+    robot.export(tmp_path)
+    path = tmp_path / "balls" / "balls.xml"
+    assert MujocoMechanism(path).gap_in_motion(0.2) < 1e-4
+    sites_in_links = re.sub(
+        r'<body name="C_([ab]_[12])" (pos="[^"]*") [^>]*>.*?</body>',
+        r'<site name="C_\1" \2 />',
+        path.read_text(encoding="utf-8"),
+        flags=re.DOTALL,
+    )
+    path.write_text(sites_in_links, encoding="utf-8")
+    assert MujocoMechanism(path).gap_in_motion(0.2) == float("inf"), "MuJoCo starts again, and the check ends"
+    report = validate_mechanism(robot.mechanism, samples=1, folder=path.parent)
+    assert [check.reason for check in report.checks if check.ok is False] == ["the simulation is unstable"]
 
 
 def test_readers_of_urdf_find_what_was_moved_in_the_tree_and_in_what_mimics(tmp_path: Path) -> None:

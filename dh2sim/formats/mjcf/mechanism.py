@@ -7,6 +7,7 @@ the loops are closed. Constraints are between sites, which do not depend on that
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from math import hypot
 from typing import Final
 
 from dh2sim.formats.mjcf.sites import add_site, placed
@@ -25,7 +26,7 @@ from dh2sim.formats.mjcf.write import (
 )
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.parallelograms import find_couplings
-from dh2sim.kinematics.transforms import compose, identity, invert, joint_part
+from dh2sim.kinematics.transforms import compose, identity, invert, joint_part, move_point
 from dh2sim.kinematics.tree import BASE, Closure, body_poses
 from dh2sim.kinematics.tree import placed as frame_pose
 from dh2sim.kinematics.trig import atan2
@@ -56,6 +57,8 @@ GAP: Final = "_gap"
 """End of the names of sensors that say how far constraints are open."""
 ARM: Final = 0.1
 """Distance, in sizes of the mechanism, of the two points of an axis that are connected."""
+RESTING: Final = 0.01
+"""Distance, in sizes of the mechanism, from an axis at which a centre of mass counts as on it."""
 
 
 def to_mechanism_mjcf(model: MechanismModel, options: MjcfOptions = EXPORTED) -> str:
@@ -135,6 +138,7 @@ def _close(
     T_a, T_b = a.T_body_frame, b.T_body_frame
     mass_b = None if b.body == BASE else model.links[b.body].inertial
     name, arm = closure.name, ARM * model.size
+    apart = all(_rests(model, poses, frame.body) for frame in (a, b))
     inertial = None if a.body == BASE else model.links[a.body].inertial
     if closure.type in HELPERS:
         T_a_b = compose(invert(frame_pose(poses, a)), frame_pose(poses, b))
@@ -153,16 +157,33 @@ def _close(
         case ClosureType.REVOLUTE | ClosureType.UNIVERSAL:
             points = [-arm / 2, arm / 2]
         case _:
-            add_site(body_a, f"{name}_a", T_a, inertial)
-            add_site(body_b, f"{name}_b", T_b, mass_b)
+            add_site(body_a, f"{name}_a", T_a, inertial, apart=apart)
+            add_site(body_b, f"{name}_b", T_b, mass_b, apart=apart)
             _constraint(equality, "weld", name, f"{name}_a", f"{name}_b", solref)
             return
     for k, height in enumerate(points):
         suffix = "" if len(points) == 1 else f"_{k + 1}"
         along = joint_part(0.0, height)
-        add_site(body_a, f"{name}_a{suffix}", compose(T_a, along), inertial)
-        add_site(body_b, f"{name}_b{suffix}", compose(T_b, along), mass_b)
+        add_site(body_a, f"{name}_a{suffix}", compose(T_a, along), inertial, apart=apart)
+        add_site(body_b, f"{name}_b{suffix}", compose(T_b, along), mass_b, apart=apart)
         _constraint(equality, "connect", f"{name}{suffix}", f"{name}_a{suffix}", f"{name}_b{suffix}", solref)
+
+
+def _rests(model: MechanismModel, poses: tuple[Array, ...], body: int) -> bool:
+    """Whether no joint moves a link's centre of mass, as in a spherical linkage of balls.
+
+    MuJoCo takes the stiffness of a constraint between two links from how easily their centres of mass move: between
+    two that rest it would be infinite, and the simulation unstable. What moves is the place of the site itself.
+    """
+    if body == BASE:
+        return True
+    inertial = model.links[body].inertial
+    com = read_only(move_point(poses[body], identity()[:3, 3] if inertial is None else inertial.com))
+    for k in model.tree.path(body):
+        x, y, _ = move_point(invert(poses[k]), com)  # the joint's axis is z
+        if model.joints[k].type.moves and not (model.joints[k].type.turns and hypot(x, y) <= RESTING * model.size):
+            return False
+    return True
 
 
 def _couple(equality: ET.Element, model: MechanismModel, solref: tuple[float, float]) -> None:

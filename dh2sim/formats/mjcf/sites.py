@@ -33,16 +33,17 @@ def _quaternion(rotation: bytes) -> str:
     return numbers(quaternion_from_rotation(np.frombuffer(rotation).reshape(3, 3)).tolist())
 
 
-def add_site(body: ET.Element, name: str, T: Array, inertial: MassProperties | None) -> None:
-    """Add a site to a body, in a massless body of the same name where it needs one.
+def add_site(body: ET.Element, name: str, T: Array, inertial: MassProperties | None, *, apart: bool = False) -> None:
+    """Add a site to a body, in a massless body of the same name where it needs one, or ``apart`` is true.
 
     Args:
         body: the link's element.
         name: of the site.
         T: its pose in the link, shape (4, 4).
         inertial: of the link.
+        apart: whether the site gets a body whatever its pose.
     """
-    if needs_body(T, inertial):
+    if apart or needs_body(T, inertial):
         body = child(body, "body", name=name, **placed(T))
         T = identity()
     child(body, "site", name=name, **placed(T))
