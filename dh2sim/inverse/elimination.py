@@ -186,12 +186,12 @@ class Method:
                 found = self._joined_with(found, again, replace(more, unsure=more.unsure[:0]))
         again = np.flatnonzero(self.doubtful(found, len(T)) | blurred)
         again = self._ill(again, blurred, found, T, locked, last=True) if len(again) else again
-        for search in (self._in_valleys, self._scattered):
+        for search in (self._in_valleys, self._from_near_by, self._scattered):
             if not len(again):
                 break
             more = search(T[again], _values_at(locked, again))
             found = self._sharp(self._joined_with(found, again, more))
-            found = replace(found, unsure=self._unsure(again, found, T, locked))
+            found = replace(found, unsure=self._unsure(again, blurred, found, T, locked))
             if not self.virtual:
                 odd = np.bincount(found.pose, minlength=len(T))[again] % 2 == 1
                 again = np.union1d(found.unsure, again[odd])
@@ -201,9 +201,10 @@ class Method:
         """Return solutions of N poses, and more of some of these."""
         return self.distinct(joined([found, more.among(poses)], self.arm.n))
 
-    def _unsure(self, poses: Indices, found: Found, T: Array, locked: Mapping[int, Array]) -> Indices:
+    def _unsure(self, poses: Indices, blurred: Flags, found: Found, T: Array, locked: Mapping[int, Array]) -> Indices:
         """Return of some poses those that may have more solutions: fewer were found than near by poses have."""
-        poses = np.intersect1d(poses, np.flatnonzero(self.doubtful(found, len(T))))
+        doubtful = self.doubtful(found, len(T))
+        poses = poses[(doubtful if self.virtual else doubtful | blurred)[poses]]
         if not len(poses) or not self.eliminations:
             return poses
         poses = poses[self._condition(poses, T, locked, all_of_them=True) >= _ILL]
@@ -212,12 +213,24 @@ class Method:
         # where solutions have met, one stands for two
         met = np.where(found.sigma < _MET, 2, 1)
         counts = np.bincount(found.pose, weights=met, minlength=len(T))[poses]
-        motions = small_motions(np.random.default_rng(_SEED), _NEAR_BY, _APART)
-        near = (T[poses, None] @ motions).reshape(-1, 4, 4)
-        near_by = self.solve_by(self.eliminations[0], near, _values_at(locked, np.repeat(poses, _NEAR_BY)))
-        most = np.bincount(near_by.pose, minlength=len(near)).reshape(-1, _NEAR_BY).max(axis=1)
+        near_by = self.solve_by(self.eliminations[0], *self._near_by(T[poses], _values_at(locked, poses)))
+        most = np.bincount(near_by.pose, minlength=len(poses) * _NEAR_BY).reshape(-1, _NEAR_BY).max(axis=1)
         unsure: Indices = poses[(counts == 0) | (counts % 2 == 1) | (most > counts)]
         return unsure
+
+    @staticmethod
+    def _near_by(T: Array, locked: Mapping[int, Array]) -> tuple[Array, Mapping[int, Array]]:
+        """Return some poses near each of N, where eliminations are regular, and locked coordinates, in order."""
+        motions = small_motions(np.random.default_rng(_SEED), _NEAR_BY, _APART)
+        near = (T[:, None] @ motions).reshape(-1, 4, 4)
+        return near, _values_at(locked, np.repeat(np.arange(len(T)), _NEAR_BY))
+
+    def _from_near_by(self, T: Array, locked: Mapping[int, Array]) -> Found:
+        """Return what is found from where the first elimination leads for poses near by."""
+        if not self.eliminations:
+            return joined([], self.arm.n)
+        near = self._candidates(self.eliminations[0], *self._near_by(T, locked))
+        return self.polished(near.pose // _NEAR_BY, near.q, T)
 
     @staticmethod
     def _sharp(found: Found) -> Found:

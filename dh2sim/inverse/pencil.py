@@ -15,18 +15,13 @@ from functools import reduce
 
 import numpy as np
 
-from dh2sim.inverse.loop import Candidates, Flags, Indices, Loop, inverse_poses, joint_motion, loop_order
+from dh2sim.inverse.eigenpairs import are_double, eigenpairs, taken_apart
+from dh2sim.inverse.loop import Candidates, Indices, Loop, inverse_poses, joint_motion, loop_order
 from dh2sim.inverse.spherical import spherical_angles
 from dh2sim.typing import Array
 
 _GATE = 0.15
 """Imaginary part of half an angle up to which an eigenvalue may be a real solution that rounding has moved."""
-_CLOSE = 1e-5
-"""Half angles that differ by less, in rad, may be one, whose eigenvector is any mixture of those of two solutions."""
-_LARGE = 1e5
-"""Quotient of matrices above which eigenvalues are ill-conditioned."""
-_SINGULAR = 1e8
-"""Condition above which they are, too, though quotients of what rounding leaves may be small."""
 _ZERO = 1e-11
 """Singular values below this share of the largest are zero."""
 _MEET = 1e-9
@@ -69,15 +64,19 @@ class Pencil:
         ring = loop.variant(self.first, backwards=self.backwards)
         ends = self._ends(ring)
         right = self._right_side(ring, ends[1])
+        C = self._matrices(ring, ends[0], right)
         with np.errstate(all="ignore"):
-            t, v, large = _eigenpairs(self._matrices(ring, ends[0], right))
+            t, v, large = eigenpairs(C)
             half = np.arctan(t)
-        blurred = np.flatnonzero(large | _double(half))
+        double = are_double(half)
+        blurred = np.flatnonzero(large | double)
         largest = np.take_along_axis(v, np.abs(v).argmax(1)[:, None], 1)[:, 0]
         poses, k = np.nonzero((np.abs(half.imag) < _GATE) & (np.abs(largest) > 0.0))
-        half, v = half[poses, k], (v[poses, :, k] / largest[poses, k, None]).real
         # rounding may have split a double root into a pair: begin on both sides of it
-        psi = [half.real + half.imag, *_ratios(v.reshape(len(v), 4, v.shape[1] // 4))]
+        angles, v = half[poses, k].real + half[poses, k].imag, (v[poses, :, k] / largest[poses, k, None]).real
+        more = taken_apart(C, half, np.flatnonzero(double))
+        poses, angles, v = (np.concatenate(pair) for pair in zip((poses, angles, v), more, strict=True))
+        psi = [angles, *_ratios(v.reshape(len(v), 4, v.shape[1] // 4))]
         q = np.full((len(poses), 6), np.nan)
         for joint, angle in zip(self._left, psi, strict=False):
             q[:, joint] = self._coordinate(ring, joint, angle)
@@ -329,55 +328,6 @@ def _in_half_tangents(turns: bool, phase: float) -> Array:
         rows = [[c * c, s * c, s * s], [-2.0 * s * c, c * c - s * s, 2.0 * s * c], [s * s, -s * c, c * c]]
         matrix = np.array(rows) @ _POWERS
     return np.asarray(matrix)
-
-
-def _eigenpairs(C: Array) -> tuple[Array, Array, Flags]:
-    """Solve (C_0 + t C_1 + t² C_2) v = 0.
-
-    Args:
-        C: Shape (3, N, s, s).
-
-    Returns:
-        Eigenvalues, complex, shape (N, 2s), vectors in columns, shape (N, s, 2s), and which are ill-conditioned,
-        because C_2 is nearly singular, bool, shape (N,).
-    """
-    size = C.shape[-1]
-    companion = np.zeros((C.shape[1], 2 * size, 2 * size))
-    companion[:, :size, size:] = np.eye(size)
-    unit = np.broadcast_to(np.eye(size), C[2].shape)
-    solved = _solved(C[2], np.concatenate([C[0], C[1], unit], axis=2))
-    companion[:, size:] = -solved[:, :, : 2 * size]
-    bad = np.logical_not(np.isfinite(companion).all(axis=(1, 2)))
-    companion[bad] = 0.0
-    t, V = np.linalg.eig(companion)
-    t = np.where(bad[:, None], np.nan, t).astype(np.complex128)
-    condition = np.abs(C[2]).max(axis=(1, 2)) * np.abs(solved[:, :, 2 * size :]).max(axis=(1, 2))
-    large = bad | (np.abs(companion).max(axis=(1, 2)) > _LARGE) | (condition > _SINGULAR)
-    return t, np.where((np.abs(t) <= 1.0)[:, None, :], V[:, :size], V[:, size:]).astype(np.complex128), large
-
-
-def _double(half: Array) -> Flags:
-    """Return for which poses two real half angles are the same, shape (N, 2s), as then eigenvectors are mixtures."""
-    real = np.abs(half.imag) < _CLOSE
-    angles = np.sort(np.where(real, half.real, np.inf), axis=1)
-    last = np.where(real, half.real, -np.inf).max(axis=1)
-    with np.errstate(invalid="ignore"):  # of infinities
-        double = (np.diff(angles, axis=1) < _CLOSE).any(axis=1)
-    return np.asarray(double | (angles[:, 0] + np.pi - last < _CLOSE))
-
-
-def _solved(A: Array, B: Array) -> Array:
-    """Solve A X = B for each of N problems; a singular one gives NaN instead of spoiling the others."""
-    try:
-        return np.asarray(np.linalg.solve(A, B))
-    except np.linalg.LinAlgError:
-        X = np.full(np.broadcast_shapes(A.shape[:1], B.shape[:1]) + B.shape[1:], np.nan)
-        for i in range(len(A)):
-            try:
-                X[i] = np.linalg.solve(A[i], B[i])
-            except np.linalg.LinAlgError:
-                continue
-        return X
 
 
 def _ratios(v: Array) -> list[Array]:

@@ -98,8 +98,7 @@ def _tried(
         *others[:1],
         *(Nudged(elimination=elimination, nudges=small_motions(rng, 6, _NUDGE)) for elimination in best[:1]),
     ]
-    telling = not trials or 2 * len(trials[0].found.unsure) < len(q)
-    return replace(bare, eliminations=tuple(best), found_share=share, telling=telling)
+    return replace(bare, eliminations=tuple(best), found_share=share, telling=not trials or trials[0].is_telling)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -113,9 +112,14 @@ class _Trial:
     condition: float
 
     @property
-    def rank(self) -> tuple[int, int, float]:
-        """Sort the best first: what finds most, then what is conditioned best."""
-        return -self.own, -len(self.found.pose), self.condition
+    def rank(self) -> tuple[int, int, bool, float]:
+        """Sort the best first: what finds most, then what tells where it may not, then what is conditioned best."""
+        return -self.own, -len(self.found.pose), not self.is_telling, self.condition
+
+    @property
+    def is_telling(self) -> bool:
+        """Whether it is sure of most poses, so that where it is not tells something."""
+        return len(self.found.unsure) < _TRIALS // 2
 
     def is_another(self, other: _Trial) -> bool:
         """Whether another elimination is of another kind, and found as much."""

@@ -13,6 +13,8 @@ from tests.inverse.arms import CRX, JACO, ORTHOGONAL
 from tests.inverse.campaign import is_found
 from tests.sample_robots import robot
 
+RIGHT = 0.5 * np.pi
+
 
 @pytest.mark.parametrize("spec", [robot("puma560"), JACO, CRX, ORTHOGONAL], ids=lambda spec: spec.name)
 def test_regular_configurations_with_joints_at_right_angles_are_found(spec: RobotSpec) -> None:
@@ -24,6 +26,22 @@ def test_regular_configurations_with_joints_at_right_angles_are_found(spec: Robo
     assert len(q) > 80
     for drawn, found in zip(q, solver.solve(table_tool_pose(spec, q), limits=False), strict=True):
         assert is_found(spec, drawn, found.q)
+
+
+@pytest.mark.parametrize(
+    ("spec", "q", "count"),
+    [
+        pytest.param(ORTHOGONAL, (RIGHT, 0.0, 0.0, RIGHT, RIGHT, -RIGHT), 6, id="solutions share an angle"),
+        pytest.param(JACO, (-RIGHT, 0.0, np.pi, RIGHT, np.pi, -RIGHT), 8, id="solutions of a skew wrist share one"),
+        pytest.param(CRX, (0.526857, np.pi, np.pi, 0.878053, np.pi, -RIGHT), 12, id="all pencils are singular"),
+    ],
+)
+def test_rounding_of_a_pose_does_not_cost_solutions(spec: RobotSpec, q: tuple[float, ...], count: int) -> None:
+    T = table_tool_pose(spec, np.array(q))
+    rounded = T * (1.0 + 1e-15 * np.random.default_rng(0).integers(-1, 2, (12, 4, 4)))
+    for found in InverseSolver(spec).solve(rounded, limits=False):
+        assert len(found) == count
+        assert is_found(spec, np.array(q), found.q)
 
 
 def test_a_pose_at_which_a_pencil_is_singular_but_for_rounding_has_all_eight() -> None:
