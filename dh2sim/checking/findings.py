@@ -43,6 +43,13 @@ RULES: Final = {
     SlipKind.FAR_FRAMES.value: "Frames are far from the robot",
 }
 """Every rule, with what it finds."""
+PART_OF_RULE: Final = {
+    "name-clash": CheckPart.DRIFT,
+    "drift": CheckPart.DRIFT,
+    "engine": CheckPart.POSES,
+    **dict.fromkeys((kind.value for kind in SlipKind), CheckPart.FILES),
+}
+"""The part that finds it; what reading the robot file finds is of every part."""
 MAX_BYTES: Final = 100_000_000
 """Of a baseline."""
 _WARNINGS: Final = {kind.value for kind in SlipKind}

@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 
 from dh2sim.checking.files import changed_files, find_robot_files
-from dh2sim.checking.findings import Baseline, CheckPart, CheckReport, Finding, RobotCheck
+from dh2sim.checking.findings import PART_OF_RULE, Baseline, CheckPart, CheckReport, Finding, RobotCheck
 from dh2sim.errors import Dh2simError, RobotError
 from dh2sim.export import drift
 from dh2sim.model.build import build_model
@@ -231,7 +231,7 @@ def _engines(report: RobotReport, file: str, *, files_too: bool) -> list[Finding
 
 
 def _with_baseline(report: CheckReport, baseline: Baseline | None, *, whole: bool) -> CheckReport:
-    """Mark what is accepted; ``whole`` says that everything was checked, so that entries can be outdated."""
+    """Mark what is accepted; ``whole`` says that all robots were checked, so that entries can be outdated."""
     if baseline is None:
         return report
     left = baseline.counts()
@@ -243,7 +243,8 @@ def _with_baseline(report: CheckReport, baseline: Baseline | None, *, whole: boo
         return replace(finding, accepted=True)
 
     robots = [replace(robot, findings=tuple(map(marked, robot.findings))) for robot in report.robots]
-    return replace(report, robots=tuple(robots), outdated=left.total() if whole else 0)
+    outdated = sum(count for (rule, *_), count in left.items() if PART_OF_RULE.get(rule) in (None, *report.parts))
+    return replace(report, robots=tuple(robots), outdated=outdated if whole else 0)
 
 
 def _folder_of(files: Sequence[Path], paths: Iterable[str | PathLike[str]]) -> Path:

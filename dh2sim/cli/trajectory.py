@@ -308,7 +308,7 @@ def _passages(planned: Trajectory) -> list[str]:
 
 def _table(planned: Trajectory, units: Units) -> list[str]:
     peaks, shares = planned.peaks, planned.peaks.shares(planned.limits)
-    rows = [["joint", "unit", "from", "to", "velocity", "%", "accel.", "%", "jerk", "%"]]
+    rows = [["joint", "unit", "least", "most", "velocity", "%", "accel.", "%", "jerk", "%"]]
     for i, (name, turns) in enumerate(zip(planned.joints, planned.limits.turns, strict=True)):
         unit = units.angle.value if turns else units.length.value
         scale = units.coordinate(1.0, turns=turns)
@@ -329,7 +329,7 @@ _CLOSED = 1e-7
 
 
 def _passive_table(planned: MechanismTrajectory, units: Units) -> list[str]:
-    rows = [["passive joint", "unit", "from", "to", "velocity"]]
+    rows = [["passive joint", "unit", "least", "most", "velocity"]]
     turns = {joint.name: joint.type.turns for joint in planned.mechanism.moving_joints}
     for name, values in planned.passive.items():
         unit = units.angle.value if turns[name] else units.length.value

@@ -138,13 +138,16 @@ def save(figure: Any, out: Path, *, dpi: float) -> None:
 
 
 def value_range(*values: NDArray[Any]) -> tuple[float, float]:
-    """Return the range of an axis that shows values; where they hardly change, it does not blow up their rounding."""
+    """Return the range of an axis that shows values; where they hardly change, it does not blow up their rounding.
+
+    It is wide enough then for labels that are whole numbers, without an offset at the axis's end.
+    """
     together = np.concatenate([np.ravel(value) for value in values if np.size(value)] or [np.zeros(1)])
     together = together[np.isfinite(together)]
     low, high = (float(together.min()), float(together.max())) if len(together) else (0.0, 0.0)
-    least = 1e-6 * max(1.0, abs(low), abs(high))
-    if high - low < least:
-        low, high = 0.5 * (low + high) - least, 0.5 * (low + high) + least
+    size = max(1.0, abs(low), abs(high))
+    if high - low < 1e-6 * size:
+        low, high = 0.5 * (low + high) - 1e-2 * size, 0.5 * (low + high) + 1e-2 * size
     margin = 0.07 * (high - low)
     return low - margin, high + margin
 

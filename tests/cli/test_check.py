@@ -46,6 +46,8 @@ def test_what_a_baseline_accepts_passes_until_there_is_more(folder: Path) -> Non
     assert (written.status, written.err) == (0, "dh2sim: accepted.json accepts 1 finding\n")
     run = dh2sim("check", "--only", "files", "--baseline", "accepted.json")
     assert (run.status, run.out) == (0, "1 of 1 robot passed, 1 accepted by the baseline\n")
+    run = dh2sim("check", "--only", "drift", "--baseline", "accepted.json")
+    assert (run.status, run.out) == (0, "1 of 1 robot passed\n"), "slips were not looked for, so none is gone"
     write(folder, small("other").replace("0.651", "45"))
     run = dh2sim("check", "--only", "files", "--baseline", "accepted.json")
     assert run.status == 1
