@@ -7,6 +7,7 @@ those of Python's Mersenne Twister, of which only ``random()`` is used: its sequ
 from __future__ import annotations
 
 import random
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,6 +28,8 @@ LEVELS = {
 """What the levels are."""
 _STEP = 0.05
 """m: of which all coordinates are multiples."""
+_WIDTH = 80
+"""Of lines, so that they fit into a terminal."""
 _ALONG = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1))
 _ODD = ((0, 3, 4), (3, 0, 4), (0, 4, 3), (1, 0, 1), (0, 1, 1), (2, 1, 2), (1, 2, 2), (0, -3, 4), (-1, 0, 1))
 Vector = tuple[int, int, int]
@@ -79,19 +82,20 @@ class Exercise:
     def text(self, drawing: str = "") -> str:
         """Return the exercise in Markdown; ``drawing`` is the file of a picture to show."""
         tip = ", ".join(f"{1000 * value:g}" for value in self.tool)
+        items = [f"{i}. {joint.sentence}" for i, joint in enumerate(self.joints, 1)]
         lines = [
             f"# Exercise {self.seed}, level {self.level}",
             "",
-            f"An arm has {len(self.joints)} joints. With all joint coordinates at zero, in the frame base_link (z",
-            "upwards, lengths in mm):",
+            f"An arm has {len(self.joints)} joints. With all joint coordinates at zero, in the frame base_link",
+            "(z upwards, lengths in mm):",
             "",
-            *(f"{i}. {joint.sentence}" for i, joint in enumerate(self.joints, 1)),
+            *(line for item in items for line in _wrapped(item)),
             "",
             f"The tip of the tool is at ({tip}) mm.",
             "",
             *([f"![The arm at coordinates zero]({drawing})", ""] if drawing else []),
-            "Assign Denavit-Hartenberg frames, and give the table: a, alpha, d and theta of each row,",
-            "and which convention it is in. Any right choice of frames counts.",
+            "Assign Denavit-Hartenberg frames, and give the table: a, alpha, d and theta of",
+            "each row, and which convention it is in. Any right choice of frames counts.",
             "",
         ]
         return "\n".join(lines)
@@ -215,6 +219,12 @@ def _wristed(dice: _Dice) -> tuple[list[AxisInWords], list[int]]:
         joints.append(_joint(i, True, place, way))
     place[0] += dice.number(1, 4)
     return joints, place
+
+
+def _wrapped(item: str) -> list[str]:
+    """Return the lines of an item of a list, with points and vectors in one piece."""
+    lines = textwrap.wrap(item.replace(", ", ",_"), _WIDTH, subsequent_indent="   ", break_long_words=False)
+    return [line.replace(",_", ", ") for line in lines]
 
 
 def _move(dice: _Dice, place: list[int]) -> None:

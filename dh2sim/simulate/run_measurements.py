@@ -79,6 +79,10 @@ def _recorded(data: xr.Dataset, robot: str, joints: list[str], name: str) -> tup
         raise CalibrationError(f"{name}: has not recorded {listed(missing)}; record again with qpos,tool_pose")
     if "base_pose" in data:
         raise CalibrationError(f"{name}: the base floats, so that poses of the tool are not in base_link")
+    if "design" in data and len(np.unique(data["design"].values)) > 1:
+        raise CalibrationError(
+            f"{name}: its rollouts are of many designs, each with a table of its own; use a run of one"
+        )
     there = [str(joint) for joint in data["joint"].values.tolist()]
     if there != joints:
         raise CalibrationError(f"{name}: its joints are {listed(there)}, those of {robot} are {listed(joints)}")

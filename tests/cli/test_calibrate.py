@@ -94,6 +94,15 @@ def test_wrong_arguments_are_told(arguments: list[str], message: str, points: Pa
     assert run.out == ""
 
 
+def test_a_run_of_many_designs_is_refused(tmp_path: Path) -> None:
+    run = tmp_path / "run.zarr"
+    made = dh2sim("rollout", "planar_2r", "--vary", "a1=0.1", "--rollouts", "2", "--steps", "2", "--out", run)
+    assert made.status == 0
+    refused = dh2sim("calibrate", "planar_2r", "--from-run", run, "--noise", "5e-5")
+    assert refused.status == 2
+    assert "its rollouts are of many designs, each with a table of its own; use a run of one" in refused.err
+
+
 @pytest.mark.slow
 def test_a_report_is_one_page_that_needs_nothing_else(points: Path, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
