@@ -40,6 +40,7 @@ def test_every_level_makes_arms_of_its_kind(level: int) -> None:
         made = make_exercise(seed, level)
         slides = sum(not joint.turns for joint in made.joints)
         assert slides == (1 if level == 2 else 0)
+        assert max(map(len, made.text("arm.svg").splitlines())) <= 80
         assert len(made.joints) in {1: (2, 3), 2: (3, 4), 3: (4, 5), 4: (6,)}[level]
 
 
