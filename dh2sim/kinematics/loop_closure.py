@@ -57,7 +57,8 @@ class ClosureGap:
 
     def __str__(self) -> str:
         """Return what of the closure is open, in mm and deg."""
-        gap = f"{1000 * self.position:.6g} mm and {math.degrees(self.rotation):.6g} deg"
+        position, rotation = (0.0 if value < TOLERANCE else value for value in (self.position, self.rotation))
+        gap = f"{1000 * position:.6g} mm and {math.degrees(rotation):.6g} deg"
         opposite = "; its z axes are opposite: turn one frame with 'alpha: 180 deg'"
         return f"{self.name} stays open by {gap}{opposite if self.opposite else ''}"
 

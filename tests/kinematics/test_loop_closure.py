@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from dh2sim.errors import AssemblyError
 from dh2sim.kinematics.loop_closure import (
     FREEDOMS,
+    ClosureGap,
     assembly,
     close_loops,
     closure_gaps,
@@ -139,6 +140,7 @@ def test_a_loop_that_cannot_be_closed_says_by_how_much() -> None:
     assert message.startswith(found)
     gap = float(message.removeprefix(found).split(" mm")[0])
     assert gap == pytest.approx(9000 - 2000 - 600 - 1800, abs=60)
+    assert str(ClosureGap(name="C", position=0.03, rotation=3e-16)) == "C stays open by 30 mm and 0 deg"
 
 
 def test_a_loop_without_assembly_is_closed_from_anywhere() -> None:
