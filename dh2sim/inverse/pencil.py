@@ -24,6 +24,8 @@ _GATE = 0.15
 """Imaginary part of half an angle up to which an eigenvalue may be a real solution that rounding has moved."""
 _ZERO = 1e-11
 """Singular values below this share of the largest are zero."""
+_UNDETERMINED = 1e8
+"""Condition above which the joints that are eliminated linearly cannot be told from the others."""
 _MEET = 1e-9
 """Axes that pass each other no farther than that, in lengths of the arm, meet."""
 _THIRDS: Array = 2.0 * np.pi / 3.0 * np.arange(3.0)
@@ -69,7 +71,7 @@ class Pencil:
             t, v, large = eigenpairs(C)
             half = np.arctan(t)
         double = are_double(half)
-        blurred = np.flatnonzero(large | double)
+        blurred = np.flatnonzero(large | double | (right.condition(self.rank) > _UNDETERMINED))
         largest = np.take_along_axis(v, np.abs(v).argmax(1)[:, None], 1)[:, 0]
         poses, k = np.nonzero((np.abs(half.imag) < _GATE) & (np.abs(largest) > 0.0))
         # rounding may have split a double root into a pair: begin on both sides of it
@@ -92,8 +94,9 @@ class Pencil:
         """Return the condition numbers of the matrices that are divided by, shape (N,): huge if singular."""
         ring = loop.variant(self.first, backwards=self.backwards)
         ends = self._ends(ring)
-        values = np.linalg.svd(self._matrices(ring, ends[0], self._right_side(ring, ends[1]))[2], compute_uv=False)
-        return np.asarray(values[:, 0] / np.maximum(values[:, -1], 1e-300 + 1e-300 * values[:, 0]))
+        right = self._right_side(ring, ends[1])
+        values = np.linalg.svd(self._matrices(ring, ends[0], right)[2], compute_uv=False)
+        return np.maximum(_quotient(values[:, 0], values[:, -1]), right.condition(self.rank))
 
     @property
     def _linear(self) -> tuple[int, ...]:
@@ -208,6 +211,10 @@ class _RightSide:
     def rank(self) -> int:
         """Greatest rank of all poses."""
         return int((self.values > _ZERO * self.values[:, :1]).sum(axis=1).max())
+
+    def condition(self, rank: int) -> Array:
+        """Return the condition numbers of coefficients of this rank, shape (N,): huge where it is less."""
+        return _quotient(self.values[:, 0], self.values[:, rank - 1])
 
 
 def build_pencil(
@@ -328,6 +335,11 @@ def _in_half_tangents(turns: bool, phase: float) -> Array:
         rows = [[c * c, s * c, s * s], [-2.0 * s * c, c * c - s * s, 2.0 * s * c], [s * s, -s * c, c * c]]
         matrix = np.array(rows) @ _POWERS
     return np.asarray(matrix)
+
+
+def _quotient(large: Array, small: Array) -> Array:
+    """Return quotients of singular values, huge where the small ones are zero."""
+    return np.asarray(large / np.maximum(small, 1e-300 + 1e-300 * large))
 
 
 def _ratios(v: Array) -> list[Array]:

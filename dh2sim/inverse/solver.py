@@ -40,7 +40,7 @@ from dh2sim.typing import Array, read_only
 
 VERIFIED: Final = 1e-10
 """Residual up to which a configuration is a solution."""
-UNSURE: Final = "The pose is nearly singular and no elimination is well-conditioned there: solutions may be missing."
+UNSURE: Final = "No elimination is well-conditioned at the pose: solutions may be missing."
 ROUNDED: Final = (
     "But for rounding of the table the joints move tool0 in one direction less, as with an alpha of 3.141593 where "
     "pi is meant: every pose is nearly singular, and solutions may be missing."

@@ -9,11 +9,20 @@ from dh2sim.inverse.nearest import goal_sigma_min
 from dh2sim.inverse.solver import InverseSolver
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
-from tests.inverse.arms import CRX, JACO, ORTHOGONAL
+from tests.inverse.arms import CRX, JACO, ORTHOGONAL, arm
 from tests.inverse.campaign import is_found
 from tests.sample_robots import robot
 
 RIGHT = 0.5 * np.pi
+PARALLEL = arm(
+    "parallel_at_the_end",
+    (0.35, -RIGHT, -0.15, 0.0, "R"),
+    (0.2, -RIGHT, 0.0, 0.0, "R"),
+    (0.5, -RIGHT, -0.15, 0.0, "R"),
+    (0.35, -RIGHT, 0.4, 0.0, "R"),
+    (0.1, 0.0, 0.25, 0.0, "R"),
+    (0.0, -RIGHT, 0.4, 0.0, "R"),
+)
 
 
 @pytest.mark.parametrize("spec", [robot("puma560"), JACO, CRX, ORTHOGONAL], ids=lambda spec: spec.name)
@@ -34,6 +43,9 @@ def test_regular_configurations_with_joints_at_right_angles_are_found(spec: Robo
         pytest.param(ORTHOGONAL, (RIGHT, 0.0, 0.0, RIGHT, RIGHT, -RIGHT), 6, id="solutions share an angle"),
         pytest.param(JACO, (-RIGHT, 0.0, np.pi, RIGHT, np.pi, -RIGHT), 8, id="solutions of a skew wrist share one"),
         pytest.param(CRX, (0.526857, np.pi, np.pi, 0.878053, np.pi, -RIGHT), 12, id="all pencils are singular"),
+        pytest.param(
+            PARALLEL, (-RIGHT, -RIGHT, np.pi, RIGHT, 0.0, RIGHT), 6, id="a regular pencil leaves joints open"
+        ),
     ],
 )
 def test_rounding_of_a_pose_does_not_cost_solutions(spec: RobotSpec, q: tuple[float, ...], count: int) -> None:
