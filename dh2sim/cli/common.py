@@ -223,8 +223,36 @@ def complain(error: object) -> int:
             text = "\n".join(f"dh2sim: {_as_option(name, message)}" for name, message in error.problems)
         case _:
             text = f"dh2sim: {error}"
-    print(printable(text), file=sys.stderr)
+    text = printable(text)
+    if sys.stderr.isatty() and not isinstance(error, RobotFileError):
+        text = _for_terminal(text)
+    print(text, file=sys.stderr)
     return FELL_SHORT if isinstance(error, MismatchError) else BAD_INPUT
+
+
+def _for_terminal(text: str) -> str:
+    """Return a message whose lines end between words, but not inside quotes: commands and paths stay whole.
+
+    Where standard error is a file or a pipe, a message stays on one line, so that it can be searched for.
+    """
+    import textwrap
+
+    try:
+        width = os.get_terminal_size(sys.stderr.fileno()).columns or 80
+    except (OSError, ValueError):
+        width = 80
+    whole = re.sub(r"(?<!\w)'[^'\n]*'", lambda found: found[0].replace(" ", "\0"), text)
+    lines = [
+        textwrap.fill(
+            line,
+            width,
+            subsequent_indent=" " * (len(line) - len(line.lstrip()) + 2),
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        for line in whole.splitlines()
+    ]
+    return "\n".join(lines).replace("\0", " ")
 
 
 def _as_option(name: str, message: str) -> str:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import pty
+from contextlib import redirect_stderr
 from pathlib import Path
 
 import pytest
 
+from dh2sim.cli.common import complain
 from dh2sim.cli.output import json_text
 from dh2sim.errors import NotFiniteError
 from tests.program import dh2sim
@@ -48,3 +52,18 @@ def test_names_of_folders_do_not_reach_the_terminal_as_they_are(command: tuple[s
     assert done.status in (0, 1), done.err
     assert "\x1b" not in done.out + done.err
     assert "a\\x1b[2Jb" in done.out
+
+
+def test_an_error_is_wrapped_between_words_on_a_terminal_and_stays_one_line_elsewhere() -> None:
+    sentence = "dh2sim: no file or robot named 'nosuch'. 'dh2sim list' lists the "
+    assert dh2sim("fk", "nosuch").err.startswith(sentence)
+    assert dh2sim("fk", "nosuch").err.count("\n") == 1
+    master, slave = pty.openpty()
+    with os.fdopen(master, "rb") as screen, os.fdopen(slave, "w") as terminal, redirect_stderr(terminal):
+        complain("a long word " * 7 + "and 'dh2sim import arm.urdf -o arm.yaml'")
+        terminal.flush()
+        lines = os.read(screen.fileno(), 4096).decode().splitlines()
+    assert lines == [
+        "dh2sim: a long word a long word a long word a long word a long word a long word",
+        "  a long word and 'dh2sim import arm.urdf -o arm.yaml'",
+    ]
