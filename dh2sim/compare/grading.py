@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,6 +22,7 @@ from dh2sim.errors import Dh2simError
 from dh2sim.importing.sources import ImportOptions
 from dh2sim.kinematics.chain import SpecLike
 from dh2sim.messages import did_you_mean, listed, shown
+from dh2sim.robot.expressions import NumberError, to_number
 from dh2sim.robot.yaml_tree import Node, Report, compose, decode, read_yaml_file
 
 TOLERANCE_OF_GRADES = 1e-3
@@ -173,10 +173,14 @@ def _points(node: Node | None, loc: tuple[str, ...], report: Report) -> float | 
     if node is None:
         return None
     value = node.value
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
+    try:
+        points = to_number(value, None)
+    except NumberError:
+        points = -1.0
+    if points < 0.0:
         report.add(node.line, node.column, loc, f"expected a number of at least 0, found {shown(_plain(node))}")
         return None
-    return float(value)
+    return points
 
 
 def _plain(node: Node) -> object:

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 
 from dh2sim.messages import Loc, shown
+from dh2sim.robot.expressions import NumberError, to_number
 from dh2sim.robot.yaml_tree import Node, Report, compose, decode, read_yaml_file
 from dh2sim.simulate.quantities import NEEDS, Setting, checked_settings, key_parts
 
@@ -28,10 +29,11 @@ def read_randomization(path: str | os.PathLike[str]) -> dict[str, Setting]:
     found: dict[str, Setting] = {}
     for key, loc, node in _entries(root, report):
         value = node.value
-        if not isinstance(value, str | int | float) or isinstance(value, bool):
+        try:
+            setting = value if isinstance(value, str) else to_number(value, None)
+        except NumberError:
             report.add(node.line, node.column, loc, f"expected a number or a distribution, found {shown(value)}")
             continue
-        setting = value if isinstance(value, str) else float(value)
         # what a quantity needs besides itself is checked when all are known
         _, problems = checked_settings({key: setting} | dict.fromkeys(_needed(key), 1.0))
         for problem in problems:

@@ -69,12 +69,13 @@ def test_a_rubric_gives_points_by_kind_and_takes_them_off_for_free_choices(tmp_p
 
 def test_everything_wrong_in_a_rubric_is_reported_at_its_place(tmp_path: Path) -> None:
     file = tmp_path / "rubric.yaml"
-    file.write_text("points: -1\nkinds: {sgin: 3}\noff: [1]\nmore: 2\n", encoding="utf-8")
+    file.write_text("points: -1\nkinds: {sgin: 3, sign: 1" + "0" * 399 + "}\noff: [1]\nmore: 2\n", encoding="utf-8")
     assert [line.split("rubric.yaml")[1] for line in refusal(RobotFileError, read_rubric, file).splitlines()] == [
         ":1:9: points: expected a number of at least 0, found -1",
         ":2:9: kinds.sgin: unknown key 'sgin'. Did you mean 'sign'? Allowed: sign, value, length-unit, angle-unit, "
         "lost, added, swapped-rows, swapped-columns, shifted, reversed, convention, type, missing-row, extra-row, "
         "wrong, joints, unreadable",
+        ":2:24: kinds.sign: expected a number of at least 0, found a number of too many digits",
         ":3:6: off: expected a mapping, found a list",
         ":4:1: more: unknown key 'more'. Allowed: points, kinds, off",
     ]

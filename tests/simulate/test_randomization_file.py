@@ -18,14 +18,15 @@ kp: normal:0.05
 push: 20
 push_interval: 1
 """
-WRONG = """\
+WRONG = f"""\
 mas: 0.2
 mass: [1, 2]
-payload: {link_1: 1}
+payload: {{link_1: 1}}
 kp:
   joint_1: normal:0.9
   others: true
 payload_com: 0.1
+damping: {10**399}
 """
 
 
@@ -49,6 +50,7 @@ def test_everything_that_is_wrong_is_reported_with_its_place(tmp_path: Path) -> 
         "3:19: payload.link_1: must not contain 'payload[link_1]': a rollout has one payload",
         "5:12: kp.joint_1: must be above 0 in all draws, got kp[joint_1]=normal:0.9, which reaches -2.6",
         "6:11: kp.others: expected a number or a distribution, found true",
+        "8:10: damping: expected a number or a distribution, found a number of too many digits",
     ]
     path.write_text("payload_com: 0.1\n")
     assert refusal(RobotFileError, read_randomization, path).endswith(
