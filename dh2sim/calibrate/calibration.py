@@ -37,7 +37,7 @@ _VAGUE: Final = 3e-3
 """m or rad: a standard deviation that is greater than errors of most robots."""
 _UNITS: Final = {"mm": 1e-3, "cm": 1e-2, "inches": 0.0254}
 _SPREAD: Final = 0.01
-"""m, over which the tool must have moved for a unit to show."""
+"""m, over which the tool must move for a unit to show."""
 _GROWTH: Final = 2.0
 """Times the size of its table, that no arm is built off."""
 _COARSE: Final = 0.05
@@ -311,17 +311,19 @@ class _Task:
             return
         measured = whole.observations.measured
         q = random_vectors(self.robot.spec, self.measured.q, _TRIES, self.seed)
-        extent = _extent(self.robot, self.robot.start, q)
-        growth = _extent(self.robot, whole.state.values, q) / max(extent, 1e-12)
-        if not 1.0 / _GROWTH < growth < _GROWTH:
+        start = self.robot.start
+        extent = _extent(self.robot, start, q, tool=False)
+        found = _extent(self.robot, whole.state.values, q, tool=False)  # a tool may be any other than the table's
+        size = max(extent, _extent(self.robot, start, q, tool=True))
+        if size > _SPREAD and not (1.0 / _GROWTH - 1.0) * size < found - extent < (_GROWTH - 1.0) * size:
             raise CalibrationError(
-                f"{self._what(measured)}: they would make the arm {growth:.4g} times as large as its table says: "
-                "lengths are in another unit, or the robot is not the one that was measured"
+                f"{self._what(measured)}: they would make the arm {found / max(extent, 1e-12):.4g} times as large as "
+                "its table says: lengths are in another unit, or the robot is not the one that was measured"
             )
-        if whole.sigma.length > _COARSE * extent and not whole.sigma.length_known:
+        if size > _SPREAD and whole.sigma.length > _COARSE * size and not whole.sigma.length_known:
             raise CalibrationError(
                 f"{self._what(measured)}: what is left is {1e3 * whole.sigma.length:.3g} mm a component, of an arm "
-                f"that gets around by {1e3 * extent:.3g} mm: columns or rows are exchanged, a sign is wrong, or the "
+                f"that gets around by {1e3 * size:.3g} mm: columns or rows are exchanged, a sign is wrong, or the "
                 "robot is not the one that was measured"
             )
         known = self._predicted(whole, q).length
@@ -519,9 +521,9 @@ def _copies(measured: Measurements) -> int:
     return count - len(set(zip((row.tobytes() for row in numbers), *names, strict=True)))
 
 
-def _extent(robot: RobotParameters, values: Values, q: Array) -> float:
-    """Return how far the last DH frame gets around: the rms distance from its mean position, m."""
-    _, p = robot.tool_poses(replace(values, tool=np.eye(4)), q)
+def _extent(robot: RobotParameters, values: Values, q: Array, *, tool: bool) -> float:
+    """Return how far the last DH frame, or tool0, gets around: the rms distance from its mean position, m."""
+    _, p = robot.tool_poses(values if tool else replace(values, tool=np.eye(4)), q)
     return float(np.sqrt(((p - p.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 

@@ -13,10 +13,10 @@ from dh2sim.calibrate.measurements import measurements
 from dh2sim.calibrate.result import Calibration, ParameterStatus
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.spec import Pose, RobotSpec
+from dh2sim.robot.spec import Limits, Pose, RobotSpec, ToolSpec
 from tests.calibrate.measured import SIGMA, measured, numbers, off, random_q
 from tests.refusals import refusal
-from tests.sample_robots import ODD_ROBOT, robot
+from tests.sample_robots import ODD_ROBOT, robot, row
 
 COUNTS = [("puma560", 30, 27), ("ur5e", 30, 27), ("franka_panda", 34, 31), ("stanford", 28, 25), ("scara", 20, 17)]
 """4 R + 2 P + 6 of poses, three less of positions."""
@@ -246,6 +246,18 @@ def test_positions_whose_columns_are_exchanged_are_refused() -> None:
     swapped = replace(given, position=given.position[:, [1, 0, 2]], station=("tracker",) * 24)
     text = refusal(CalibrationError, calibrate, nominal, swapped, held_out=False)
     assert "a component, of an arm that gets around by 954 mm: columns or rows are exchanged" in text
+
+
+@pytest.mark.parametrize("kind", ["pose", "position"])
+def test_a_head_whose_own_table_has_no_length_that_moves_is_fitted(kind: str) -> None:
+    pan = replace(row("pan", alpha=math.pi / 2.0, d=0.12), limits=Limits(position=(-2.9, 2.9)))
+    tilt = replace(row("tilt"), limits=Limits(position=(-1.4, 1.4)))
+    head = RobotSpec(name="head", rows=(pan, tilt), tool=ToolSpec(xyz=np.array([0.25, 0.0, 0.05])))
+    true = off(head, 2e-3, 1)
+    found = calibrate(head, measured(head, true, kind, random_q(head, 60, 2), seed=3), held_out=False)
+    q = random_q(head, 50, 9)
+    off_by = table_tool_pose(found.robot, q)[:, :3, 3] - table_tool_pose(true, q)[:, :3, 3]
+    assert np.linalg.norm(off_by, axis=1).max() < 2.0 * SIGMA
 
 
 def test_copied_rows_are_noted() -> None:

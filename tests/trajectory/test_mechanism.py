@@ -78,6 +78,12 @@ def test_limits_of_passive_joints_hold_too() -> None:
     free = plan_mechanism_trajectory(build_mechanism(load_robot("four_bar")), ["home", [3.49]])
     assert slow.passive["rocker_joint_1"][2] <= math.radians(30)
     assert slow.duration == pytest.approx(free.duration * free.passive["rocker_joint_1"][2] / math.radians(30), 1e-3)
+    times = np.linspace(0.0, slow.duration, 20_001)
+    C = _pin(slow.at(times)[0][:, 0])
+    angle = np.degrees(np.arctan2(C[:, 1], C[:, 0] - GROUND))
+    assert np.abs(np.diff(angle)).max() / times[1] == pytest.approx(30.0, rel=5e-6)
+    narrow = _with(f"{rocker}{{position: [0, {angle.max() - 1e-3}]}}}}")
+    assert "leaves its limits" in refusal(TrajectoryError, plan_mechanism_trajectory, narrow, ["home", [3.49]])
     message = refusal(
         TrajectoryError,
         plan_mechanism_trajectory,

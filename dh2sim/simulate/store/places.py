@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from os import fspath
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Final
 
 from dh2sim.errors import RunError
@@ -24,11 +24,11 @@ def open_store(place: Place) -> LocalStore | ObjectStore:
         MissingExtraError: It is an object store, and the library for those is not installed.
     """
     text = fspath(place)
-    if isinstance(place, Path):  # which makes one slash of two
-        text = _LOST_SLASH.sub(r"\1//", text)
+    if isinstance(place, PurePath):  # which makes one slash of two, and on Windows a backslash
+        text = _LOST_SLASH.sub(r"\1//", place.as_posix())
     scheme = _SCHEME.match(text)
     if scheme is None:
-        return LocalStore(Path(text))
+        return LocalStore(Path(place))
     if scheme[1].lower() != "s3":
         raise RunError(f"'{text}' cannot be opened: runs are in folders, or in object stores as s3://BUCKET/NAME")
     return ObjectStore(text)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib.util import find_spec
-from pathlib import Path
+from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 
 import pytest
 
@@ -14,6 +14,7 @@ from dh2sim.simulate.store import objects as objects_module
 from dh2sim.simulate.store.codec import encode_text
 from dh2sim.simulate.store.metadata import make_metadata
 from dh2sim.simulate.store.objects import ObjectStore
+from dh2sim.simulate.store.places import open_store
 from dh2sim.simulate.store.reader import damaged_blocks, open_dataset
 from dh2sim.simulate.store.writer import RunWriter
 from tests.program import contents, dh2sim
@@ -169,6 +170,11 @@ def test_where_there_is_no_run_the_place_is_named(place: str, reported: str) -> 
     shown = dh2sim("runs", place)
     assert (shown.status, shown.out) == (2, "")
     assert shown.err.startswith(f"dh2sim: {reported}")
+
+
+@pytest.mark.parametrize("kind", [PurePosixPath, PureWindowsPath])
+def test_a_path_that_has_lost_a_slash_is_the_same_place(kind: type[PurePath]) -> None:
+    assert open_store(kind(RUN)).name == RUN
 
 
 def test_commands_read_a_run_where_it_is(tmp_path: Path) -> None:
