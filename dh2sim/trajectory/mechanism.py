@@ -37,7 +37,7 @@ _FINER: Final = 16
 _RIVAL: Final = 0.02
 """Of what a passive joint moves by, or of its greatest velocity: a peak that is lower by less may be the greatest."""
 _BRANCH: Final = 1e-6
-"""rad or sizes: configurations nearer to each other are the same."""
+"""rad or m: configurations nearer to each other are the same."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
