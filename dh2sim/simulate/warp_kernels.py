@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import warp as wp
 
-BAD_POSITION, BAD_VELOCITY, BAD_ACCELERATION, CONSTRAINTS_FULL = 1, 2, 4, 8
-"""Bits of what ``watch`` finds."""
-
 
 @wp.kernel  # type: ignore[untyped-decorator]
 def watch(
@@ -18,7 +15,10 @@ def watch(
     huge: float,
     found: wp.array(dtype=int),  # type: ignore[valid-type]
 ) -> None:
-    """Note simulations whose state is not finite or huge, or that have more constraints than there is room for."""
+    """Note simulations whose state is not finite or huge, or that have more constraints than there is room for.
+
+    Bits of ``found``: 1 positions, 2 velocities, 4 accelerations, 8 constraints.
+    """
     world = wp.tid()
     bits = int(0)  # noqa: UP018, RUF046 - so that Warp lets it change
     for i in range(qpos.shape[1]):
