@@ -150,8 +150,7 @@ def _print_quantities(found: Comparison) -> None:
         return
     print("\nOf what both give, these differ (B as A counts):")
     for quantity in found.quantities:
-        between = f"{quantity.a} in A, {quantity.b} in B" if quantity.a else f"in B {quantity.b}"
-        print_item(f"{quantity.joint}: {quantity.quantity} {between}")
+        print_item(str(quantity))
 
 
 def print_item(sentence: str) -> None:

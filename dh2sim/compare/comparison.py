@@ -108,9 +108,9 @@ class Equivalence:
             yield f"names differ: {', '.join(renamed)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Comparison:
-    """What comparing robot A with robot B found."""
+    """What comparing robot A with robot B found; as text, the verdict and a line for each difference."""
 
     a: RobotSpec
     b: RobotSpec
@@ -140,6 +140,16 @@ class Comparison:
     def equal(self) -> bool:
         """Whether both are the same mechanism, with the same limits, masses and gains as far as both give them."""
         return self.same and not self.quantities
+
+    def __repr__(self) -> str:
+        verdict = "equal" if self.equal else "the same mechanism" if self.same else "different"
+        return f"<Comparison of '{self.a.name}' with '{self.b.name}': {verdict}>"
+
+    def __str__(self) -> str:
+        found = [*self.sentences(), *map(str, self.quantities)]
+        verdict = "The same mechanism" if self.same else "Different mechanisms"
+        end = ", but:" if self.same and found else "."
+        return "\n".join([verdict + end, *(f"  - {sentence}" for sentence in found)])
 
     def sentences(self) -> list[str]:
         """Return what is different, in words: of the same mechanism, or of two."""

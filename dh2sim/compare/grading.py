@@ -107,7 +107,7 @@ class Grade:
     """An outcome, or the kind of the misreading that the points are for."""
     comments: tuple[str, ...]
     """Sentences for the student."""
-    comparison: Comparison | None = None
+    comparison: Comparison | None = field(default=None, repr=False)
     """None of an unreadable submission."""
 
     @property

@@ -32,6 +32,10 @@ class QuantityDifference:
     b: str
     """The value in B, as A counts."""
 
+    def __str__(self) -> str:
+        between = f"{self.a} in A, {self.b} in B" if self.a else f"in B {self.b}"
+        return f"{self.joint}: {self.quantity} {between}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointPair:

@@ -30,6 +30,17 @@ def edited(spec: RobotSpec, index: int, **values: Any) -> RobotSpec:
     return replace(spec, rows=tuple(rows))
 
 
+def test_a_comparison_prints_its_verdict_and_what_differs() -> None:
+    found = diff("puma560", "stanford")
+    assert repr(found) == "<Comparison of 'puma560' with 'stanford': different>"
+    assert str(found).splitlines()[:2] == [
+        "Different mechanisms.",
+        "  - first difference: joint_3 turns in A, joint_3 slides in B",
+    ]
+    spec = robot("rpr")
+    assert str(diff(spec, spec)) == "The same mechanism."
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_a_table_written_otherwise_is_the_same_mechanism_and_its_equation_holds(seed: int) -> None:
     rng = np.random.default_rng(seed)
