@@ -19,6 +19,8 @@ _SETTLED: Final = 1e-9
 _ROUNDS: Final = 30
 NOISY: Final = 1e-3
 """m and rad: the greatest noise that makes parameters count as not determined."""
+_EXACT: Final = 1e-9
+"""m and rad: the least noise that is estimated; steps of a fit with less drown in rounding."""
 _STRICTER: Final = (1.0, 0.3, 0.1)
 """Shares of what parameters must be known to, tried in turn where a fit does not settle with all that are."""
 _SAME: Final = 1e-3
@@ -260,7 +262,7 @@ def _estimated(equations: Equations, sigma: Sigma, weight: Array, leverage: Arra
             spread = float(np.median(np.abs(e))) / 0.6745 * np.sqrt(mine.sum() / share)
         else:
             spread = float(np.sqrt((weight[mine] * e**2).sum() / share))
-        found[scale] = max(spread, 1e-12)
+        found[scale] = max(spread, _EXACT)
     return Sigma(
         length=found[LENGTH],
         angle=found[ANGLE],

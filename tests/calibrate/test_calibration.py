@@ -14,7 +14,7 @@ from dh2sim.calibrate.result import Calibration, ParameterStatus
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import Limits, Pose, RobotSpec, ToolSpec
-from tests.calibrate.measured import SIGMA, measured, numbers, off, random_q
+from tests.calibrate.measured import SIGMA, measured, numbers, off, random_q, turned
 from tests.refusals import refusal
 from tests.sample_robots import ODD_ROBOT, robot, row
 
@@ -297,3 +297,17 @@ def test_estimated_noise_is_the_noise() -> None:
     found = calibrate(nominal, given, held_out=False)
     assert math.isclose(found.fit.sigma.length, SIGMA, rel_tol=0.15)
     assert math.isclose(found.fit.sigma.angle, SIGMA, rel_tol=0.15)
+
+
+@pytest.mark.parametrize("sigma", [(0.0, 0.0), (1e-4, 0.0), (0.0, 1e-4)], ids=["all", "rotations", "positions"])
+def test_exact_data_are_fitted(sigma: tuple[float, float]) -> None:
+    nominal = robot("scara")
+    true, q = off(nominal, 1e-3, 1), random_q(nominal, 40, 2)
+    rng = np.random.default_rng(3)
+    poses = table_tool_pose(true, q).copy()
+    poses[:, :3, 3] += sigma[0] * rng.normal(size=(40, 3))
+    poses[:, :3, :3] = turned(sigma[1] * rng.normal(size=(40, 3))) @ poses[:, :3, :3]
+    found = calibrate(nominal, measurements(nominal, q, poses=poses), held_out=False)
+    unseen = random_q(nominal, 50, 4)
+    error = np.abs(table_tool_pose(found.robot, unseen) - table_tool_pose(true, unseen)).max()
+    assert error < (1e-8 if sigma == (0.0, 0.0) else 4e-4)
