@@ -61,9 +61,15 @@ def sources() -> tuple[tuple[str, bytes], ...]:
     paths = [path for folder in folders for path in sorted(folder.rglob("*")) if path.is_file()]
     packages = [(arm, installed(arm.package)) for arm in ARMS]
     paths += [arm.path(root) for arm, root in packages if root is not None]
+    closed = {path.stem for path in (REPOSITORY / "robots" / "mechanisms").glob("*.yaml")}
     found = {}
     for path in paths:
-        if path.suffix in (".urdf", ".xml", ".txt") and path.name != "scene.xml" and path.stat().st_size < 60_000:
+        if (
+            path.parent.name not in closed
+            and path.suffix in (".urdf", ".xml", ".txt")
+            and path.name != "scene.xml"
+            and path.stat().st_size < 60_000
+        ):
             found[f"{path.parent.name}-{path.name}"] = path.read_bytes()
     return tuple(found.items())
 
