@@ -53,7 +53,7 @@ def least_error(spec: RobotSpec, kind: Kind, count: int) -> float:
     """Return a lower bound of the predicted error of the tool, in sigmas, of any configurations inside the limits."""
     contact = plan._SelfContact(build_model(spec))
     q, _ = contact.free(plan.CANDIDATES, np.random.default_rng(0))
-    design, _ = plan._design(spec, q, kind, (1.0, 1.0), None, 0)
+    design, _ = plan._design(spec, q, kind, (1.0, 1.0), 0)
     rng = np.random.default_rng(0)
     bound = 0.0
     for _ in range(4):

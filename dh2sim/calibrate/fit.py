@@ -116,10 +116,10 @@ def _weighted(
     return _Weighted(e, J, size)
 
 
-def weighted_jacobian(observations: Observations, state: State, sigma: Sigma, prior: Prior | None = None) -> Array:
-    """Return the derivatives of all equations, in standard deviations, and of the prior; shape (E, U)."""
+def weighted_jacobian(observations: Observations, state: State, sigma: Sigma) -> Array:
+    """Return the derivatives of all equations, in standard deviations, shape (E, U)."""
     equations = observations.equations(state)
-    return _weighted(observations, state, equations, sigma, np.ones(len(equations.e)), prior).J
+    return _weighted(observations, state, equations, sigma, np.ones(len(equations.e)), None).J
 
 
 def fit(

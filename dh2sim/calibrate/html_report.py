@@ -84,8 +84,8 @@ def _row(cells: Sequence[str], tag: str, text: int) -> str:
     return f"<tr>{''.join(made)}</tr>"
 
 
-def _milli(value: float, places: int = 3) -> str:
-    return "–" if math.isnan(value) else f"{1e3 * value:.{places}f}"
+def _milli(value: float) -> str:
+    return "–" if math.isnan(value) else f"{1e3 * value:.3f}"
 
 
 def _errors(found: Calibration) -> str:

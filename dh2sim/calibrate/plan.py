@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from dh2sim.calibrate.calibration import random_vectors
 from dh2sim.calibrate.hayati_rows import fit_rows
@@ -84,7 +84,6 @@ def plan_measurements(
     *,
     kind: Kind | str = Kind.POSITION,
     noise: float | tuple[float, float] = 1e-4,
-    stations: ArrayLike | None = None,
     seed: int = 0,
 ) -> Plan:
     """Choose configurations to measure a robot at.
@@ -92,11 +91,9 @@ def plan_measurements(
     Args:
         robot: A serial robot.
         count: How many to choose.
-        kind: Of the measurements: 'pose', 'position' or 'distance' (from points around the arm, unless ``stations``
-            names them). Where tool0 is on the last axis, positions and distances are taken to be those of a point
-            beside it, as a reflector is.
+        kind: Of the measurements: 'pose', 'position' or 'distance' (from three points around the arm). Where tool0 is
+            on the last axis, positions and distances are taken to be those of a point beside it, as a reflector is.
         noise: Sigma of a component, m, or m and rad.
-        stations: Fixed points that distances lead to, in base_link, m, shape (S, 3).
         seed: Of the random candidates.
 
     Raises:
@@ -118,7 +115,7 @@ def plan_measurements(
         raise CalibrationError(f"{joints} joints move; configurations are chosen for at most {MOST_JOINTS}")
     contact = _SelfContact(build_model(spec))
     q, touching = contact.free(max(CANDIDATES, 4 * count), np.random.default_rng(seed))
-    design, note = _design(spec, q, wanted, (length, angle), stations, seed)
+    design, note = _design(spec, q, wanted, (length, angle), seed)
     if count * design.equations < design.unknowns:
         least = math.ceil(design.unknowns / design.equations)
         raise CalibrationError(
@@ -257,9 +254,7 @@ class _Setup:
         return find_basis(self.rows(q).reshape(-1, len(unknowns)), unknowns, columns).kept
 
 
-def _design(
-    spec: RobotSpec, q: Array, kind: Kind, sigma: tuple[float, float], stations: ArrayLike | None, seed: int
-) -> tuple[_Design, str]:
+def _design(spec: RobotSpec, q: Array, kind: Kind, sigma: tuple[float, float], seed: int) -> tuple[_Design, str]:
     """Return what measurements determine, by candidates, and a note of where the tool is taken to be."""
     parameters = RobotParameters(fit_rows(spec))
     setup = _Setup(
@@ -267,7 +262,7 @@ def _design(
         values=parameters.start,
         kind=kind,
         sigma=sigma,
-        points=_stations(parameters, q, stations) if kind is Kind.DISTANCE else None,
+        points=_stations(parameters, q) if kind is Kind.DISTANCE else None,
     )
     kept, note = setup.identifiable(q), ""
     if kind is not Kind.POSE:
@@ -298,13 +293,8 @@ def _design(
     ), note
 
 
-def _stations(parameters: RobotParameters, q: Array, given: ArrayLike | None) -> Array:
-    """Return fixed points: as given, or three around the arm, beyond where the tool gets."""
-    if given is not None:
-        points = np.asarray(given, dtype=np.float64)
-        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-            raise CalibrationError(f"stations must be points of shape (S, 3), got shape {points.shape}")
-        return points
+def _stations(parameters: RobotParameters, q: Array) -> Array:
+    """Return three fixed points around the arm, beyond where the tool gets, shape (3, 3)."""
     _, p = parameters.tool_poses(parameters.start, q)
     middle, reach = p.mean(axis=0), float(np.linalg.norm(p - p.mean(axis=0), axis=1).max())
     turns = np.radians([10.0, 130.0, 250.0])

@@ -15,7 +15,7 @@ from dh2sim.cli.common import (
     QuietOption,
     RobotArgument,
     SeedOption,
-    load_all,
+    load_one,
     refuse_options,
 )
 from dh2sim.cli.output import WIDTH, json_text, require_free, table_lines, wrapped
@@ -131,7 +131,7 @@ def calibrate(
     """
     require_free(out, force=force)
     require_free(report, force=force)
-    [spec] = load_all([robot])
+    spec = load_one(robot)
     if plan is not None:
         refuse_options(
             "--plan",

@@ -268,25 +268,21 @@ def _as_option(name: str, message: str) -> str:
 # ---------------------------------------------------------------------------- robots
 
 
-def load_all(robots: Sequence[str]) -> list[RobotSpec]:
-    """Read robot files, and report the errors of all of them at once.
+def load_one(robot: str) -> RobotSpec:
+    """Read a robot file, and check that loops can be closed.
 
     Raises:
-        Dh2simError: Files are wrong, not found, cannot be read or have another format; the last error, after the
-            others were printed.
+        Dh2simError: The file is wrong, is not found, cannot be read or has another format.
     """
     from dh2sim.robot.read import load_robot
 
-    def load(robot: str) -> RobotSpec:
-        refuse_other_formats(robot)
-        spec = load_robot(robot)
-        if spec.closures:
-            from dh2sim.kinematics.loop_closure import assembly
+    refuse_other_formats(robot)
+    spec = load_robot(robot)
+    if spec.closures:
+        from dh2sim.kinematics.loop_closure import assembly
 
-            assembly(spec)
-        return spec
-
-    return _all(load, robots)
+        assembly(spec)
+    return spec
 
 
 _XML_ROOT = re.compile(rb"(?:<\?.*?\?>|<!--.*?-->|<![^>]*>|\s)*<\s*([A-Za-z_][\w:.-]*)", re.DOTALL)
@@ -338,26 +334,23 @@ def other_format(file: str) -> str | None:
     return "a Markdown table" if head.startswith(b"|") else None
 
 
-def build_all(robots: Sequence[str], *, strict: bool | None = None) -> list[RobotModel]:
-    """Read files of serial robots and build their models, and report the errors of all of them at once.
+def build_serial(robot: str) -> RobotModel:
+    """Read the file of a serial robot and build its model.
+
+    Raises:
+        Dh2simError: The file is wrong, or a mesh cannot be used.
+    """
+    from dh2sim.model.build import build_model
+
+    return build_model(load_one(robot))
+
+
+def build_any(robots: Sequence[str], *, strict: bool | None = None) -> list[RobotModel | MechanismModel]:
+    """Read files of robots and mechanisms and build their models, and report the errors of all of them at once.
 
     Args:
         robots: Files or names.
         strict: What becomes of likely slips: errors, notes on standard error, or nothing if this is None.
-
-    Raises:
-        Dh2simError: A file is wrong, two robots have the same name, or a mesh cannot be used.
-    """
-    from dh2sim.model.build import build_model
-
-    models = _all(build_model, _load_distinct(robots))
-    if strict is not None:
-        report_slips(models, strict=strict)
-    return models
-
-
-def build_any(robots: Sequence[str], *, strict: bool | None = None) -> list[RobotModel | MechanismModel]:
-    """Read files of robots and mechanisms and build their models; as ``build_all``.
 
     Raises:
         Dh2simError: A file is wrong, two robots have the same name, or a mesh cannot be used.
@@ -380,7 +373,7 @@ def _load_distinct(robots: Sequence[str]) -> list[RobotSpec]:
     Raises:
         Dh2simError: A file is wrong, or two robots have the same name.
     """
-    specs = load_all(robots)
+    specs = _all(load_one, robots)
     first: dict[str, str] = {}
     for robot, spec in zip(robots, specs, strict=True):
         if spec.name in first:

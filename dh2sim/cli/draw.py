@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from dh2sim.cli.common import MANY, RobotArgument, load_all
+from dh2sim.cli.common import MANY, RobotArgument, load_one
 from dh2sim.cli.joint_vector import (
     DegreesOption,
     QArgument,
@@ -79,7 +79,7 @@ def draw(
 
     if q and configuration is not None:
         raise typer.BadParameter("gives the configuration already; leave Q out", param_hint="--configuration")
-    [spec] = load_all([robot])
+    spec = load_one(robot)
     texts = [configuration] if configuration is not None else q
     options = "--configuration, --as, --style, --workspace, --reach, --out, --degrees, --radians, --help"
     vector = read_joint_vector(spec, texts, degrees=degrees, radians=radians, command="draw", options=options)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import JsonOption, RobotArgument, load_all
+from dh2sim.cli.common import JsonOption, RobotArgument, load_one
 from dh2sim.cli.joint_vector import (
     DegreesOption,
     JointVector,
@@ -69,7 +69,7 @@ def fk(
         raise typer.BadParameter("mean the same; give one of them", param_hint="--frame, --to")
     if every and (frame or target or source):
         raise typer.BadParameter("prints every row; leave the other option out", param_hint="--all")
-    [spec] = load_all([robot])
+    spec = load_one(robot)
     options = "--frame, --from, --to, --all, --degrees, --radians, --json, --help"
     vector = read_joint_vector(spec, q, degrees=degrees, radians=radians, command="fk", options=options)
     if spec.is_mechanism:
@@ -188,7 +188,7 @@ def jacobian(
     from dh2sim.kinematics.loop_motion import actuated_joints, mechanism_jacobian
     from dh2sim.kinematics.singularity import lost_directions, manipulability, rank, singular_values, still_motions
 
-    [spec] = load_all([robot])
+    spec = load_one(robot)
     options = "--frame, --degrees, --radians, --json, --help"
     vector = read_joint_vector(spec, q, degrees=degrees, radians=radians, command="jacobian", options=options)
     with np.errstate(all="ignore"):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, MANY, JsonOption, RobotArgument, complain, load_all
+from dh2sim.cli.common import DONE, FELL_SHORT, MANY, JsonOption, RobotArgument, complain, load_one
 from dh2sim.cli.output import json_text
 from dh2sim.errors import ConfigurationError, Dh2simError, SettingsError
 from dh2sim.messages import did_you_mean, listed, shown
@@ -104,7 +104,7 @@ def ik(
       dh2sim ik franka_panda --at home --lock joint_7=0.5
       dh2sim fk stanford home --json | dh2sim ik stanford --pose - --json
     """
-    [spec] = load_all([robot])
+    spec = load_one(robot)
     asked = _read(spec, _Options(pose, xyz, rpy, quaternion, at, frame, near, lock, free, no_limits))
     solutions = _solved(asked, limits=not no_limits, numeric=numeric)
     explanation = _explained(asked) if explain else None

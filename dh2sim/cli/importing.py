@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import ForceOption, RobotArgument, choice, complete_robot, load_all, other_format, tolerance_of
+from dh2sim.cli.common import ForceOption, RobotArgument, choice, complete_robot, load_one, other_format, tolerance_of
 from dh2sim.cli.output import hand_over, json_text, require_free
 from dh2sim.errors import Dh2simError, ImportedFileError, MissingExtraError
 from dh2sim.messages import printable
@@ -352,7 +352,7 @@ def convert(
 
     target = choice(to, TableForm, "--to", other_names=CONVENTIONS)
     require_free(out, force=force)
-    [spec] = load_all([robot])
+    spec = load_one(robot)
     folder = Path.cwd() if out is None else out.resolve().parent
     converted = convert_robot(spec, target or TableForm.STANDARD, folder=folder)
     if as_json:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dh2sim.cli.common import JsonOption, RobotArgument, load_all
+from dh2sim.cli.common import JsonOption, RobotArgument, load_one
 from dh2sim.cli.output import json_text, print_wrapped, table_lines
 from dh2sim.messages import printable
 
@@ -30,7 +30,7 @@ def mobility(
     """
     from dh2sim.mobility.robot_mechanism import find_mobility
 
-    found = find_mobility(load_all([robot])[0])
+    found = find_mobility(load_one(robot))
     if as_json:
         print(json_text(found.to_dict()))
     else:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import ForceOption, choice, complete_robot, load_all
+from dh2sim.cli.common import ForceOption, choice, complete_robot, load_one
 from dh2sim.cli.output import hand_over, require_free
 from dh2sim.errors import Dh2simError
 from dh2sim.messages import printable
@@ -111,7 +111,7 @@ def _types(letters: str) -> list[str]:
 
 def _renamed(source: str, name: str) -> str:
     """Return the text of another robot file with the name exchanged."""
-    [spec] = load_all([source])
+    spec = load_one(source)
     original = "" if spec.source_file is None else spec.source_file.text
     text, count = re.subn(r"^(name:[ \t]*)([\w-]+|'[\w-]+'|\"[\w-]+\")", rf"\g<1>{name}", original, flags=re.M)
     if count != 1:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import QuietOption, RobotArgument, build_all, named_values
+from dh2sim.cli.common import QuietOption, RobotArgument, build_serial, named_values
 from dh2sim.cli.output import json_text, progress_bar, table_lines
 from dh2sim.errors import Dh2simError
 from dh2sim.messages import counted, printable
@@ -78,7 +78,7 @@ def sweep(
     """
     if not vary and designs is None:
         raise Dh2simError("there is nothing to vary: give --vary or --designs")
-    model = build_all([robot])[0]
+    model = build_serial(robot)
     from dh2sim.robot_facade import Robot
     from dh2sim.simulate.designs import read_design_table
     from dh2sim.sweep.sweep import DEFAULT_COUNT, measure_designs, prepare_task

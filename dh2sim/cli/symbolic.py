@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import ForceOption, RobotArgument, choice, load_all, refuse_options
+from dh2sim.cli.common import ForceOption, RobotArgument, choice, load_one, refuse_options
 from dh2sim.cli.output import hand_over, json_text, require_free
 from dh2sim.cli.symbolic_code import LANGUAGES, is_about_code, print_code
 from dh2sim.codegen.program import What as CodeWhat
@@ -102,7 +102,7 @@ def symbolic(
     elif wanted is What.DYNAMICS:
         refuse_options("--what dynamics", frames | nesting)
     require_free(out, force=force)
-    [spec] = load_all([robot])
+    spec = load_one(robot)
     bodies = None
     if wanted is What.DYNAMICS:
         _require_few_joints(spec)

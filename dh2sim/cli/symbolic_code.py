@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from dh2sim.cli.common import choice, load_all
+from dh2sim.cli.common import choice, load_one
 from dh2sim.cli.output import hand_over, require_free
 from dh2sim.codegen.languages import Language
 from dh2sim.codegen.program import What
@@ -43,7 +43,7 @@ def print_code(robot: str, what: str, as_: str, out: Path | None, *, force: bool
 
     wanted = [choice(word.strip(), What, "--what") for word in what.split(",")]
     require_free(out, force=force)
-    [spec] = load_all([robot])
+    spec = load_one(robot)
     about = ", ".join(word for word in wanted if word is not None)
     if as_.lower() in LANGUAGES:
         # MATLAB calls a function by the name of its file

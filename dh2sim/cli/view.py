@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, StrictOption, load_all, report_slips
+from dh2sim.cli.common import RobotArgument, StrictOption, load_one, report_slips
 from dh2sim.cli.output import require_free
 from dh2sim.messages import printable
 
@@ -86,7 +86,7 @@ def view(
     if export is not None and export.suffix.lower() not in (".html", ".htm"):
         raise typer.BadParameter(f"must be a file that ends in .html, got {str(export)!r}", param_hint="--export")
     require_free(export, force=force)
-    [spec] = load_all([robot])
+    spec = load_one(robot)
     if spec.is_mechanism:
         names = _host_names(allow_host or [])
         _view_mechanism(spec, run, rollout, export, host=host, allow_hosts=names, port=port, browser=browser)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import JsonOption, QuietOption, RobotArgument, build_all
+from dh2sim.cli.common import JsonOption, QuietOption, RobotArgument, build_serial
 from dh2sim.cli.output import json_text, progress_bar, table_lines, wrapped
 from dh2sim.errors import OutputError
 from dh2sim.files import require_folder
@@ -81,7 +81,7 @@ def workspace(
     if orientations is not None and not dexterity:
         raise typer.BadParameter("needs --dexterity", param_hint="--orientations")
     picture = _require_file(out)
-    [model] = build_all([robot])
+    model = build_serial(robot)
 
     from dh2sim.workspace.workspace import ORIENTATIONS, compute_workspace
 

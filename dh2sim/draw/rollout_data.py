@@ -93,11 +93,8 @@ def open_rollout(path: Path, number: int) -> RolloutData:
     """
     from dh2sim.simulate.store.reader import open_dataset, reading
 
-    with open_dataset(path) as run:
-        _check_number(run, number, path.absolute().name)
-        with reading(path):
-            data = run.isel(rollout=number).load()
-    return _rollout_data(data, number, path.absolute().name)
+    with open_dataset(path) as run, reading(path):
+        return select_rollout(run, number, path.absolute().name)
 
 
 def select_rollout(run: Dataset, number: int, name: str) -> RolloutData:
@@ -111,18 +108,11 @@ def select_rollout(run: Dataset, number: int, name: str) -> RolloutData:
     Raises:
         PictureError: the run has no such rollout, or it has not been run.
     """
-    _check_number(run, number, name)
-    return _rollout_data(run.isel(rollout=number).load(), number, name)
-
-
-def _check_number(run: Dataset, number: int, name: str) -> None:
     count = int(run.sizes["rollout"])
     if not 0 <= number < count:
         allowed = "rollout 0 only" if count == 1 else f"rollouts 0 to {count - 1}"
         raise PictureError(f"{name} has no rollout {number}; it contains {allowed}")
-
-
-def _rollout_data(data: Dataset, number: int, name: str) -> RolloutData:
+    data = run.isel(rollout=number).load()
     status = int(data["status"]) if "status" in data else FINISHED
     if status == NOT_RUN:
         raise PictureError(

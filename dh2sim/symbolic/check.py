@@ -38,9 +38,7 @@ def scattered(count: int, dimensions: int, seed: int = 0) -> Array:
 class SampledConfigurations:
     """Random configurations of a robot, and what atoms and frames are there."""
 
-    def __init__(
-        self, table: SymbolicTable, samples: int = SAMPLES, seed: int = 0, *, q: Array | None = None
-    ) -> None:
+    def __init__(self, table: SymbolicTable, *, seed: int = 0, q: Array | None = None) -> None:
         """``q`` are configurations to take instead, rad and m, shape (samples, n)."""
         self.table = table
         spec = table.spec
@@ -50,7 +48,7 @@ class SampledConfigurations:
         lengths += [abs(v) for pose in (spec.base.pose, spec.tool.pose) for v in pose.xyz.tolist()]
         self.reach = max(math.fsum(lengths), self._metre)
         """Sum of the lengths of the table, m, and how far slides are moved."""
-        shares = 2.0 * scattered(samples, len(rows), seed) - 1.0
+        shares = 2.0 * scattered(SAMPLES, len(rows), seed) - 1.0
         scale = np.array([math.pi if row.type.turns else self.reach for row in rows])
         self.q: Array = shares * scale if q is None else q
         """rad and m, shape (samples, n)."""

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from dh2sim.symbolic.angles import Angle, rate_row, slide_row, trig_of
-from dh2sim.symbolic.expression import Sum
 from dh2sim.symbolic.form import Condition, Equation, Form, moving_angles, used_letters
 from dh2sim.symbolic.notation import decimal, is_long_run, is_simple_quotient, written
 from dh2sim.symbolic.polynomial import Atom, Rational, magnitude
@@ -103,23 +102,25 @@ class TextNotation:
         return f"({text})"
 
 
-def form_text(form: Form, width: int = WIDTH) -> str:
-    """Return a form as text that is at most ``width`` characters wide; what has no sum to wrap at may be wider."""
+def form_text(form: Form) -> str:
+    """Return a form as text that is at most ``WIDTH`` characters wide; what has no sum to wrap at may be wider."""
     notation = TextNotation(form.table, form.joint_names)
-    blocks = ["\n".join(_equation_lines(equation, notation, width)) for equation in form.equations]
+    blocks = ["\n".join(_equation_lines(equation, notation)) for equation in form.equations]
     if form.named:
-        lines = [line for name, sum_ in form.named.items() for line in _assignment(name, sum_, notation, width)]
+        lines = [
+            line for name, sum_ in form.named.items() for line in _wrapped(f"{name} = ", written(sum_, notation))
+        ]
         blocks.append("\n".join(["with", *lines]))
-    legend = "\n".join(legend_lines(form, notation, width))
+    legend = "\n".join(_legend_lines(form, notation))
     if legend:
         blocks.append(legend)
     if form.conditions:
-        blocks.insert(len(form.equations), "\n".join(_condition_lines(form.conditions, notation, width)))
-    blocks += ["\n".join(_filled(note, width)) for note in form.notes]
+        blocks.insert(len(form.equations), "\n".join(_condition_lines(form.conditions, notation)))
+    blocks += [textwrap.fill(note, WIDTH, break_long_words=False, break_on_hyphens=False) for note in form.notes]
     return "\n\n".join(blocks)
 
 
-def legend_lines(form: Form, notation: TextNotation, width: int = WIDTH) -> Iterator[str]:
+def _legend_lines(form: Form, notation: TextNotation) -> Iterator[str]:
     """Yield lines that say what cosines, coordinates and letters mean."""
     atoms = form.atoms
     moving = moving_angles(atoms)
@@ -140,7 +141,7 @@ def legend_lines(form: Form, notation: TextNotation, width: int = WIDTH) -> Iter
         name = notation.coordinate(rates[0], turns=form.table.spec.rows[rates[0] - 1].type.turns)
         items.append(f"d{name}: velocity of {name}")
     items += [text for letter in used_letters(form.table, atoms) if (text := letter_text(letter, form.table))]
-    yield from _listed(items, width)
+    yield from _listed(items)
 
 
 def letter_text(letter: Letter, table: SymbolicTable) -> str:
@@ -154,12 +155,12 @@ def letter_text(letter: Letter, table: SymbolicTable) -> str:
     return f"{letter.name}{definition} = {letter.value:.12g}{unit}"
 
 
-def _condition_lines(conditions: Sequence[Condition], notation: TextNotation, width: int) -> Iterator[str]:
+def _condition_lines(conditions: Sequence[Condition], notation: TextNotation) -> Iterator[str]:
     yield "singular where"
     for condition in conditions:
         text = f"{written(condition.expression, notation)} = 0"
         details = condition_text(condition, notation)
-        yield from _wrapped("", f"{text}{details}", width)
+        yield from _wrapped("", f"{text}{details}")
 
 
 def condition_text(condition: Condition, notation: TextNotation) -> str:
@@ -173,14 +174,14 @@ def condition_text(condition: Condition, notation: TextNotation) -> str:
     return text
 
 
-def _equation_lines(equation: Equation, notation: TextNotation, width: int) -> Iterator[str]:
+def _equation_lines(equation: Equation, notation: TextNotation) -> Iterator[str]:
     """Yield a heading and a matrix, or an equation for each entry."""
     cells = [[written(entry, notation) for entry in row] for row in equation.entries]
     if not equation.entry_names:
-        yield from _wrapped(f"{equation.name} = ", cells[0][0], width, indent="")
+        yield from _wrapped(f"{equation.name} = ", cells[0][0], indent="")
         return
     yield f"{equation.name} =" if not equation.meaning else f"{equation.name}, {equation.meaning}"
-    grid = matrix_lines(cells, width)
+    grid = _matrix_lines(cells)
     if grid is not None:
         yield from grid
         return
@@ -190,15 +191,15 @@ def _equation_lines(equation: Equation, notation: TextNotation, width: int) -> I
         for name, cell in zip(names, row, strict=True):
             if not name or (zeros and cell == "0"):
                 continue
-            yield from _wrapped(f"{name:{label}} = ", cell, width)
+            yield from _wrapped(f"{name:{label}} = ", cell)
     if zeros:
         yield "  and all other entries are 0"
 
 
-def matrix_lines(cells: Sequence[Sequence[str]], width: int) -> list[str] | None:
+def _matrix_lines(cells: Sequence[Sequence[str]]) -> list[str] | None:
     """Return a matrix in columns, entries wrapped between terms; None where it would not fit or be too tall."""
     columns = list(zip(*cells, strict=True))
-    room = width - 6 - 3 * (len(columns) - 1)
+    room = WIDTH - 6 - 3 * (len(columns) - 1)
     least = [max(max(map(len, pieces(cell))) for cell in column) for column in columns]
     whole = [max(map(len, column)) for column in columns]
     if sum(least) > room:
@@ -257,32 +258,24 @@ def _cut(term: str, width: int) -> list[str]:
     return lines
 
 
-def _assignment(name: str, sum_: Sum, notation: TextNotation, width: int) -> Iterator[str]:
-    yield from _wrapped(f"{name} = ", written(sum_, notation), width)
-
-
-def _wrapped(head: str, text: str, width: int, indent: str = "  ") -> Iterator[str]:
+def _wrapped(head: str, text: str, indent: str = "  ") -> Iterator[str]:
     """Yield an assignment in lines, cut between terms."""
-    first, *rest = _filled_cell(text, width - len(indent) - len(head))
+    first, *rest = _filled_cell(text, WIDTH - len(indent) - len(head))
     yield f"{indent}{head}{first}"
     for line in rest:
         yield " " * (len(indent) + len(head)) + line
 
 
-def _listed(items: Sequence[str], width: int) -> Iterator[str]:
+def _listed(items: Sequence[str]) -> Iterator[str]:
     """Yield items in lines, separated by commas and broken between them; what is longer than a line is wrapped."""
     line = ""
     for item in items:
-        if line and len(line) + len(item) + 3 > width:
+        if line and len(line) + len(item) + 3 > WIDTH:
             yield line + ","
             line = ""
-        if len(item) >= width:
-            *whole, item = textwrap.wrap(item, width - 1, subsequent_indent="  ", break_on_hyphens=False)
+        if len(item) >= WIDTH:
+            *whole, item = textwrap.wrap(item, WIDTH - 1, subsequent_indent="  ", break_on_hyphens=False)
             yield from whole
         line += f", {item}" if line else item
     if line:
         yield line
-
-
-def _filled(text: str, width: int) -> list[str]:
-    return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False)
