@@ -11,8 +11,12 @@ Array: TypeAlias = NDArray[np.float64]
 """An array of doubles; the docstring of whatever carries it gives its shape."""
 
 
+Point: TypeAlias = tuple[float, float, float]
+"""x, y, z: for sums in plain arithmetic, where an array a point would be slow."""
+
+
 def read_only(values: object) -> Array:
     """Return a copy of ``values`` as doubles that nobody can write to."""
-    array = np.array(values, dtype=np.float64)
+    array = np.array(values, np.float64)
     array.setflags(write=False)
     return array

@@ -107,7 +107,7 @@ def _links(model: RobotModel, mechanism: Mechanism) -> list[_Link]:
 
 def _about_origin(body: MassProperties) -> _Link:
     com = body.com.tolist()
-    inertia = shifted_inertia(body.inertia, body.mass, com)
+    inertia = shifted_inertia(body.inertia.tolist(), body.mass, com)
     return _Link(body.mass, [body.mass * value for value in com], inertia)
 
 

@@ -43,8 +43,10 @@ def numbers(values: Iterable[float]) -> str:
 
 
 def child(parent: ET.Element, tag: str, **attributes: str) -> ET.Element:
-    """Append an element; an attribute name that is a Python keyword is given with a trailing underscore."""
-    return ET.SubElement(parent, tag, {name.rstrip("_"): value for name, value in attributes.items()})
+    """Append an element; its attribute ``class``, a keyword of Python's, is given as ``class_``."""
+    if "class_" in attributes:
+        attributes = {name.rstrip("_"): value for name, value in attributes.items()}
+    return ET.SubElement(parent, tag, attributes)
 
 
 def document(root: ET.Element, header: Iterable[str]) -> str:
@@ -61,18 +63,18 @@ def document(root: ET.Element, header: Iterable[str]) -> str:
 
 def _serialise(element: ET.Element, indent: str, parents: tuple[ET.Element, ...], lines: list[str]) -> None:
     """Append the lines of an element: the bytes of ElementTree, sooner, as there are no namespaces and texts."""
-    texts = []
+    start = f"{indent}<{element.tag}"
     for name, text in element.attrib.items():
         if text.__class__ is _NotFinite:
             raise NotFiniteError(f"{_path((*parents, element))}.{name}", text)
-        texts.append(f' {name}="{text.translate(_ESCAPED) if _special(text) else text}"')
-    start = f"{indent}<{element.tag}{''.join(texts)}"
+        start += f' {name}="{text.translate(_ESCAPED) if _special(text) else text}"'
     if not len(element):
         lines.append(f"{start} />\n")
         return
     lines.append(f"{start}>\n")
+    parents, deeper = (*parents, element), f"{indent}  "
     for inner in element:
-        _serialise(inner, f"{indent}  ", (*parents, element), lines)
+        _serialise(inner, deeper, parents, lines)
     lines.append(f"{indent}</{element.tag}>\n")
 
 

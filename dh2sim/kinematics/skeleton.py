@@ -20,10 +20,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from dh2sim.kinematics.chain import Joint, KinematicChain
-from dh2sim.kinematics.transforms import compose
+from dh2sim.kinematics.chain import KinematicChain
+from dh2sim.kinematics.transforms import Rows, compose
 from dh2sim.robot.spec import JointType
-from dh2sim.typing import Array, read_only
+from dh2sim.typing import Point
 
 Travel = tuple[float, float]
 """Lowest and highest displacement of a joint along its frame's +z, m; (0, 0) of one that does not slide."""
@@ -41,24 +41,24 @@ WEAKEST = 1e-3
 class Skeleton:
     """Where links meet; joint i counts from 0, link 0 is base_link, link i + 1 is moved by joint i."""
 
-    entries: tuple[Array, ...] = field(repr=False)
-    """The point of axis i where link i arrives, in the frame of link i with all coordinates zero, m, shape (3,)."""
+    entries: tuple[Point, ...] = field(repr=False)
+    """The point of axis i where link i arrives, in the frame of link i with all coordinates zero, m."""
     entry_heights: tuple[float, ...]
     """The same along z of joint frame i at zero, m."""
     exit_heights: tuple[float, ...]
     """The point of axis i where link i + 1 leaves, along its own z, m."""
-    arrivals: tuple[Array, ...] = field(repr=False)
-    """The point where link i + 1 leaves axis i, in the frame of link i with all coordinates zero, m, shape (3,)."""
-    tip: Array = field(repr=False)
-    """tool0 in the last link's frame, m, shape (3,)."""
+    arrivals: tuple[Point, ...] = field(repr=False)
+    """The point where link i + 1 leaves axis i, in the frame of link i with all coordinates zero, m."""
+    tip: Point = field(repr=False)
+    """tool0 in the last link's frame, m."""
     slides: tuple[Travel | None, ...]
     """Travels along the axes, m; None where a joint does not slide."""
-    directions: tuple[Array, ...] = field(repr=False)
-    """Of axis i in the frame of link i with all coordinates zero, shape (3,)."""
+    directions: tuple[Point, ...] = field(repr=False)
+    """Of axis i in the frame of link i with all coordinates zero, unit vectors."""
 
-    def leaving(self, link: int) -> Array:
-        """Return the point where a link begins, in its frame, m, shape (3,): base_link's origin, or on its axis."""
-        return read_only([0.0, 0.0, 0.0 if link == 0 else self.exit_heights[link - 1]])
+    def leaving(self, link: int) -> Point:
+        """Return the point where a link begins, in its frame, m: base_link's origin, or on its axis."""
+        return 0.0, 0.0, 0.0 if link == 0 else self.exit_heights[link - 1]
 
     @property
     def steps(self) -> tuple[float, ...]:
@@ -87,14 +87,13 @@ class Skeleton:
             weights = [1.0 / max(length, WEAKEST * total) for length in lengths]
         return shortest + fixed
 
-    def _span(self, link: int) -> list[float]:
+    def _span(self, link: int) -> Point:
         """Return the vector across a link, from where it begins to where it ends."""
-        start = self.leaving(link).tolist()
         if link == len(self.entries):
-            end = self.tip
+            x, y, z = self.tip
         else:
-            end = self.arrivals[link] if self.slides[link] is None else self.entries[link]
-        return [b - a for a, b in zip(start, end.tolist(), strict=True)]
+            x, y, z = self.arrivals[link] if self.slides[link] is None else self.entries[link]
+        return x, y, z - self.leaving(link)[2]
 
     def _slide(self, joint: int) -> float:
         """Return the greatest distance from entry to exit of a slide, 0 of a joint that does not slide."""
@@ -104,14 +103,14 @@ class Skeleton:
         along = self.exit_heights[joint] - self.entry_heights[joint]
         return max(abs(along + slide[0]), abs(along + slide[1]))
 
-    def _pulled(self, spans: Sequence[Sequence[float]], weights: Sequence[float]) -> list[list[float]]:
+    def _pulled(self, spans: Sequence[Point], weights: Sequence[float]) -> list[Point]:
         """Return the spans when the points that no slide holds have moved along their axes to the least energy."""
         n = len(self.entries)
         free = [slide is None for slide in self.slides]
         diagonal, beside, right = [0.0] * n, [0.0] * n, [0.0] * n
         for k, (c, w) in enumerate(zip(spans, weights, strict=True)):
             if k < n and free[k]:
-                z = self.directions[k].tolist()
+                z = self.directions[k]
                 diagonal[k] += w
                 right[k] -= w * (c[0] * z[0] + c[1] * z[1] + c[2] * z[2])
                 if k > 0 and free[k - 1]:
@@ -120,12 +119,12 @@ class Skeleton:
                 diagonal[k - 1] += w
                 right[k - 1] += w * c[2]
         shifts = _tridiagonal([d or 1.0 for d in diagonal], beside, right)
-        moved = []
-        for k, c in enumerate(spans):
-            ahead = [shifts[k] * float(x) for x in self.directions[k]] if k < n else [0.0, 0.0, 0.0]
-            back = shifts[k - 1] if k > 0 else 0.0
-            moved.append([c[0] + ahead[0], c[1] + ahead[1], c[2] + ahead[2] - back])
-        return moved
+        ahead, back = [*shifts, 0.0], [0.0, *shifts]
+        along = (*self.directions, (0.0, 0.0, 0.0))
+        return [
+            (x + by * u, y + by * v, z + by * w - less)
+            for (x, y, z), by, less, (u, v, w) in zip(spans, ahead, back, along, strict=True)
+        ]
 
     @property
     def segments(self) -> tuple[float, ...]:
@@ -151,19 +150,20 @@ def build_skeleton(chain: KinematicChain, travels: Sequence[Travel]) -> Skeleton
         The points; the same to within rounding for every table of the same arm.
     """
     joints = chain.joints
-    tip = read_only(compose(joints[-1].T_joint_dh, chain.T_dhn_tool0)[:3, 3])
+    x, y, z = compose(joints[-1].T_joint_dh, chain.T_dhn_tool0)[:3, 3].tolist()
+    tip = point = (x, y, z)
     exits, arrivals = [0.0] * len(joints), [tip] * len(joints)
-    point = tip
+    poses = [joint.T_parent_joint.tolist() for joint in joints]
     for i in reversed(range(len(joints))):
-        exits[i] = float(point[2])
-        held = exits[i] + (_guide(travels[i]) if joints[i].type is JointType.PRISMATIC else 0.0)
-        point = _on_axis(joints[i], held)
-        arrivals[i] = _on_axis(joints[i], exits[i])
+        exits[i] = point[2]
+        point = arrivals[i] = _on_axis(poses[i], exits[i])
+        if joints[i].type is JointType.PRISMATIC:
+            point = _on_axis(poses[i], exits[i] + _guide(travels[i]))
     starts = [0.0, *exits[:-1]]
-    entry_heights = [_height(joint, [0.0, 0.0, start]) for joint, start in zip(joints, starts, strict=True)]
+    entry_heights = [_height(T, (0.0, 0.0, start)) for T, start in zip(poses, starts, strict=True)]
     return Skeleton(
-        directions=tuple(read_only(joint.T_parent_joint[:3, 2]) for joint in joints),
-        entries=tuple(_on_axis(joint, height) for joint, height in zip(joints, entry_heights, strict=True)),
+        directions=tuple((a[2], b[2], c[2]) for a, b, c, _ in poses),
+        entries=tuple(_on_axis(T, height) for T, height in zip(poses, entry_heights, strict=True)),
         entry_heights=tuple(entry_heights),
         exit_heights=tuple(exits),
         arrivals=tuple(arrivals),
@@ -198,13 +198,12 @@ def _guide(travel: Travel) -> float:
     return min(max(0.0, low), high) - SLIDE_MARGIN * (low + high)
 
 
-def _on_axis(joint: Joint, height: float) -> Array:
-    """Return the point at a height, m, on a joint's axis, in the frame of its parent."""
-    T = joint.T_parent_joint.tolist()
-    return read_only([row[3] + height * row[2] for row in T[:3]])
+def _on_axis(T: Rows, height: float) -> Point:
+    """Return the point at a height, m, on the axis of a joint of this pose in its parent, in the parent's frame."""
+    (_, _, a, x), (_, _, b, y), (_, _, c, z), _ = T
+    return x + height * a, y + height * b, z + height * c
 
 
-def _height(joint: Joint, point: Sequence[float]) -> float:
+def _height(T: Rows, point: Point) -> float:
     """Return where a point of the parent's frame is projected onto a joint's axis, m along z from its origin."""
-    T = joint.T_parent_joint.tolist()
-    return math.fsum(row[2] * (x - row[3]) for row, x in zip(T[:3], point, strict=True))
+    return math.fsum([row[2] * (x - row[3]) for row, x in zip(T[:3], point, strict=True)])

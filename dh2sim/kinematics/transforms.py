@@ -19,6 +19,8 @@ from dh2sim.kinematics.trig import atan2, sin_cos
 from dh2sim.robot.spec import Pose
 from dh2sim.typing import Array, read_only
 
+Rows: TypeAlias = Sequence[Sequence[float]]
+"""Of a matrix, as ``tolist`` gives them."""
 PoseLike: TypeAlias = Pose | ArrayLike
 """A pose; or a position, m, shape (3,); or a homogeneous transform, shape (4, 4)."""
 _RIGID = 1e-9
@@ -242,14 +244,22 @@ def rotate_tensor(T_a_b: Array, tensor: Array) -> Array:
     Returns:
         Exactly symmetric, shape (3, 3).
     """
-    R = [row[:3] for row in T_a_b.tolist()[:3]]
-    (a1, a2, a3), (b1, b2, b3), (c1, c2, c3) = tensor.tolist()
-    RA = [(x * a1 + y * b1 + z * c1, x * a2 + y * b2 + z * c2, x * a3 + y * b3 + z * c3) for x, y, z in R]
-    xx, xy, xz, yy, yz, zz = (
-        RA[i][0] * R[j][0] + RA[i][1] * R[j][1] + RA[i][2] * R[j][2] + 0.0
-        for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-    )
-    return read_only([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return read_only(rotated_tensor(T_a_b.tolist(), tensor.tolist()))
+
+
+def rotated_tensor(T_a_b: Rows, tensor: Rows) -> list[list[float]]:
+    """Return what :func:`rotate_tensor` does, of rows of numbers: for sums in which an array a term would be slow."""
+    (x1, y1, z1, *_), (x2, y2, z2, *_), (x3, y3, z3, *_), *_ = T_a_b
+    (a1, a2, a3), (b1, b2, b3), (c1, c2, c3) = tensor
+    u, v, w = x1 * a1 + y1 * b1 + z1 * c1, x1 * a2 + y1 * b2 + z1 * c2, x1 * a3 + y1 * b3 + z1 * c3
+    xx = u * x1 + v * y1 + w * z1 + 0.0
+    xy = u * x2 + v * y2 + w * z2 + 0.0
+    xz = u * x3 + v * y3 + w * z3 + 0.0
+    u, v, w = x2 * a1 + y2 * b1 + z2 * c1, x2 * a2 + y2 * b2 + z2 * c2, x2 * a3 + y2 * b3 + z2 * c3
+    yy = u * x2 + v * y2 + w * z2 + 0.0
+    yz = u * x3 + v * y3 + w * z3 + 0.0
+    u, v, w = x3 * a1 + y3 * b1 + z3 * c1, x3 * a2 + y3 * b2 + z3 * c2, x3 * a3 + y3 * b3 + z3 * c3
+    return [[xx, xy, xz], [xy, yy, yz], [xz, yz, u * x3 + v * y3 + w * z3 + 0.0]]
 
 
 _BLOCK = 2048

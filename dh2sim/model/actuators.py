@@ -14,7 +14,8 @@ import numpy as np
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import reference_joint_frames, reference_joint_poses
-from dh2sim.model.mass import MassProperties, in_frame, shifted_inertia
+from dh2sim.kinematics.transforms import Rows, move_point, rotated_tensor
+from dh2sim.model.mass import MassProperties, shifted_inertia
 from dh2sim.model.shapes import neat
 from dh2sim.robot.spec import ActuatorSpec, ActuatorType, JointType
 from dh2sim.typing import Array
@@ -72,34 +73,32 @@ def seen_inertias(chain: KinematicChain, bodies: Sequence[MassProperties | None]
         m values, kg·m² or kg; a joint that carries nothing sees 0.
     """
     poses = reference_joint_poses(chain, q)
-    placed = _outboard(poses, bodies)
+    placed = [_placed(T, body) for T, body in zip(poses, bodies, strict=True)]
     seen = []
     for i, joint in enumerate(chain.joints):
         if not joint.type.moves:
             continue
         carried = [body for body in placed[i:] if body is not None]
         if joint.type.turns:
-            axis, origin = poses[i][:3, 2:].T.tolist()
+            (a, ox), (b, oy), (c, oz) = poses[i][:3, 2:].tolist()
             terms = []
-            for body in carried:
-                x, y, z = body.com.tolist()
-                x, y, z = x - origin[0], y - origin[1], z - origin[2]
-                along = _dot((x, y, z), axis)  # of no account, and much where a frame is far along its axis
-                arm = [x - along * axis[0], y - along * axis[1], z - along * axis[2]]
-                about = shifted_inertia(body.inertia, body.mass, arm)
-                terms.append(_dot(axis, [_dot(row, axis) for row in about]))
+            for mass, (x, y, z), inertia in carried:
+                x, y, z = x - ox, y - oy, z - oz
+                along = x * a + y * b + z * c  # of no account, and much where a frame is far along its axis
+                about = shifted_inertia(inertia, mass, (x - along * a, y - along * b, z - along * c))
+                u, v, w = [xx * a + xy * b + xz * c for xx, xy, xz in about]
+                terms.append(a * u + b * v + c * w)
         else:
-            terms = [body.mass for body in carried]
+            terms = [mass for mass, _, _ in carried]
         seen.append(math.fsum(terms))
     return tuple(seen)
 
 
-def _outboard(poses: Sequence[Array], bodies: Sequence[MassProperties | None]) -> list[MassProperties | None]:
-    return [None if body is None else in_frame(T, body) for T, body in zip(poses, bodies, strict=True)]
-
-
-def _dot(a: Sequence[float], b: Sequence[float]) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def _placed(T: Array, body: MassProperties | None) -> tuple[float, Sequence[float], Rows] | None:
+    """Return mass, centre of mass and inertia of a body in the frame in which its own has pose ``T``."""
+    if body is None:
+        return None
+    return body.mass, move_point(T, body.com), rotated_tensor(T.tolist(), body.inertia.tolist())
 
 
 ASSUMED_BANDWIDTH = 100.0

@@ -23,7 +23,7 @@ from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel, c
 from dh2sim.model.shapes import Shape, given_shape, placed
 from dh2sim.robot.read import place_in
 from dh2sim.robot.spec import LinkSpec, RobotSpec, Row
-from dh2sim.typing import Array, read_only
+from dh2sim.typing import Array, Point, read_only
 
 PALETTE: tuple[Color, ...] = (
     (0.90, 0.45, 0.13, 1.0),
@@ -82,7 +82,8 @@ def build_model(spec: SpecLike) -> RobotModel:
     skeleton = build_skeleton(chain, travels)
     length = arm_length(skeleton)
     radii = link_radii(length, [row.link.radius for row in spec.rows])
-    drawn = build_skeleton(replace(chain, T_dhn_tool0=_tool_start(spec, chain)), travels)
+    start = _drawn_tool(spec)
+    drawn = skeleton if start is None else build_skeleton(replace(chain, T_dhn_tool0=start), travels)
     shapes = lay_out(chain, drawn, radii, length)
     links = tuple(
         _link(row, joint, own, skeleton.leaving(i), i)
@@ -101,8 +102,8 @@ def build_model(spec: SpecLike) -> RobotModel:
     last = chain.joints[-1]
     bodies = carrying([link.inertial for link in links], None if tool is None else tool.inertial, last)
     home = spec.named_configurations["home"]
-    zero = np.zeros_like(home)
     _check_carried(spec, bodies)
+    at = [np.zeros_like(home), home] if home.any() else [home]
     names = [base.name, *(link.name for link in links), *([] if tool is None else [tool.name])]
     payload = _payload(spec, chain, math.fsum(body.mass for body in bodies if body is not None))
     loaded = carrying(bodies, payload, last)
@@ -133,7 +134,7 @@ def build_model(spec: SpecLike) -> RobotModel:
         tool=tool,
         payload=payload,
         joints=tuple(joints),
-        excluded=excluded_pairs(chain, names, (*shapes, *_tool_shapes(tool, chain)), (zero, home)),
+        excluded=excluded_pairs(chain, names, (*shapes, *_tool_shapes(tool, chain)), at),
         reach=reach_bound(skeleton),
         extent=frame_extent(chain, travels),
         home=home,
@@ -167,10 +168,10 @@ def _payload(spec: RobotSpec, chain: KinematicChain, moving_mass: float) -> Mass
     return replace(ball(mass, radius), com=read_only(before_tool0 if spec.payload.com is None else spec.payload.com))
 
 
-def _tool_start(spec: RobotSpec, chain: KinematicChain) -> Array:
-    """Return the pose in DH frame n that the last link reaches to: tool0, or a tool that is drawn by itself."""
+def _drawn_tool(spec: RobotSpec) -> Array | None:
+    """Return the pose in DH frame n of a tool that is drawn by itself: the last link reaches there, not to tool0."""
     drawn = spec.tool.shape or spec.tool.mesh
-    return chain.T_dhn_tool0 if drawn is None else pose_from_rpy(drawn.pose.xyz, drawn.pose.rpy)
+    return None if drawn is None else pose_from_rpy(drawn.pose.xyz, drawn.pose.rpy)
 
 
 def _tool_shapes(tool: LinkModel | None, chain: KinematicChain) -> list[tuple[Shape, ...]]:
@@ -188,7 +189,7 @@ def _tool(spec: RobotSpec, chain: KinematicChain) -> LinkModel | None:
         mass = tool.mass or 0.0
         com = read_only(chain.T_dhn_tool0[:3, 3]) if tool.com is None else tool.com
         assumed = replace(assumed, mass=mass, com=com, radius=ball_radius(mass))
-    inertial, _ = link_inertial(assumed, identity(), shapes, read_only([0, 0, 0]))
+    inertial, _ = link_inertial(assumed, identity(), shapes, (0.0, 0.0, 0.0))
     estimated = tuple(name for name in ("mass", "com", "inertia") if inertial and getattr(tool, name) is None)
     return LinkModel(
         name="tool",
@@ -201,7 +202,7 @@ def _tool(spec: RobotSpec, chain: KinematicChain) -> LinkModel | None:
     )
 
 
-def _link(row: Row, joint: Joint, shapes: tuple[Shape, ...], anchor: Array, i: int) -> LinkModel:
+def _link(row: Row, joint: Joint, shapes: tuple[Shape, ...], anchor: Point, i: int) -> LinkModel:
     name = f"link_{i}"
     inertial, estimated = link_inertial(row.link, joint.T_joint_dh, shapes, anchor)
     return LinkModel(

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import reference_joint_poses
@@ -80,7 +82,7 @@ def _overlapping(
     centres = np.array([shape.T_link_shape for _, shape in solid])
     half = np.array([[0.5 * shape.length] for _, shape in solid]) * centres[:, :3, 2]
     x, y, z = np.stack([centres[:, :3, 3] - half, centres[:, :3, 3] + half]).transpose(2, 0, 1)[:, :, None, :, None]
-    k, other = np.triu_indices(len(solid), 1)
+    k, other = _pairs_of(len(solid))
     apart = link[k] != link[other]
     k, other = k[apart], other[apart]
     poses = np.array([[identity(), *reference_joint_poses(chain, q)] for q in configurations])
@@ -91,6 +93,11 @@ def _overlapping(
     touching = near.any(axis=0)
     result[link[k[touching]], link[other[touching]]] = True
     return result | result.T
+
+
+@lru_cache(maxsize=64)  # robots that differ in lengths have as many shapes
+def _pairs_of(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    return np.triu_indices(count, 1)
 
 
 def segment_distance(a: Array, b: Array, starts: Array, ends: Array) -> Array:

@@ -18,7 +18,7 @@ from dh2sim.kinematics.skeleton import Skeleton
 from dh2sim.model.limits import NO_LENGTH
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart, between, neat
 from dh2sim.robot.spec import JointType
-from dh2sim.typing import Array, read_only
+from dh2sim.typing import Array, Point
 
 NEGLIGIBLE = 1e-6
 """Segments shorter than this share of the arm's length get no shape."""
@@ -81,8 +81,8 @@ def lay_out(
         on_rail = slides and (i == 0 or _on_mast(T, skeleton, i, shortest))
         end = _point(T, entry if slides else meetings[i])
         if i == 0:
-            heights = [float(_point(T, leaving + slide)[2]) for slide in (low, high)]
-            lowest = min(heights) if slides else float(end[2])
+            heights = [_point(T, leaving + slide)[2] for slide in (low, high)]
+            lowest = min(heights) if slides else end[2]
             parent += _base(r, _upright_half(T, own), lowest, end, _hangs(heights, T, own), shortest)
         else:
             parent += _tubes([begin, skeleton.leaving(i), skeleton.entries[i], end], TUBE * r, shortest)
@@ -96,7 +96,7 @@ def lay_out(
             child.append(_on_axis(None, ShapeKind.CYLINDER, ShapePart.LINK, 0.6 * own, *rod))
         elif joint.type.turns:
             child += _housing(own, meetings[i], HOUSING)
-        begin = skeleton.leaving(i + 1) if slides else read_only([0.0, 0.0, meetings[i]])
+        begin = skeleton.leaving(i + 1) if slides else (0.0, 0.0, meetings[i])
     links[-1] += _tip([begin, skeleton.leaving(len(chain.joints)), skeleton.tip], radii[-1], shortest)
     return tuple(tuple(shapes) for shapes in links)
 
@@ -118,7 +118,7 @@ def _meetings(chain: KinematicChain, skeleton: Skeleton, radii: Sequence[float])
             middle = _first_meeting(chain, skeleton, radii, middle)
         elif i == len(chain.joints) - 1 and chain.joints[i - 1].type.turns:
             clear = HOUSING * (radii[i] + 0.5 * radii[i + 1])
-            before = read_only([0.0, 0.0, heights[-1]])
+            before = (0.0, 0.0, heights[-1])
             if math.dist(before, skeleton.entries[i]) < 0.5 * clear and abs(leaving - entry) < 2.0 * clear:
                 ahead = leaving - entry if abs(leaving - entry) > NEGLIGIBLE * clear else joint.sign
                 middle = entry + math.copysign(clear, ahead)
@@ -135,10 +135,10 @@ def _first_meeting(chain: KinematicChain, skeleton: Skeleton, radii: Sequence[fl
         clear = HOUSING * (radii[1] + radii[2])
         height = 0.5 * (skeleton.entry_heights[1] + skeleton.exit_heights[1])
         beyond = _point(chain.joints[1].T_parent_joint, height)
-        if math.dist(beyond, [0.0, 0.0, middle]) < 0.5 * clear:
-            below = -clear if _hangs([float(_point(T, leaving)[2])], T, radii[1]) else clear
-            return float(beyond[2]) - math.copysign(1.0, up) * below
-    z, top = (float(_point(T, height)[2]) for height in (middle, leaving))
+        if math.dist(beyond, (0.0, 0.0, middle)) < 0.5 * clear:
+            below = -clear if _hangs([_point(T, leaving)[2]], T, radii[1]) else clear
+            return beyond[2] - math.copysign(1.0, up) * below
+    z, top = (_point(T, height)[2] for height in (middle, leaving))
     missing = _plate(radii[0]) + _upright_half(T, radii[1]) - z
     return middle + min(missing, top - z) / up if z >= 0.0 and missing > 0.0 and top > z else middle
 
@@ -148,7 +148,7 @@ def _hangs(heights: Sequence[float], T: Array, r: float) -> bool:
     return max(heights) < -_upright_half(T, r)
 
 
-def _base(r: float, half: float, lowest: float, end: Array, hangs: bool, shortest: float) -> list[Shape]:
+def _base(r: float, half: float, lowest: float, end: Point, hangs: bool, shortest: float) -> list[Shape]:
     """Return a plate, a column, and a bracket to the first housing where that is not above the plate.
 
     Args:
@@ -159,18 +159,18 @@ def _base(r: float, half: float, lowest: float, end: Array, hangs: bool, shortes
         hangs: Whether the plate is above the arm.
         shortest: Length of what is drawn, m.
     """
-    x, y, top = end.tolist()
+    x, y, top = end
     if hangs:
         side, z = -1.0, max(0.0, top + half + _plate(r))
     else:
         side, z = 1.0, min(0.0, lowest - half - _plate(r))
     thick = neat(0.3 * r)
-    column = read_only([0.0, 0.0, z + side * thick])
+    column = (0.0, 0.0, z + side * thick)
     shapes = [
-        _cylinder(ShapePart.JOINT, 1.9 * r, read_only([0.0, 0.0, z]), column),
-        _cylinder(ShapePart.LINK, 1.4 * r, column, read_only([0.0, 0.0, z + side * neat(0.6 * r)])),
+        _cylinder(ShapePart.JOINT, 1.9 * r, (0.0, 0.0, z), column),
+        _cylinder(ShapePart.LINK, 1.4 * r, column, (0.0, 0.0, z + side * neat(0.6 * r))),
     ]
-    corner = read_only([0.0, 0.0, top])
+    corner = (0.0, 0.0, top)
     if abs(top - column[2]) > shortest:
         shapes.append(_cylinder(ShapePart.LINK, 0.85 * r, column, corner))
     return shapes + _tubes([corner, end], TUBE * r, shortest) if math.hypot(x, y) > BEND * r else shapes
@@ -193,7 +193,7 @@ def _on_mast(T: Array, skeleton: Skeleton, i: int, shortest: float) -> bool:
     return across < NEGLIGIBLE and math.dist(skeleton.leaving(i), skeleton.entries[i]) < shortest
 
 
-def _tubes(path: Sequence[Array], r: float, shortest: float) -> list[Shape]:
+def _tubes(path: Sequence[Point], r: float, shortest: float) -> list[Shape]:
     """Return tubes along a path, with rounded corners; points close to one before or to the last are left out."""
     kept = [path[0]]
     for point in path[1:-1]:
@@ -201,10 +201,11 @@ def _tubes(path: Sequence[Array], r: float, shortest: float) -> list[Shape]:
             kept.append(point)
     if math.dist(kept[-1], path[-1]) > shortest:
         kept.append(path[-1])
-    return [between(ShapeKind.CAPSULE, ShapePart.LINK, neat(r), start, end) for start, end in pairwise(kept)]
+    radius = neat(r)
+    return [between(ShapeKind.CAPSULE, ShapePart.LINK, radius, start, end) for start, end in pairwise(kept)]
 
 
-def _tip(path: Sequence[Array], r: float, shortest: float) -> list[Shape]:
+def _tip(path: Sequence[Point], r: float, shortest: float) -> list[Shape]:
     """Return the tubes to tool0, and a flange at their end."""
     tubes = _tubes(path, 0.7 * r, shortest)
     housing = HOUSING * r
@@ -212,9 +213,9 @@ def _tip(path: Sequence[Array], r: float, shortest: float) -> list[Shape]:
         return tubes if math.dist(path[0], path[-1]) > housing else []
     start, end = (p.tolist() for p in tubes[-1].ends)
     share = min(1.0, 0.4 * r / tubes[-1].length)
-    inner = read_only([b + share * (a - b) for a, b in zip(start, end, strict=True)])
-    tubes[-1:] = [between(ShapeKind.CYLINDER, ShapePart.LINK, neat(0.7 * r), read_only(start), read_only(end))]
-    return [*tubes, _cylinder(ShapePart.TRIM, 0.9 * r, inner, read_only(end))]
+    inner = [b + share * (a - b) for a, b in zip(start, end, strict=True)]
+    tubes[-1:] = [between(ShapeKind.CYLINDER, ShapePart.LINK, neat(0.7 * r), start, end)]
+    return [*tubes, _cylinder(ShapePart.TRIM, 0.9 * r, inner, end)]
 
 
 def _housing(r: float, height: float, wide: float) -> list[Shape]:
@@ -234,18 +235,17 @@ def _sleeve(T: Array, r: float, height: float) -> list[Shape]:
     ]
 
 
-def _point(T: Array, height: float) -> Array:
+def _point(T: Array, height: float) -> Point:
     """Return the point at a height, m, on a joint's axis, in the frame of its parent."""
-    return read_only([float(T[k, 3]) + height * float(T[k, 2]) for k in range(3)])
+    (a, x), (b, y), (c, z) = T[:3, 2:].tolist()
+    return x + height * a, y + height * b, z + height * c
 
 
-def _cylinder(part: ShapePart, radius: float, start: Array, end: Array) -> Shape:
+def _cylinder(part: ShapePart, radius: float, start: Sequence[float], end: Sequence[float]) -> Shape:
     return between(ShapeKind.CYLINDER, part, neat(radius), start, end)
 
 
 def _on_axis(T: Array | None, kind: ShapeKind, part: ShapePart, radius: float, low: float, high: float) -> Shape:
     """Return a shape between two heights on the next joint's axis, or on the link's own if T is None."""
-    points = (
-        (read_only([0.0, 0.0, low]), read_only([0.0, 0.0, high])) if T is None else (_point(T, low), _point(T, high))
-    )
-    return between(kind, part, neat(radius), *points)
+    start, end = ((0.0, 0.0, low), (0.0, 0.0, high)) if T is None else (_point(T, low), _point(T, high))
+    return between(kind, part, neat(radius), start, end)

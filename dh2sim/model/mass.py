@@ -6,17 +6,17 @@ Everything is done in plain double arithmetic in a fixed order, so that every ma
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dh2sim.kinematics.transforms import move_point, rotate_tensor
+from dh2sim.kinematics.transforms import Rows, move_point, rotate_tensor, rotated_tensor
 from dh2sim.model.shapes import Shape, ShapeKind
 from dh2sim.robot.magnitudes import INERTIA
 from dh2sim.robot.parts import inertia_problem
 from dh2sim.robot.spec import LinkSpec
-from dh2sim.typing import Array, read_only
+from dh2sim.typing import Array, Point, read_only
 
 ROUNDING = (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """Shares of its trace by which an inertia may be mended: numbers in robot files are rounded."""
@@ -57,24 +57,24 @@ MuJoCo refuses moving bodies of less than 1e-15 kg, and in a URDF inertias of le
 """
 
 
-def of_shape(shape: Shape, density: float) -> MassProperties:
-    """Return the mass properties of a solid shape in its link's frame; ``density`` in kg/m³.
+def _solid(shape: Shape, density: float) -> tuple[float, Sequence[float], Rows]:
+    """Return mass, centre of mass and inertia of a solid shape in its link's frame; ``density`` in kg/m³.
 
     Cylinder: I_z = m r²/2, I_x = m (3 r² + l²)/12. The capsule adds two half balls of mass m_b = 2/3 π r³ ρ, whose
     centres of mass lie 3/8 r beyond the cylinder's ends: I_z += 2 · 2/5 m_b r²,
     I_x += 2 m_b (2/5 r² + l²/4 + 3/8 l r). Ball: 2/5 m r². Box: I_x = m (y² + z²)/12.
     (Beer & Johnston, Vector Mechanics, tables of inertia; parallel axes.)
     """
-    T, com = shape.T_link_shape, read_only(shape.T_link_shape[:3, 3])
+    r, length, T = shape.radius, shape.length, shape.T_link_shape.tolist()
+    com = [T[0][3], T[1][3], T[2][3]]
     if shape.size is not None:
         x, y, z = shape.size
         mass = density * x * y * z
-        moments = [mass * (u * u + v * v) / 12 for u, v in ((y, z), (x, z), (x, y))]
-        own = read_only([[moments[i] if i == j else 0.0 for j in range(3)] for i in range(3)])
-        return MassProperties(mass=mass, com=com, inertia=rotate_tensor(T, own))
-    r, length = shape.radius, shape.length
+        I_x, I_y, I_z = (mass * (u * u + v * v) / 12 for u, v in ((y, z), (x, z), (x, y)))
+        return mass, com, rotated_tensor(T, [[I_x, 0.0, 0.0], [0.0, I_y, 0.0], [0.0, 0.0, I_z]])
     if shape.kind is ShapeKind.SPHERE:
-        return replace(ball(density * 4 / 3 * math.pi * r * r * r, r), com=com)
+        mass = density * 4 / 3 * math.pi * r * r * r
+        return mass, com, ball(mass, r).inertia.tolist()
     mass = density * math.pi * r * r * length
     I_z = mass * r * r / 2
     I_x = mass * (3 * r * r + length * length) / 12
@@ -83,8 +83,7 @@ def of_shape(shape: Shape, density: float) -> MassProperties:
         I_z += 2 * half_ball * (2 / 5) * r * r
         I_x += 2 * half_ball * (2 / 5 * r * r + length * length / 4 + 3 / 8 * length * r)
         mass += 2 * half_ball
-    own = read_only([[I_x, 0, 0], [0, I_x, 0], [0, 0, I_z]])
-    return MassProperties(mass=mass, com=com, inertia=rotate_tensor(T, own))
+    return mass, com, rotated_tensor(T, [[I_x, 0.0, 0.0], [0.0, I_x, 0.0], [0.0, 0.0, I_z]])
 
 
 def ball(mass: float, radius: float) -> MassProperties:
@@ -100,25 +99,24 @@ def ball_radius(mass: float) -> float:
 
 def combine(parts: Iterable[MassProperties]) -> MassProperties:
     """Combine rigid bodies that are fixed to each other, all given in one frame (parallel-axis theorem)."""
-    parts = tuple(parts)
-    mass = math.fsum(part.mass for part in parts)
-    coms = [part.com.tolist() for part in parts]
-    com = [math.fsum(part.mass * own[i] for part, own in zip(parts, coms, strict=True)) / mass for i in range(3)]
-    tensors = [
-        shifted_inertia(part.inertia, part.mass, [x - c for x, c in zip(part.com.tolist(), com, strict=True)])
-        for part in parts
-    ]
-    inertia = [[math.fsum(tensor[i][j] for tensor in tensors) for j in range(3)] for i in range(3)]
+    return _combined([(part.mass, part.com.tolist(), part.inertia.tolist()) for part in parts])
+
+
+def _combined(bodies: Sequence[tuple[float, Sequence[float], Rows]]) -> MassProperties:
+    mass = math.fsum([m for m, _, _ in bodies])
+    cx, cy, cz = (math.fsum([m * com[i] for m, com, _ in bodies]) / mass for i in range(3))
+    tensors = [shifted_inertia(inertia, m, (x - cx, y - cy, z - cz)) for m, (x, y, z), inertia in bodies]
+    inertia = [[math.fsum(same) for same in zip(*rows, strict=True)] for rows in zip(*tensors, strict=True)]
     least = NOTHING * (inertia[0][0] + inertia[1][1] + inertia[2][2])
     inertia = [[0.0 if abs(inertia[i][j]) < least else inertia[i][j] for j in range(3)] for i in range(3)]
-    return MassProperties(mass=mass, com=read_only(com), inertia=read_only(inertia))
+    return MassProperties(mass=mass, com=read_only([cx, cy, cz]), inertia=read_only(inertia))
 
 
-def shifted_inertia(inertia: Array, mass: float, offset: list[float]) -> list[list[float]]:
+def shifted_inertia(inertia: Rows, mass: float, offset: Sequence[float]) -> list[list[float]]:
     """Return the inertia, shape (3, 3), about a point ``offset`` (m) from the centre: I + m (o·o E - o oᵀ)."""
     x, y, z = offset
     square = x * x + y * y + z * z
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = inertia.tolist()
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = inertia
     return [
         [xx + mass * (square - x * x), xy + mass * (0.0 - x * y), xz + mass * (0.0 - x * z)],
         [yx + mass * (0.0 - y * x), yy + mass * (square - y * y), yz + mass * (0.0 - y * z)],
@@ -211,7 +209,7 @@ def in_frame(T: Array, body: MassProperties) -> MassProperties:
 
 
 def link_inertial(
-    link: LinkSpec, T_link_dh: Array, shapes: tuple[Shape, ...], anchor: Array
+    link: LinkSpec, T_link_dh: Array, shapes: tuple[Shape, ...], anchor: Point
 ) -> tuple[MassProperties | None, tuple[str, ...]]:
     """Return the mass properties of a link; what the robot file gives wins over estimates from the shapes.
 
@@ -219,7 +217,7 @@ def link_inertial(
         link: As in the file; centre of mass and inertia in DH frame i.
         T_link_dh: Pose of DH frame i in the link, shape (4, 4).
         shapes: Of the link, solid. A given mass scales their inertia, a given centre of mass moves it.
-        anchor: Where a link without shapes counts as a ball, in the joint frame, m, shape (3,).
+        anchor: Where a link without shapes counts as a ball, in the joint frame, m.
 
     Returns:
         The properties in the link's frame, and which of 'mass', 'com' and 'inertia' were estimated; None for a link
@@ -243,7 +241,7 @@ def link_inertial(
 
 def of_shapes(shapes: Iterable[Shape], density: float) -> MassProperties:
     """Return the mass properties of a link of solid shapes, none too small for MuJoCo; ``density`` in kg/m³."""
-    whole = combine(of_shape(shape, density) for shape in shapes if shape.solid)
+    whole = _combined([_solid(shape, density) for shape in shapes if shape.solid])
     whole = _of_mass(whole, max(whole.mass, MIN_MASS))
     return replace(whole, inertia=made_possible(whole.inertia))
 
@@ -253,8 +251,9 @@ def _of_mass(body: MassProperties, mass: float) -> MassProperties:
     return replace(body, mass=mass, inertia=substantial(read_only(body.inertia * (mass / body.mass))))
 
 
-def _estimate(link: LinkSpec, shapes: tuple[Shape, ...], anchor: Array) -> MassProperties:
+def _estimate(link: LinkSpec, shapes: tuple[Shape, ...], anchor: Point) -> MassProperties:
     """Estimate from the shapes; a fixed link without any, but with a mass, counts as a small ball."""
     if shapes:
-        return combine(of_shape(shape, link.density or ASSUMED_DENSITY) for shape in shapes if shape.solid)
-    return replace(ball(link.mass or 1.0, link.radius or 0.01), com=anchor)
+        density = link.density or ASSUMED_DENSITY
+        return _combined([_solid(shape, density) for shape in shapes if shape.solid])
+    return replace(ball(link.mass or 1.0, link.radius or 0.01), com=read_only(anchor))

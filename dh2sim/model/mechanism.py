@@ -210,13 +210,13 @@ def _reaching(link: LinkModel, tree: KinematicTree, body: int) -> LinkModel:
     chain = link.name.rpartition("/")[0]
     own = {name: f for name, f in tree.frames.items() if f.body == body and name.rpartition("/")[0] == chain}
     reached = [own["tool0"]] if "tool0" in own else own.values()  # the last link is drawn to tool0, not to its frame
-    near = [read_only([0.0, 0.0, 0.0]), *(frame.T_body_frame[:3, 3] for frame in reached)]
+    near = [[0.0, 0.0, 0.0], *(frame.T_body_frame[:3, 3].tolist() for frame in reached)]
     held = [tree.frame(frame) for closure in tree.closures for frame in (closure.a, closure.b)]
     starts = [frame for name, frame in tree.frames.items() if name.endswith("/dh_0")]
     size = mechanism_size(tree)
     struts: list[Shape] = []
     for frame in (*held, *starts):
-        end = frame.T_body_frame[:3, 3]
+        end = frame.T_body_frame[:3, 3].tolist()
         start = min(near, key=lambda point: math.dist(point, end))
         if frame.body == body and math.dist(start, end) > STRUT * size:
             struts.append(between(ShapeKind.CAPSULE, ShapePart.TRIM, neat(STRUT * size), start, end))

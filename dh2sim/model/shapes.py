@@ -58,19 +58,19 @@ class Shape:
         return centre - half, centre + half
 
 
-def between(kind: ShapeKind, part: ShapePart, radius: float, start: Array, end: Array) -> Shape:
-    """Make a shape whose axis runs from ``start`` to ``end`` (link frame, m, shape (3,) each, not the same)."""
-    along = [float(b) - float(a) for a, b in zip(start, end, strict=True)]
-    length = math.sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2])
+def between(kind: ShapeKind, part: ShapePart, radius: float, start: Sequence[float], end: Sequence[float]) -> Shape:
+    """Make a shape whose axis runs from ``start`` to ``end`` (link frame, m, three numbers each, not the same)."""
+    (a, b, c), (d, e, f) = start, end
+    x, y, z = d - a, e - b, f - c
+    length = math.sqrt(x * x + y * y + z * z)
     if length == 0.0:  # the ends of a shape that is tiny beside its distance are rounded to one point
-        along, length = [0.0, 0.0, radius], radius
-    centre = [0.5 * (float(a) + float(b)) for a, b in zip(start, end, strict=True)]
+        x, y, z, length = 0.0, 0.0, radius, radius
     return Shape(
         kind=kind,
         part=part,
         radius=radius,
         length=length,
-        T_link_shape=pose_with_z(centre, [component / length for component in along]),
+        T_link_shape=pose_with_z((0.5 * (a + d), 0.5 * (b + e), 0.5 * (c + f)), (x / length, y / length, z / length)),
     )
 
 
@@ -91,17 +91,17 @@ def given_shape(spec: ShapeSpec) -> Shape:
     return Shape(kind=kind, part=part, radius=spec.radius or 0.0, length=spec.length or 0.0, T_link_shape=T)
 
 
-def pose_with_z(origin: list[float], z: list[float]) -> Array:
+def pose_with_z(origin: Sequence[float], z: Sequence[float]) -> Array:
     """Return a pose, shape (4, 4), at ``origin`` (m) whose z axis is the unit vector ``z``; x is any normal to it.
 
     The frame is turned about the coordinate axis that z is farthest from, so axes along x, y or z stay exact.
     """
-    smallest = min(range(3), key=lambda i: (abs(z[i]), i))
-    other = [0.0, 0.0, 0.0]
-    other[smallest] = 1.0
     if z[2] == 1.0:
         x, y = [1.0, 0.0, -z[0]], [0.0, 1.0, -z[1]]  # components too small to show in z[2]
     else:
+        sizes = [*map(abs, z)]
+        other = [0.0, 0.0, 0.0]
+        other[sizes.index(min(sizes))] = 1.0
         y = cross(z, other)
         norm = math.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
         y = [component / norm for component in y]

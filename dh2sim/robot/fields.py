@@ -13,6 +13,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum, StrEnum
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, Protocol, TypeAlias
@@ -172,7 +173,7 @@ class Choice(Kind):
     other_names: Mapping[str, str] = field(default_factory=dict)
     """Other names of members, lower case, that messages explain but that are not taken."""
 
-    @property
+    @cached_property
     def allowed(self) -> list[str]:
         """The values allowed."""
         return [choice.value for choice in self.of if choice.value not in self.without]
@@ -230,7 +231,7 @@ class Number(Kind):
         bounds = self.magnitude(turns=scope.turns)
         if bounds is ANY:
             return None
-        own = self._own_unit(scope)
+        own = "" if self.dimension is None else scope.angle if bounds is ANGLE else scope.length
         si = IN_SI[own] if own else 1.0
         most, least = bounds.most / si, bounds.least / si
         size, positive = abs(number), self.above is not None
@@ -249,25 +250,16 @@ class Number(Kind):
 
     def magnitude(self, *, turns: bool) -> Magnitude:
         """Return its bounds in SI units; ``turns`` says whether a joint coordinate is an angle."""
-        match self.dimension:
-            case Dimension.ANGLE:
-                return ANGLE
-            case Dimension.LENGTH:
-                return LENGTH
-            case Dimension.COORDINATE:
-                return ANGLE if turns else LENGTH
-            case None:
-                return self.size
-
-    def _own_unit(self, scope: Scope) -> str:
-        """Return the unit of angle or length that the number is in; empty for one that is neither."""
-        if self.dimension is None:
-            return ""
-        return scope.angle if self.magnitude(turns=scope.turns) is ANGLE else scope.length
+        dimension = self.dimension
+        if dimension is None:
+            return self.size
+        if dimension is Dimension.COORDINATE:
+            return ANGLE if turns else LENGTH
+        return ANGLE if dimension is Dimension.ANGLE else LENGTH
 
     def to_si(self, value: Any, units: UnitsLike, *, turns: bool) -> Any:
         """Return the number in SI units."""
-        return units.to_si(value, self.dimension, turns=turns)
+        return value if self.dimension is None else units.to_si(value, self.dimension, turns=turns)
 
 
 WITH_UNIT: Final = (

@@ -29,6 +29,8 @@ FREE_SLIDE: Final = 1.0
 """m: half the range of a joint that slides without limits."""
 
 
+_HINGE: Final = int(mujoco.mjtJoint.mjJNT_HINGE)
+
 Columns: TypeAlias = slice | NDArray[np.intp]
 """Which of MuJoCo's positions or velocities."""
 
@@ -211,16 +213,16 @@ def make_plant(compiled: mujoco.MjModel, robot: RobotModel | MechanismModel) -> 
     controlled = compiled.actuator_ctrllimited.astype(bool)
     controls = compiled.actuator_ctrlrange.reshape(-1, 2)
     gains = unloaded_gains(robot, seen)
-    place = {int(joint): k for k, joint in enumerate(ids)}
+    place = {joint: k for k, joint in enumerate(ids.tolist())}
     return Plant(
         model=compiled,
         spec=robot.spec,
         timestep=float(compiled.opt.timestep),
         floating=bool(floating),
-        joints=tuple(compiled.joint(int(i)).name for i in ids),
-        turns=tuple(compiled.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE for i in ids),
-        actuators=tuple(compiled.actuator(i).name for i in range(compiled.nu)),
-        driven=tuple(place[int(compiled.actuator_trnid[i, 0])] for i in range(compiled.nu)),
+        joints=tuple(mujoco.mj_id2name(compiled, mujoco.mjtObj.mjOBJ_JOINT, i) for i in place),
+        turns=tuple(kind == _HINGE for kind in compiled.jnt_type[ids].tolist()),
+        actuators=tuple(mujoco.mj_id2name(compiled, mujoco.mjtObj.mjOBJ_ACTUATOR, i) for i in range(compiled.nu)),
+        driven=tuple(place[joint] for joint in compiled.actuator_trnid[:, 0].tolist()),
         lower=read_only(np.where(limited, ranges[:, 0], -np.inf)),
         upper=read_only(np.where(limited, ranges[:, 1], np.inf)),
         velocity=read_only([joint.velocity for joint in robot.moving_joints]),

@@ -83,7 +83,7 @@ def test_points_are_on_the_axes_and_projected_onto_them(spec: RobotSpec) -> None
         ):
             np.testing.assert_allclose(point, T[:3, 3] + height * T[:3, 2], rtol=0, atol=1e-14)
         # square to the axis that it is projected onto
-        assert abs(float((found.entries[k] - found.leaving(k)) @ T[:3, 2])) < 1e-14
+        assert abs(float(np.subtract(found.entries[k], found.leaving(k)) @ T[:3, 2])) < 1e-14
         if joint.type is not PRISMATIC and k > 0:
             assert abs(float(found.arrivals[k][2] - found.leaving(k)[2])) < 1e-14
 

@@ -144,7 +144,7 @@ def test_every_slide_of_any_robot_stays_guided(spec: RobotSpec) -> None:
 
 
 def test_a_shape_between_two_points_ends_at_them() -> None:
-    start, end = np.array([0.1, -0.2, 0.3]), np.array([-0.5, 0.4, 0.35])
+    start, end = (0.1, -0.2, 0.3), (-0.5, 0.4, 0.35)
     shape = between(ShapeKind.CAPSULE, ShapePart.LINK, 0.05, start, end)
     np.testing.assert_allclose(shape.ends, (start, end), rtol=0, atol=1e-16)
     T = pose_from_rpy([0.4, 0.5, -0.6], [0.7, -0.8, 0.9])
@@ -154,8 +154,7 @@ def test_a_shape_between_two_points_ends_at_them() -> None:
 
 
 def test_a_shape_along_z_needs_no_rotation() -> None:
-    ends = [np.array([0.0, 0.0, z]) for z in (-0.2, 0.6)]
-    shape = between(ShapeKind.CYLINDER, ShapePart.JOINT, 0.1, *ends)
+    shape = between(ShapeKind.CYLINDER, ShapePart.JOINT, 0.1, (0.0, 0.0, -0.2), (0.0, 0.0, 0.6))
     np.testing.assert_array_equal(shape.T_link_shape, pose_from_rpy([0, 0, 0.5 * (0.6 - 0.2)], [0, 0, 0]))
 
 

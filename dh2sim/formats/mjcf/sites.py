@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from dh2sim.formats.xml_write import child, numbers
-from dh2sim.kinematics.transforms import identity, quaternion_from_rotation, rotate_tensor
+from dh2sim.kinematics.transforms import Rows, identity, quaternion_from_rotation, rotated_tensor
 from dh2sim.model.mass import MassProperties
 from dh2sim.typing import Array
 
@@ -51,23 +51,28 @@ def add_site(body: ET.Element, name: str, T: Array, inertial: MassProperties | N
 
 def needs_body(T: Array, inertial: MassProperties | None) -> bool:
     """Whether MuJoCo may replace a site with pose ``T`` in a link by another frame that is only near it."""
-    position, R = T[:3, 3], T[:3, :3]
-    turned, moved = _gap(R, identity()[:3, :3]), _gap(position, 0.0)
+    (xx, xy, xz, x), (yx, yy, yz, y), (zx, zy, zz, z), _ = T.tolist()
+    turned = _largest(xx - 1.0, xy, xz, yx, yy - 1.0, yz, zx, zy, zz - 1.0)
     if NOISE < turned < NEAR:
         return True
-    if turned <= NOISE:
-        return NOISE < moved < NEAR or (inertial is not None and NOISE < _gap(position, inertial.com) < NEAR)
-    return inertial is not None and _along_principal_axes(R, inertial.inertia)
-
-
-def _along_principal_axes(R: Array, tensor: Array) -> bool:
-    """Whether the axes of ``R`` are almost principal ones of a tensor that is not diagonal as it is written."""
-    if tensor[0, 1] == tensor[0, 2] == tensor[1, 2] == 0.0:
+    if turned > NOISE:
+        return inertial is not None and _along_principal_axes(T, inertial.inertia)
+    if NOISE < _largest(x, y, z) < NEAR:
+        return True
+    if inertial is None:
         return False
-    own = rotate_tensor(R.T, tensor)
-    trace = float(tensor[0, 0] + tensor[1, 1] + tensor[2, 2])
-    return max(abs(float(own[i, j])) for i, j in ((0, 1), (0, 2), (1, 2))) < NEAR * trace
+    u, v, w = inertial.com.tolist()
+    return NOISE < _largest(x - u, y - v, z - w) < NEAR
 
 
-def _gap(a: Array, b: Array | float) -> float:
-    return float(abs(a - b).max())
+def _along_principal_axes(T: Array, tensor: Array) -> bool:
+    """Whether the axes of ``T`` are almost principal ones of a tensor that is not diagonal as it is written."""
+    rows: Rows = tensor.tolist()
+    if rows[0][1] == rows[0][2] == rows[1][2] == 0.0:
+        return False
+    (_, xy, xz), (_, _, yz), _ = rotated_tensor(T[:3, :3].T.tolist(), rows)
+    return _largest(xy, xz, yz) < NEAR * (rows[0][0] + rows[1][1] + rows[2][2])
+
+
+def _largest(*values: float) -> float:
+    return max(map(abs, values))

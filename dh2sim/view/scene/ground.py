@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
-import numpy as np
-
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.shapes import ShapeKind, ShapePart, between
@@ -39,7 +37,7 @@ def ground_of(model: RobotModel) -> Ground:
 
 
 def _solid(geom: ET.Element) -> Solid:
-    ends = np.array(geom.get("fromto", "").split(), dtype=np.float64)
+    ends = [float(text) for text in geom.get("fromto", "").split()]
     radius = float(geom.get("size", "").split()[0])
     shape = between(ShapeKind.CYLINDER, ShapePart.LINK, radius, ends[:3], ends[3:])
     vertices, faces = shape_triangles(shape)
