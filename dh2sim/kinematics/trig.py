@@ -11,8 +11,10 @@ from functools import lru_cache
 
 _GUARD_BITS = 256
 """Bits behind those of the argument; a double's distance to a multiple of pi/2 takes about 62 of them."""
-_USUAL_BITS = 128
+_USUAL_BITS = 80
 """As many are nearly always enough to see to which double a sine or a cosine rounds."""
+_NODE_BITS = 8
+"""Sines and cosines of multiples of 2**-8 are kept."""
 _ERROR = 1 << 10
 """Upper bound of the error of ``scaled_sin_cos``, in its units."""
 _SNAP_TURNS = 16
@@ -60,7 +62,7 @@ def scaled_sin_cos(angle: float, guard_bits: int = _GUARD_BITS) -> tuple[int, in
     """
     if not math.isfinite(angle):
         raise ValueError(f"the angle must be finite, got {angle!r}")
-    bits = guard_bits + abs(math.frexp(angle)[1])
+    bits = guard_bits + (abs(math.frexp(angle)[1]) + 15 & -16)  # the same for most angles, as _node remembers it
     quadrant, rest = _reduce(angle, bits)
     if abs(quadrant) <= _SNAP_TURNS and abs(rest / (1 << bits)) <= _SNAP_WIDTH * max(1, abs(quadrant)):
         rest = 0
@@ -135,11 +137,11 @@ def _reduce(angle: float, bits: int) -> tuple[int, int]:
 
 
 def _sin_cos_of_rest(rest: int, bits: int) -> tuple[int, int]:
-    """Sine and cosine of ``rest``, at most pi/4, all in units of 2**-bits: those of the nearest 1/32, turned on."""
-    step = ((rest >> (bits - 6)) + 1) >> 1
+    """Sine and cosine of ``rest``, at most pi/4, all in units of 2**-bits: those of the nearest node, turned on."""
+    step = ((rest >> (bits - _NODE_BITS - 1)) + 1) >> 1
     if step == 0:
         return _taylor(rest, bits)
-    sine, cosine = _taylor(rest - (step << (bits - 5)), bits)
+    sine, cosine = _taylor(rest - (step << (bits - _NODE_BITS)), bits)
     sine_before, cosine_before = _node(step, bits)
     return (
         (sine_before * cosine + cosine_before * sine) >> bits,
@@ -149,19 +151,20 @@ def _sin_cos_of_rest(rest: int, bits: int) -> tuple[int, int]:
 
 @lru_cache(maxsize=1024)
 def _node(step: int, bits: int) -> tuple[int, int]:
-    """Sine and cosine of step/32 in units of 2**-bits."""
-    return _taylor(step << (bits - 5), bits)
+    """Sine and cosine of a node, step·2**-8, in units of 2**-bits."""
+    return _taylor(step << (bits - _NODE_BITS), bits)
 
 
 def _taylor(rest: int, bits: int) -> tuple[int, int]:
     """Sine and cosine of ``rest``, all in units of 2**-bits, by their Taylor series."""
-    sums = [0, 0]  # cosine, sine
-    term, k = 1 << bits, 0
+    sine, cosine, term, k = 0, 0, 1 << bits, 0
     while term not in (0, -1):
-        sums[k % 2] += term if k % 4 < 2 else -term
-        k += 1
-        term = (term * rest >> bits) // k
-    return sums[1], sums[0]
+        cosine += term
+        term = (term * rest >> bits) // (k + 1)
+        sine += term
+        k += 2
+        term = -(term * rest >> bits) // k
+    return sine, cosine
 
 
 def _turn(quadrant: int, sine: int, cosine: int) -> tuple[int, int]:

@@ -145,10 +145,12 @@ def check_joint_vector(
         scope.report(loc, f"{expected}, found a list of {len(values)}")
         return
     scopes = {kind: replace(scope, joint_type=kind) for kind in {placed.row["type"] for placed in moving}}
+    largest = {kind: COORDINATE.largest(within) for kind, within in scopes.items()}
     for place, (value, placed, joint) in enumerate(zip(values, moving, called, strict=True)):
         if value is WRONG:
             continue
-        if problem := COORDINATE.size_problem(value, scopes[placed.row["type"]]):
+        kind = placed.row["type"]
+        if abs(value) > largest[kind] and (problem := COORDINATE.size_problem(value, scopes[kind])):
             scope.report((*loc, place), f"{problem}, found {shown(value)}")
         elif limits := _outside(value, placed.row):
             lower, upper = limits

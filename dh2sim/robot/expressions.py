@@ -335,6 +335,8 @@ def to_number(value: object, names: Mapping[str, float] | None) -> float:
     Raises:
         NumberError: With what was found and what is allowed.
     """
+    if type(value) is float and math.isfinite(value):  # most of them
+        return value
     match value:
         case str() if names is not None:
             try:

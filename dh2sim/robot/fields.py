@@ -226,12 +226,21 @@ class Number(Kind):
             return "must not be negative" if self.least == 0 else f"must be at least {self.least:g}"
         return None
 
+    def largest(self, scope: Scope) -> float:
+        """Return how large a number may be at most, in the units that it is given in."""
+        bounds = self.magnitude(turns=scope.turns)
+        return bounds.most / IN_SI[self._own_unit(bounds, scope) or "m"] * _SLACK
+
+    def _own_unit(self, bounds: Magnitude, scope: Scope) -> str:
+        """Return the unit of angle or length that the number is in; empty for one that is neither."""
+        return "" if self.dimension is None else scope.angle if bounds is ANGLE else scope.length
+
     def size_problem(self, number: float, scope: Scope) -> str | None:
         """Return what is wrong with how large or small a number is, in the units that it is given in."""
         bounds = self.magnitude(turns=scope.turns)
         if bounds is ANY:
             return None
-        own = "" if self.dimension is None else scope.angle if bounds is ANGLE else scope.length
+        own = self._own_unit(bounds, scope)
         si = IN_SI[own] if own else 1.0
         most, least = bounds.most / si, bounds.least / si
         size, positive = abs(number), self.above is not None
@@ -472,4 +481,7 @@ class Vector(Kind):
         """Return a list of numbers, some of which may be WRONG."""
         if not isinstance(value, list):
             return scope.wrong(loc, f"expected a list, found {shown(value)}")
-        return [_ANY.check(number, (*loc, index), scope) for index, number in enumerate(value)]
+        return [
+            number if type(number) is float and math.isfinite(number) else _ANY.check(number, (*loc, index), scope)
+            for index, number in enumerate(value)  # most of a large file
+        ]

@@ -42,9 +42,8 @@ Scalar: TypeAlias = str | int | float | bool | None
 
 _NULL: Final = frozenset({"", "~", "null", "Null", "NULL"})
 _BOOL: Final = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
-_INT: Final = re.compile(r"[-+]?[0-9]+")
 _OCTAL_OR_HEX: Final = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
-_FLOAT: Final = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_DECIMAL: Final = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _INF: Final = re.compile(r"[-+]?\.(?:inf|Inf|INF)")
 _NAN: Final = frozenset({".nan", ".NaN", ".NAN"})
 _MOST_DIGITS: Final = 400
@@ -53,16 +52,11 @@ _MOST_DIGITS: Final = 400
 
 def resolve_plain(text: str) -> Scalar:
     """Return what a plain (unquoted) scalar stands for in YAML 1.2's core schema (section 10.3.2)."""
-    if text in _NULL:
-        return None
-    if text in _BOOL:
-        return _BOOL[text]
-    if text[0] not in "+-.0123456789":
-        return text
-    if _INT.fullmatch(text):
-        return int(text) if len(text) <= _MOST_DIGITS else float(text)
-    if _FLOAT.fullmatch(text):
-        return float(text)
+    if not text or text[0] not in "+-.0123456789":
+        return None if text in _NULL else _BOOL.get(text, text)
+    if _DECIMAL.fullmatch(text):
+        fraction = "." in text or "e" in text or "E" in text
+        return float(text) if fraction or len(text) > _MOST_DIGITS else int(text)
     if _OCTAL_OR_HEX.fullmatch(text):
         return int(text, 0) if len(text) <= _MOST_DIGITS else float("inf")
     if _INF.fullmatch(text):
@@ -304,6 +298,8 @@ class _Composer:
     def take(self, event: Any) -> None:
         """Take the next event, of either parser."""
         match type(event).__name__:
+            case "ScalarEvent":  # most of them
+                self._attach(self._scalar(event), event.anchor, 1, 1)
             case "DocumentStartEvent":
                 if self.root is not None:
                     self._fail(event, "a second YAML document; a robot file holds one")
@@ -311,8 +307,6 @@ class _Composer:
                     self._fail(event, "only YAML 1.2 is read")
             case "AliasEvent":
                 self._alias(event)
-            case "ScalarEvent":
-                self._attach(self._scalar(event), event.anchor, 1, 1)
             case "MappingStartEvent":
                 self._open(event, {})
             case "SequenceStartEvent":
@@ -336,35 +330,34 @@ class _Composer:
         if len(self._stack) + height > MAX_DEPTH:
             self._fail(event, f"nested deeper than {MAX_DEPTH} levels")
 
-    def _node(self, event: Any, value: Value) -> Node:
-        self._count(event, 1, 1)
+    def _node(self, event: Any, value: Value, end: int = 0, text: str = "", *, flow: bool = False) -> Node:
+        if self._total >= MAX_NODES or len(self._stack) >= MAX_DEPTH:
+            self._count(event, 1, 1)
+        self._total += 1
         mark = event.start_mark
-        anchor = event.anchor is not None
-        node = Node(mark.line + 1, mark.column + 1, value, start=mark.index, anchor=anchor)
         tag = getattr(event, "tag", None)
         if tag is not None:
             written = shown(tag.replace("tag:yaml.org,2002:", "!!"))
             self._fail(event, f"tag {written} is not allowed; write the value alone")
-        return node
+        anchor = event.anchor is not None
+        return Node(mark.line + 1, mark.column + 1, value, False, mark.index, end, text, flow, anchor)
 
     def _scalar(self, event: Any) -> Node:
-        plain = not event.style
-        node = self._node(event, resolve_plain(event.value) if plain else event.value)
-        node.end, node.text = event.end_mark.index, event.value
-        if plain and not event.value:
+        text, plain = event.value, not event.style
+        node = self._node(event, resolve_plain(text) if plain else text, event.end_mark.index, text)
+        if plain and not text:
             if self._stack and (key := self._stack[-1].key):
                 node.line, node.column, node.start, node.end = key[1].line, key[1].column, key[1].start, key[1].start
             else:
                 self.parsers_differ = True
-        if not plain and (found := NOT_PRINTABLE.search(event.value)):
+        if not plain and (found := NOT_PRINTABLE.search(text)):
             self._fail(event, f"control character U+{ord(found.group()):04X} is not allowed")
         return node
 
     def _open(self, event: Any, value: Value) -> None:
         if event.anchor:
             self._anchors[event.anchor] = None
-        node = self._node(event, value)
-        node.flow = bool(event.flow_style)
+        node = self._node(event, value, flow=bool(event.flow_style))
         self._stack.append(_Frame(node, event.anchor))
 
     def _alias(self, event: Any) -> None:
@@ -385,7 +378,8 @@ class _Composer:
             return
         frame = self._stack[-1]
         frame.size += size
-        frame.height = max(frame.height, height + 1)
+        if height >= frame.height:
+            frame.height = height + 1
         match frame.node.value:
             case list() as items:
                 items.append(node)

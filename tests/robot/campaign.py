@@ -1,19 +1,25 @@
 """Random robot files, many of them: read and modelled without a traceback, exported, validated and imported back.
 
-    python -m tests.robot.campaign read 100000 [SEED]
-    python -m tests.robot.campaign whole 1000 [SEED]
+    python -m tests.robot.campaign read 1000000 [SEED] [LOG]
+    python -m tests.robot.campaign whole 20000 [SEED] [LOG]
 
-Prints a line of JSON, how often what was found, and the files that fell short to standard error.
+Files are made in chunks, of SEED and the seeds after it. Prints a line of JSON for each chunk, how often what was
+found, and the files that fell short to standard error. With LOG, a file, all that is kept there, and a chunk that it
+has is not made again.
 """
 
 from __future__ import annotations
 
+import gc
 import json
 import re
 import sys
 import tempfile
+import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 
@@ -131,9 +137,42 @@ def _kind(error: Exception) -> str:
     return f"{type(error).__name__}: {re.sub(r'[0-9].*', '…', str(error))[:60]}"
 
 
+CAMPAIGNS: Final = {"read": (read, 10_000), "whole": (whole, 100)}
+"""What is tried, and of how many files a chunk is made."""
+
+
+def chunks(name: str, count: int, seed: int, log: Path | None) -> Iterator[dict[str, Any]]:
+    """Run a campaign in chunks and yield what each found; those that the log has are not run again."""
+    campaign, size = CAMPAIGNS[name]
+    lines = log.read_text().splitlines() if log and log.exists() else []
+    kept = {(line["campaign"], line["seed"], line["count"]): line for line in map(json.loads, lines)}
+    for start in range(0, count, size):
+        key = (name, seed + start // size, min(size, count - start))
+        if key in kept:
+            yield kept[key]
+            continue
+        begin = time.perf_counter()
+        found, failures = campaign(key[2], key[1])
+        line = {"campaign": name, "seed": key[1], "count": key[2], "found": found, "failures": failures}
+        line["seconds"] = round(time.perf_counter() - begin, 1)
+        if log:
+            with log.open("a") as file:
+                print(json.dumps(line), file=file)
+        yield line
+
+
+def main(name: str, count: str, seed: str = "0", log: str | None = None) -> None:
+    """Run a campaign and print what it finds."""
+    gc.freeze()
+    gc.set_threshold(100_000)  # as in the command line
+    total = Counter[str]()
+    for line in chunks(name, int(count), int(seed), Path(log) if log else None):
+        for failure in line.pop("failures"):
+            print(failure, end="\n\n", file=sys.stderr, flush=True)
+        print(json.dumps(line), flush=True)
+        total.update(line["found"])
+    print(json.dumps({"campaign": name, "found": total}))
+
+
 if __name__ == "__main__":
-    made, failed = {"read": read, "whole": whole}[sys.argv[1]](
-        int(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 0
-    )
-    print("\n\n".join(failed), file=sys.stderr)
-    print(json.dumps(made))
+    main(*sys.argv[1:])

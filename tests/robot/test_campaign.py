@@ -5,15 +5,28 @@ The same as ``python -m tests.robot.campaign``, with fewer files.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from tests.robot.campaign import read, whole
+from tests.robot.campaign import chunks, read, whole
 from tests.robot.random_files import RandomFiles
 
 
 def test_the_same_seed_makes_the_same_files() -> None:
     one, other = RandomFiles(3), RandomFiles(3)
     assert [one.any() for _ in range(20)] == [other.any() for _ in range(20)]
+
+
+def test_a_campaign_goes_on_where_its_log_ends(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    [first] = chunks("read", 5, 3, log)
+    assert first["found"] == read(5, 3)[0]
+    assert list(chunks("read", 5, 3, log)) == [first]
+    assert len(log.read_text().splitlines()) == 1
+    [other] = chunks("read", 5, 4, log)
+    assert other["seed"] == 4
+    assert len(log.read_text().splitlines()) == 2
 
 
 @pytest.mark.parametrize("count", [250, pytest.param(20_000, marks=pytest.mark.slow)])
