@@ -3,9 +3,13 @@
 import signal
 
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not where whoever started it has it ignored
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback of Python's own until ``main`` handles signals
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback of Python's own
 
-from dh2sim.cli.main import main
+from dh2sim.cli.signals import leave_on_signals
+
+leave_on_signals()  # until ``main`` handles signals
+
+from dh2sim.cli.main import main  # noqa: E402
 
 if __name__ == "__main__":
     main()

@@ -101,7 +101,7 @@ class Loss:
 
     def __str__(self) -> str:
         """Return it in words, such as ``URDF: armature of joint_1``."""
-        names = ", ".join(self.where)
+        names = listed(self.where)
         words: str = self.what
         match self.what:
             case Lost.DYNAMICS:

@@ -12,7 +12,7 @@ import typer
 from dh2sim.cli.common import DONE, FELL_SHORT, RobotsArgument, StrictOption, build_any, complain
 from dh2sim.cli.output import print_wrapped
 from dh2sim.errors import Dh2simError, OutputError
-from dh2sim.messages import printable
+from dh2sim.messages import listed, printable
 
 if TYPE_CHECKING:
     from dh2sim.export import ExportReport, Format
@@ -64,8 +64,8 @@ def export(
         return _check(models, out, chosen, dh_frames=not no_dh_frames)
     from dh2sim.export import export_robot
 
-    status = DONE
-    for model in models:
+    status, written = DONE, list[str]()
+    for position, model in enumerate(models):
         try:
             report = export_robot(
                 model,
@@ -76,11 +76,17 @@ def export(
                 wait=not no_wait,
                 waiting=_report_waiting,
             )
-        except OutputError:
-            raise  # the next robot would fare no better
+        except OutputError as error:  # the next robot would fare no better
+            if not written:
+                raise
+            status = complain(f"{model.name}: {error}")
+            left = listed([each.name for each in models[position:]])
+            print(f"dh2sim: exported before it: {listed(written)}; not exported: {left}", file=sys.stderr)
+            break
         except Dh2simError as error:
             status = max(status, complain(error))
         else:
+            written.append(model.name)
             _print_report(report, out, model)
     return status
 

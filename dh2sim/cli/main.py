@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 
-from dh2sim.cli.signals import Signals
+from dh2sim.cli.signals import INTERRUPTED, Signals
 
 
 def main() -> None:
@@ -28,7 +28,8 @@ def main() -> None:
         if signals.first is None:
             raise
         if signals.first == signal.SIGINT:
-            sys.stderr.write("dh2sim: interrupted\n")
+            sys.stderr.write(INTERRUPTED)
+            exec("")  # if the last string of code was interrupted, Python kills itself with SIGINT at its end
         raise SystemExit(128 + signals.first) from None
     finally:
         gc.freeze()  # no search for garbage at exit; see _prepare_imports

@@ -4,20 +4,40 @@ The handler raises an exception in the main thread. That alone is not enough: Py
 finalizer or in a callback of the garbage collector, and libraries may catch it, as some do while they are imported.
 So a thread repeats the signal until the program ends. A repetition raises nothing while the exception is on its way,
 so that cleaning up is not disturbed; only a second signal from outside cuts it short.
+
+Before the program listens, and once it has ended, a signal ends the process at once, with the same words and the same
+status.
 """
 
 from __future__ import annotations
 
 import _thread
+import atexit
+import contextlib
+import os
 import signal
 import sys
-import threading
 import warnings
 from collections.abc import Callable
 from types import FrameType
 
 PAUSE = 0.05
 """s between repetitions of a signal."""
+
+
+def leave_on_signals() -> None:
+    """Let SIGINT and SIGTERM end the process at once."""
+    _install(signal.SIGINT, _leave)
+    _install(signal.SIGTERM, _leave)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+    if number == signal.SIGINT:
+        os.write(2, INTERRUPTED.encode())
+    os._exit(128 + number)
+
+
+INTERRUPTED = "dh2sim: interrupted\n"
 
 
 class Signals:
@@ -37,23 +57,24 @@ class Signals:
         self._repeating = _thread.allocate_lock()
         """Held by the thread that repeats a signal."""
         self._handler = self._handle
+        self._main_thread = _thread.get_ident()
 
     def listen(self) -> None:
         """Handle signals from now on."""
         _install(signal.SIGINT, self._handler)
         _install(signal.SIGTERM, self._handler)
+        atexit.register(_ignore_late_interrupts)  # the first to be registered is the last to be called
         sys.unraisablehook = self._report_dropped
 
     def end(self) -> None:
-        """Let signals end the program at once from now on: Python itself takes a while to end.
+        """Let signals end the process at once from now on: Python itself takes a while to end.
 
         Python before 3.11.3 crashes where a thread begins to run while it ends, so the one here is waited for.
         """
         self._ended = True
         self._over.release()
         with self._sending:  # no repetition is on its way any more
-            _install(signal.SIGINT, signal.SIG_DFL)
-            _install(signal.SIGTERM, signal.SIG_DFL)
+            leave_on_signals()
         self._repeating.acquire(timeout=1.0)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
@@ -83,8 +104,14 @@ class Signals:
                 # whoever has installed another handler meanwhile waits for signals from outside
                 if signal.getsignal(self.first) == self._handler:
                     self._repeated = True
-                    _interrupt_main_thread(self.first)
+                    self._interrupt_main_thread(self.first)
         self._repeating.release()
+
+    def _interrupt_main_thread(self, number: int) -> None:
+        if hasattr(signal, "pthread_kill"):  # wakes the main thread, which may be asleep
+            signal.pthread_kill(self._main_thread, number)
+        else:
+            _thread.interrupt_main(signal.Signals(number))
 
     def _report_dropped(self, error: sys.UnraisableHookArgs) -> None:
         """Report an exception that Python drops, unless it is that of a signal, which is repeated."""
@@ -116,8 +143,8 @@ def _install(kind: signal.Signals, handler: Callable[[int, FrameType | None], No
         signal.signal(kind, handler)
 
 
-def _interrupt_main_thread(number: int) -> None:
-    if hasattr(signal, "pthread_kill"):  # wakes the main thread, which may be asleep
-        signal.pthread_kill(threading.main_thread().ident or 0, number)
-    else:
-        _thread.interrupt_main(signal.Signals(number))
+def _ignore_late_interrupts() -> None:
+    """Ignore SIGINT in the last milliseconds of Python's end, where it runs no handlers: all is done and written."""
+    with contextlib.suppress(Exception):  # which Python itself reports
+        sys.stdout.flush()
+    _install(signal.SIGINT, signal.SIG_IGN)

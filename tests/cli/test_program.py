@@ -335,28 +335,58 @@ def test_a_missing_drawing_library_is_named(command: tuple[str, ...], tmp_path: 
     assert not list(tmp_path.iterdir())
 
 
-CUT_OFF = """
-import os, sys, time
-import dh2sim.cli.app
+SIGNALLED = """
+import atexit, os, signal, sys, time, types
 
 async def never_awaited():
     pass
 
-def run(prog_name):
-    kept = never_awaited()  # as libraries have them when they are interrupted
+def kill():
     os.kill(os.getpid(), int(sys.argv[1]))
+
+class Late:
+    kill, number, pid = os.kill, int(sys.argv[1]), os.getpid()
+
+    def __del__(self):
+        self.kill(self.pid, self.number)
+
+def run(prog_name):
+    print("done")
+    match sys.argv[2]:
+        case "at work":
+            kept = never_awaited()  # as libraries have them when they are interrupted
+            kill()
+        case "in the code of a string":  # as namedtuple makes them
+            exec("kill()")
+        case "at the end":
+            atexit.register(kill)
+            sys.exit(0)
+        case "after the end":
+            sys.modules["late"] = Late()
+            sys.exit(0)
     time.sleep(20)
 
-dh2sim.cli.app.app = run
+sys.modules["dh2sim.cli.app"] = types.SimpleNamespace(app=run)
 from dh2sim.cli.main import main
 main()
 """
+ENDS = [
+    (signal.SIGINT, "at work", 130, "dh2sim: interrupted\n"),
+    (signal.SIGTERM, "at work", 143, ""),
+    (signal.SIGINT, "in the code of a string", 130, "dh2sim: interrupted\n"),
+    (signal.SIGINT, "at the end", 130, "dh2sim: interrupted\n"),
+    (signal.SIGTERM, "at the end", 143, ""),
+    (signal.SIGINT, "after the end", 0, ""),
+]
 
 
-@pytest.mark.parametrize(
-    ("kill", "status", "printed"), [(signal.SIGINT, 130, "dh2sim: interrupted\n"), (signal.SIGTERM, 143, "")]
-)
-def test_what_an_end_cuts_off_is_not_reported(kill: signal.Signals, status: int, printed: str) -> None:
-    command = [sys.executable, "-c", CUT_OFF, str(int(kill))]
-    done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=60, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (status, "", printed)
+@pytest.mark.parametrize(("kill", "when", "status", "printed"), ENDS)
+def test_a_signal_ends_the_program_with_the_status_of_shells(
+    kill: signal.Signals, when: str, status: int, printed: str, tmp_path: Path
+) -> None:
+    (tmp_path / "signalled.py").write_text(SIGNALLED)
+    command = [sys.executable, "-m", "signalled", str(int(kill)), when]
+    done = subprocess.run(
+        command, env=environment(), cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stderr) == (status, printed)

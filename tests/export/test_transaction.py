@@ -33,6 +33,20 @@ def test_a_file_where_a_folder_is_needed_is_reported(tmp_path: Path) -> None:
     assert contents(tmp_path / "made") == {"small": b"mine"}
 
 
+def test_robots_that_were_exported_before_an_error_are_named(tmp_path: Path) -> None:
+    robots = [write(tmp_path, small(name), name) for name in "abcd"]
+    out = tmp_path / "made"
+    out.mkdir()
+    (out / "c").write_bytes(b"mine")
+    run = dh2sim("export", *robots, "--out", out)
+    assert run.status == 2
+    assert run.err == (
+        f"dh2sim: c: cannot write '{out / 'c'}': Not a directory; the existing files are unchanged\n"
+        "dh2sim: exported before it: a, b; not exported: c, d\n"
+    )
+    assert {path.name for path in out.iterdir()} == {"a", "b", "c"}
+
+
 def test_a_folder_at_a_files_name_is_reported_and_old_files_stay(tmp_path: Path) -> None:
     robot, out = write(tmp_path, small()), tmp_path / "made"
     dh2sim("export", robot, "--out", out)
