@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Final, TypedDict
 
@@ -17,39 +17,26 @@ from dh2sim.calibrate.identify import find_basis
 from dh2sim.calibrate.initial import initial_states
 from dh2sim.calibrate.measurements import Kind, Measurements
 from dh2sim.calibrate.observations import Observations, State
-from dh2sim.calibrate.outliers import Outlier, chi2_spread, find_outliers
+from dh2sim.calibrate.outliers import find_outliers
 from dh2sim.calibrate.parameters import Group, RobotParameters, Values
+from dh2sim.calibrate.plausibility import (
+    described,
+    remarks,
+    require_enough,
+    require_improvement,
+    require_metres,
+    require_size,
+)
 from dh2sim.calibrate.result import Calibration, ParameterResult, ParameterStatus
 from dh2sim.calibrate.unknowns import prior_of, requested_columns
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
-from dh2sim.messages import counted, listed
+from dh2sim.messages import counted
 from dh2sim.robot.spec import JointType, RobotSpec
 from dh2sim.typing import Array
 
-_USELESS: Final = 3.0
-"""Times the error before it, by which a table may be worse known than it is corrected."""
 _TRIES: Final = 300
 """Random configurations that the error of the tool is predicted at."""
-_FAR: Final = 0.1
-"""m, by which a base has been moved that is not only corrected."""
-_VAGUE: Final = 3e-3
-"""m or rad: a standard deviation that is greater than errors of most robots."""
-_UNITS: Final = {"mm": 1e-3, "cm": 1e-2, "inches": 0.0254}
-_SPREAD: Final = 0.01
-"""m, over which the tool must move for a unit to show."""
-_GROWTH: Final = 2.0
-"""Times the size of its table, that no arm is built off."""
-_COARSE: Final = 0.05
-"""Of the arm's size, that no measurement is as uncertain as."""
-_TWISTED: Final = 0.2
-"""rad."""
-_MOST_NAMED: Final = 6
-"""Parameters in a message."""
-_ADVICE: Final = (
-    "Measure more, at configurations that are spread over the limits, fit fewer parameters (unknown), or say how far "
-    "off they may be (prior)."
-)
 
 
 class CalibrationKeywords(TypedDict, total=False):
@@ -146,27 +133,12 @@ class _Task:
             (k for k in range(len(self.parameters)) if k not in self.free), "not among the unknown"
         )
         self.notes: list[str] = []
-        self._require_metres()
+        require_metres(self.robot, measured)
         self._hold_what_has_no_reference()
         self.free = {k for k in self.free if k not in self.held}
         self.groups = {self.parameters[k].group for k in self.free} - {None}
         self.prior_given = dict(prior or {})
         self.prior = prior_of(self.robot, self.prior_given, self.free, Observations(self.robot, measured))
-
-    def _require_metres(self) -> None:
-        """Raise an error if positions are spread as many times wider than the table's as a unit is."""
-        measured = self.measured
-        if measured.kind not in (Kind.POSE, Kind.POSITION) or measured.position is None:
-            return
-        _, p = self.robot.tool_poses(self.robot.start, measured.q)
-        expected, found = (float(np.sqrt(np.var(points, axis=0).sum())) for points in (p, measured.position))
-        for unit, size in _UNITS.items():
-            for times, given, meant in ((1.0 / size, unit, "m"), (size, "m", unit)):
-                if abs(found - times * expected) < 0.1 * times * expected and expected > _SPREAD:
-                    raise CalibrationError(
-                        f"{self._what(measured)}: positions are spread over {found:.3g} m, where the table says "
-                        f"{expected:.3g} m: they look like {given} taken for {meant}"
-                    )
 
     def _hold_what_has_no_reference(self) -> None:
         """Hold what places the arm as a whole, where nothing that was measured says where it is."""
@@ -230,13 +202,18 @@ class _Task:
         starts.sort(key=lambda state: _misfit(observations, state))
         before = fit(observations, starts[0], setup, self.sigma, robust=self.robust)
         columns = self._columns(observations)
-        self._require_enough(observations, before.state, columns)
+        if self.prior is None:
+            J = weighted_jacobian(observations, before.state, self.sigma)
+            require_enough(observations, J, columns, self.possible(observations, before.state, self.sigma))
         sigma = replace(self.sigma, length=before.sigma.length, angle=before.sigma.angle)
         whole = fit(observations, before.state, columns, sigma, prior=self.prior, robust=self.robust)
-        self._require_useful(before, whole)
+        if self.prior is None:
+            q = self._random_vectors(_TRIES)
+            require_size(whole, q)
+            require_improvement(before, whole, self._predicted(whole, q).length)
         if not whole.settled:
             raise CalibrationError(
-                f"{self._what(measured)}: the fit does not settle after {counted(whole.iterations, 'step')}: the "
+                f"{described(measured)}: the fit does not settle after {counted(whole.iterations, 'step')}: the "
                 "robot is not the one that was measured, joint coordinates are in other units or of another order, "
                 "or a prior is needed"
             )
@@ -264,82 +241,14 @@ class _Task:
             )
         return whole, dropped
 
-    def _what(self, measured: Measurements) -> str:
-        where = f"{measured.file}: " if measured.file else ""
-        rows = counted(
-            len(measured),
-            {Kind.POSE: "pose", Kind.POSITION: "position", Kind.DISTANCE: "distance"}.get(measured.kind, "row"),
-        )
-        if measured.groups is None:
-            return f"{where}{rows}"
-        return f"{where}{rows} of {counted(len(set(measured.groups)), measured.group_name or 'group')}"
-
-    def _require_enough(self, observations: Observations, state: State, columns: Sequence[int]) -> None:
-        """Raise an error if the measurements cannot tell parameters that others of their kind could."""
-        if self.prior is not None:
-            return
-        measured, robot = observations.measured, len(self.parameters)
-        J = weighted_jacobian(observations, state, self.sigma)
-        basis = find_basis(J, observations.unknowns, columns)
-        could = self.possible(observations, state, self.sigma)
-        mine = {k for k in basis.kept if k < robot}
-        count = f"{len(could)} parameters of the robot" + (
-            f" and {len(observations.unknowns) - robot} of the measurement"
-            if len(observations.unknowns) > robot
-            else ""
-        )
-        if len(J) < len(could) + len(basis.kept) - len(mine):
-            raise CalibrationError(
-                f"{self._what(measured)} cannot fix {count}: they are only {counted(len(J), 'equation')}. {_ADVICE}"
-            )
-        if len(mine) >= len(could):
-            return
-        missing = [self.parameters[k].name for k in sorted(could - mine)]
-        still = _still_joints(self.robot.spec, measured.q)
-        if len(still) == self.robot.n:
-            why = " No joint moves."
-        else:
-            why = f" {listed(still)} {'does' if len(still) == 1 else 'do'} not move." if still else ""
-        raise CalibrationError(
-            f"{self._what(measured)} cannot fix {count}: they determine only {len(mine)} of them, not "
-            f"{_some(missing)}.{why} {_ADVICE}"
-        )
-
-    def _require_useful(self, before: Fit, whole: Fit) -> None:
-        """Raise an error if the fit is worth less than the table as it was."""
-        if self.prior is not None:
-            return
-        measured = whole.observations.measured
-        q = random_vectors(self.robot.spec, self.measured.q, _TRIES, self.seed)
-        start = self.robot.start
-        extent = _extent(self.robot, start, q, tool=False)
-        found = _extent(self.robot, whole.state.values, q, tool=False)  # a tool may be any other than the table's
-        size = max(extent, _extent(self.robot, start, q, tool=True))
-        if size > _SPREAD and not (1.0 / _GROWTH - 1.0) * size < found - extent < (_GROWTH - 1.0) * size:
-            raise CalibrationError(
-                f"{self._what(measured)}: they would make the arm {found / max(extent, 1e-12):.4g} times as large as "
-                "its table says: lengths are in another unit, or the robot is not the one that was measured"
-            )
-        if size > _SPREAD and whole.sigma.length > _COARSE * size and not whole.sigma.length_known:
-            raise CalibrationError(
-                f"{self._what(measured)}: what is left is {1e3 * whole.sigma.length:.3g} mm a component, of an arm "
-                f"that gets around by {1e3 * size:.3g} mm: columns or rows are exchanged, a sign is wrong, or the "
-                "robot is not the one that was measured"
-            )
-        known = self._predicted(whole, q).length
-        was = errors_of(before.observations, before.state).length
-        if known > _USELESS * max(was, 3.0 * whole.sigma.length):
-            count = counted(sum(k < len(self.parameters) for k in whole.basis.kept), "parameter")
-            raise CalibrationError(
-                f"{self._what(measured)} cannot fix {count}: the tool would be known to {1e3 * known:.3g} mm inside "
-                f"the limits, and is {1e3 * was:.3g} mm off as it is. {_ADVICE}"
-            )
+    def _random_vectors(self, count: int) -> Array:
+        return random_vectors(self.robot.spec, self.measured.q, count, self.seed)
 
     def possible(self, observations: Observations, state: State, sigma: Sigma) -> set[int]:
         """Return the parameters that as many measurements could tell, at configurations all over the limits."""
         columns = self._columns(observations)
         count = max(200, 4 * len(columns))
-        anywhere = observations.with_random_rows(random_vectors(self.robot.spec, self.measured.q, count, self.seed))
+        anywhere = observations.with_random_rows(self._random_vectors(count))
         points = len(anywhere.point_names)
         there = replace(state, points=state.points[:points] if points <= len(state.points) else state.points)
         J = weighted_jacobian(anywhere, there, sigma.at_most(NOISY))
@@ -368,12 +277,12 @@ class _Task:
         measured = self.measured
         errors = errors_of(observations, state)
         errors_before = errors_of(observations, before.state)
-        q = random_vectors(self.robot.spec, measured.q, _TRIES, self.seed)
+        q = self._random_vectors(_TRIES)
         J = weighted_jacobian(observations, state, whole.sigma.at_most(NOISY))
         alone = find_basis(J, observations.unknowns, self._columns(observations), scale=1.0)
         outliers = find_outliers(whole, dropped, robust=self.robust)
         results = self._parameters(whole, values)
-        notes = [*self.notes, *self._remarks(whole, outliers)]
+        notes = [*self.notes, *remarks(whole, outliers, robust=self.robust)]
         return Calibration(
             robot=self.robot.robot(values),
             nominal=self.robot.spec,
@@ -445,97 +354,11 @@ class _Task:
             angle=float(np.sqrt((np.arccos(turn) ** 2).mean())),
         )
 
-    def _remarks(self, whole: Fit, outliers: Sequence[Outlier]) -> list[str]:
-        notes = []
-        spread, per_dof = chi2_spread(whole.dof), whole.chi2_per_dof
-        if whole.sigma.length_known and whole.dof > 0 and abs(per_dof - 1.0) > 4.0 * spread:
-            notes.append(
-                f"What is left is {math.sqrt(per_dof):.3g} times the noise that was given: "
-                + (
-                    "there is more than noise and the table's numbers (backlash, bending, outliers), or the noise is "
-                    "greater. The standard deviations do not account for that."
-                    if per_dof > 1.0
-                    else "the noise is less."
-                )
-            )
-        if whole.dof < 10:
-            notes.append(
-                f"There are only {whole.dof} more equations than parameters: what is left says little about the "
-                "noise."
-            )
-        away = float(np.linalg.norm(whole.state.values.base[:3, 3] - self.robot.spec.base.pose.xyz))
-        if away > _FAR:
-            notes.append(
-                f"base_link is the frame of the measurements now, {away:.3g} m from where it was; with a station "
-                "for each row it would stay. Gravity in the robot file is as it was: check it if the frame is not "
-                "level."
-            )
-        vague = [
-            self.parameters[column].name
-            for k, column in enumerate(whole.basis.kept)
-            if column < len(self.parameters) and math.sqrt(whole.covariance[k, k]) > _VAGUE
-        ]
-        if vague:
-            notes.append(
-                f"{listed(vague)} {'is' if len(vague) == 1 else 'are'} determined to no better than "
-                f"{1e3 * _VAGUE:g} mm or mrad: only together do these numbers mean anything. A prior keeps them near "
-                "the robot file's."
-            )
-        change = self.robot.change(whole.state.values, self.robot.start)
-        twisted = [
-            parameter.name
-            for k, parameter in enumerate(self.parameters)
-            if parameter.group in (Group.ALPHA, Group.BETA) and abs(change[k]) > _TWISTED
-        ]
-        if twisted:
-            notes.append(
-                f"{listed(twisted)} changed by more than any arm is built off: columns may be exchanged, a joint may "
-                "turn the other way, or the robot is not the one that was measured."
-            )
-        copies = _copies(whole.observations.measured)
-        if copies:
-            notes.append(
-                f"{counted(copies, 'row')} {'is an exact copy' if copies == 1 else 'are exact copies'} of another: "
-                "remove what was not measured again, since each row counts."
-            )
-        if outliers and not self.robust:
-            notes.append("There are outliers; a robust fit leaves them out.")
-        return notes
-
 
 def _misfit(observations: Observations, state: State) -> float:
     """Return how bad a start is; rows that are far off do not decide."""
     size = np.abs(observations.equations(state).e)
     return float(np.minimum(size, 10.0 * np.median(size) + 1e-12).sum())
-
-
-def _copies(measured: Measurements) -> int:
-    """Return how many rows are exact copies of rows before them, in what was measured and where."""
-    count = len(measured)
-    given = (measured.q, measured.position, measured.rotation, measured.distance)
-    numbers = np.concatenate([each.reshape(count, -1) for each in given if each is not None], axis=1)
-    names = (
-        texts or ("",) * count
-        for texts in (measured.station, measured.placement, measured.socket, measured.to, measured.pair)
-    )
-    return count - len(set(zip((row.tobytes() for row in numbers), *names, strict=True)))
-
-
-def _extent(robot: RobotParameters, values: Values, q: Array, *, tool: bool) -> float:
-    """Return how far the last DH frame, or tool0, gets around: the rms distance from its mean position, m."""
-    _, p = robot.tool_poses(values if tool else replace(values, tool=np.eye(4)), q)
-    return float(np.sqrt(((p - p.mean(axis=0)) ** 2).sum(axis=1).mean()))
-
-
-def _some(names: Sequence[str]) -> str:
-    if len(names) <= _MOST_NAMED + 1:
-        return listed(names)
-    return f"{listed(names[:_MOST_NAMED])} and {len(names) - _MOST_NAMED} others"
-
-
-def _still_joints(spec: RobotSpec, q: Array) -> list[str]:
-    names = [row.name for row in spec.moving_rows]
-    return [name for name, spread in zip(names, np.ptp(q, axis=0).tolist(), strict=True) if spread < 1e-3]
 
 
 def random_vectors(spec: RobotSpec, q: Array, count: int, seed: int) -> Array:

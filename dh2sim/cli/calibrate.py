@@ -420,7 +420,7 @@ def _error_lines(found: Calibration) -> list[str]:
 
 
 def _nominal(parameter: ParameterResult, spec: RobotSpec) -> str:
-    from dh2sim.robot.write import UnitWriter
+    from dh2sim.robot.number_text import UnitWriter
 
     if parameter.nominal is None:
         return ""

@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 from typing import Final, TypeAlias
 
-from dh2sim.robot.write import word
+from dh2sim.robot.yaml_text import word
 from dh2sim.robot.yaml_tree import Entry, Node, Report, compose, resolve_plain
 
 PARAMETERS: Final = "parameters"

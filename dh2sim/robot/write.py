@@ -10,14 +10,10 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import itertools
-import math
 import os
-import re
-import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 import numpy as np
 
@@ -26,6 +22,7 @@ from dh2sim.files import atomic_file
 from dh2sim.robot.checks import default_name
 from dh2sim.robot.fields import Choice, Color, Dimension, Flag, Kind, MeshFile, Number, Numbers
 from dh2sim.robot.mechanism_checks import default_closure_name
+from dh2sim.robot.number_text import UnitWriter, number, numbers
 from dh2sim.robot.parts import Inertia, Internal, Part, fields_of
 from dh2sim.robot.spec import (
     ActuatorSpec,
@@ -39,231 +36,12 @@ from dh2sim.robot.spec import (
     Row,
     Units,
 )
-from dh2sim.robot.yaml_tree import NOT_PRINTABLE, resolve_plain
+from dh2sim.robot.yaml_text import WIDTH, Tree, block_lines, comment_lines, entry_lines, inline, text_lines, word
+from dh2sim.robot.yaml_tree import NOT_PRINTABLE
 from dh2sim.typing import Array
-
-_NEIGHBOURS = 4
-"""Doubles tried on either side: the way to a unit and back rounds three times, less than an ulp each time."""
-
-
-def number(value: float) -> str:
-    """Return the shortest text of a double, such as ``-90``, ``0.4318`` or ``1e-9``; zero has no sign.
-
-    Raises:
-        NotFiniteError: It is NaN or infinite.
-    """
-    if not math.isfinite(value):
-        raise NotFiniteError("", repr(float(value)))
-    digits, _, exponent = repr(float(value) + 0.0).partition("e")
-    digits = digits.removesuffix(".0")
-    return f"{digits}e{int(exponent)}" if exponent else digits
-
-
-def numbers(values: Iterable[float]) -> list[str]:
-    """Return the texts of several doubles."""
-    return [number(value) for value in values]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UnitWriter:
-    """Writes SI values in the units of one file.
-
-    Read back through ``Units``, a text gives the same double in rad and in m. In another unit there may be no
-    double that does: the steps of the two units do not match. Then it gives the next one, an ulp away, which is
-    one that has such a text; what was read once is therefore written and read again without change.
-    """
-
-    units: Units = field(default_factory=Units)
-
-    def angle(self, value: float) -> str:
-        """Return the text of an angle in rad.
-
-        Raises:
-            ModelError: Too large for the file's unit.
-        """
-        if self.units.angle is AngleUnit.RAD:
-            return number(value)
-        return _shortest(value, self.units.radians, math.degrees, "rad", self.units.angle)
-
-    def length(self, value: float) -> str:
-        """Return the text of a length in m.
-
-        Raises:
-            ModelError: Too large for the file's unit.
-        """
-        if self.units.length is LengthUnit.M:
-            return number(value)
-        return _shortest(value, self.units.metres, self._from_metres, "m", self.units.length)
-
-    def text(self, value: float, dimension: Dimension | None, *, turns: bool) -> str:
-        """Return the text of a number in SI units; ``turns`` says whether a joint coordinate is an angle.
-
-        Raises:
-            ModelError: Too large for the file's unit.
-        """
-        match dimension:
-            case None:
-                return number(value)
-            case Dimension.COORDINATE:
-                return self.angle(value) if turns else self.length(value)
-            case Dimension.ANGLE:
-                return self.angle(value)
-            case Dimension.LENGTH:
-                return self.length(value)
-
-    def _from_metres(self, value: float) -> float:
-        """Return a length in the file's unit, an ulp off at most."""
-        match self.units.length:
-            case LengthUnit.M:
-                return value
-            case LengthUnit.MM:
-                return value * 1000
-            case LengthUnit.CM:
-                return value * 100
-            case LengthUnit.IN:
-                return value / 0.0254
-
-
-def _shortest(
-    value: float, to_si: Callable[[float], float], from_si: Callable[[float], float], si: str, unit: str
-) -> str:
-    """Return the shortest text that reads back as ``value``, or as the double nearest to it that has one."""
-    if not math.isfinite(from_si(value)):
-        raise ModelError(f"{value!r} {si} is too large to be written in {unit}")
-    reached = min(map(to_si, _around(from_si(value))), key=lambda si_value: (abs(si_value - value), abs(si_value)))
-    # from the reached value, not from the given one: so both have the same text
-    doubles = [double for double in _around(from_si(reached)) if to_si(double) == reached]
-    return min(map(number, doubles), key=len)
-
-
-def _around(centre: float) -> list[float]:
-    """Return a double and its neighbours, the nearest first."""
-    doubles = [centre]
-    below = above = centre
-    for _ in range(_NEIGHBOURS):
-        below, above = math.nextafter(below, -math.inf), math.nextafter(above, math.inf)
-        doubles += [below, above]
-    return doubles
-
-
-WIDTH: Final = 100
-"""Columns that a line should have at most."""
-_INDENT: Final = "  "
-_WORD: Final = re.compile(r"(?:/|\.\./)*[A-Za-z][A-Za-z0-9_./-]*")
-"""Names and paths in which nothing means anything to YAML, also inside brackets."""
-_OTHERS_BOOL: Final = frozenset({"y", "yes", "n", "no", "on", "off"})
-"""Booleans of YAML 1.1, which other programs may read the file by."""
-_ESCAPES: Final = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
-_REPLACEMENT: Final = "\N{REPLACEMENT CHARACTER}"
-
-
-def word(text: str) -> str:
-    """Return a name or a path, in quotes only where it needs them."""
-    return text if _WORD.fullmatch(text) and _is_text(text) else quoted(text)
-
-
-def quoted(text: str) -> str:
-    """Return text in double quotes; what YAML cannot hold becomes the replacement character U+FFFD."""
-    return f'"{"".join(map(_escaped, NOT_PRINTABLE.sub(_REPLACEMENT, text)))}"'
-
-
-def text_lines(key: str, text: str) -> list[str]:
-    """Return the lines of a key at the top of the file whose value is any text.
-
-    Plain on one line where that is possible and short enough; else folded, where folding keeps every character;
-    else in double quotes.
-    """
-    line = f"{key}: {text if _is_plain(text) else quoted(text)}"
-    if (len(line) <= WIDTH and "\n" not in text) or not _can_be_folded(text):
-        return [line]
-    body = text.removesuffix("\n")
-    lines = [f"{key}: {'>-' if body == text else '>'}"]
-    for index, paragraph in enumerate(body.split("\n")):
-        lines += [""] if index else []
-        lines += _wrapped(paragraph, _INDENT)
-    return lines
-
-
-def comment_lines(texts: Iterable[str]) -> list[str]:
-    """Return comments; long lines are wrapped, and what YAML cannot hold becomes U+FFFD."""
-    lines: list[str] = []
-    for text in texts:
-        for line in text.splitlines() or [""]:
-            shown = NOT_PRINTABLE.sub(_REPLACEMENT, line).rstrip()
-            lines += [f"# {shown}"] if 0 < len(shown) <= WIDTH - 2 else _wrapped(shown, "# ") or ["#"]
-    return lines
-
-
-def _is_text(text: str) -> bool:
-    """Whether readers take these characters, without quotes, for a text."""
-    return resolve_plain(text) == text and text.casefold() not in _OTHERS_BOOL
-
-
-def _is_plain(text: str) -> bool:
-    """Whether a text needs no quotes as the value of a key outside of brackets."""
-    if not text[:1].isalpha() or not text.isprintable() or not _is_text(text):
-        return False
-    return ": " not in text and " #" not in text and not text.endswith((":", " "))
-
-
-def _can_be_folded(text: str) -> bool:
-    """Whether single spaces and line feeds are the only white space, with a word at both ends."""
-    lines = text.removesuffix("\n").split("\n")
-    if not lines[0] or not lines[-1]:
-        return False
-    return all(line.isprintable() and line.strip(" ") == line and "  " not in line for line in lines)
-
-
-def _wrapped(text: str, prefix: str) -> list[str]:
-    """Return lines of at most WIDTH columns, where words are not longer than that."""
-    wrapper = textwrap.TextWrapper(
-        width=WIDTH,
-        initial_indent=prefix,
-        subsequent_indent=prefix,
-        break_long_words=prefix != _INDENT,
-        break_on_hyphens=False,
-    )
-    return wrapper.wrap(text)
-
-
-def _escaped(character: str) -> str:
-    if character in _ESCAPES:
-        return _ESCAPES[character]
-    if character.isprintable():
-        return character
-    code = ord(character)
-    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
-
-
-Tree: TypeAlias = "str | list[str] | dict[str, Tree]"
-"""Texts as written in the file, in lists and mappings."""
 
 _WORDS: Final = ("name", "type")
 _NUMBERS: Final = ("a", "alpha", "beta", "d", "theta")
-
-
-def inline(tree: Tree) -> str:
-    """Return a tree on one line."""
-    match tree:
-        case str():
-            return tree
-        case list():
-            return f"[{', '.join(tree)}]"
-        case dict():
-            return f"{{{', '.join(f'{key}: {inline(value)}' for key, value in tree.items())}}}"
-
-
-def entry_lines(key: str, tree: Tree, indent: int = 0) -> list[str]:
-    """Return the lines of a key: one, unless the value is a mapping that is too long for it."""
-    line = f"{' ' * indent}{key}: {inline(tree)}"
-    if len(line) <= WIDTH or not isinstance(tree, dict):
-        return [line]
-    return [f"{' ' * indent}{key}:", *block_lines(tree, indent + 2)]
-
-
-def block_lines(tree: Mapping[str, Tree], indent: int) -> list[str]:
-    """Return the lines of a mapping's keys."""
-    return [line for key, value in tree.items() for line in entry_lines(key, value, indent)]
 
 
 def table_lines(rows: Sequence[dict[str, Tree]]) -> list[str]:

@@ -1,10 +1,9 @@
-"""Poses of a robot in symbols."""
+"""Poses and Jacobians of a robot in symbols."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -21,7 +20,7 @@ from dh2sim.symbolic.jacobian import (
     singularities,
     square_rows,
 )
-from dh2sim.symbolic.polynomial import Atom, Matrix, identity
+from dh2sim.symbolic.polynomial import Matrix, identity
 from dh2sim.symbolic.table import Fold, SymbolicTable, transform
 from dh2sim.typing import Array
 
@@ -34,62 +33,55 @@ POSE_ENTRIES: Final = (
 """What the entries of a pose are called; those of the last row are 0 and 1 and have no name."""
 
 
-def pose_form(
-    table: SymbolicTable,
-    source: str = "base_link",
-    target: str = "tool0",
-    *,
-    style: Style = Style.BASE,
-    lengths: Lengths | None = None,
-    names: bool = True,
-    fold: Fold = Fold.PARALLEL,
-    joint_names: str = "theta",
-) -> Form:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FormNotation:
+    """How a form is written."""
+
+    style: Style
+    """How entries are nested."""
+    lengths: Lengths | None
+    """Whether lengths are outside or inside; None: as the style has them."""
+    names: bool
+    """Whether sums that recur are named #1, #2, …"""
+    fold: Fold
+    """Across which axes angles are added up."""
+    joint_names: str
+    """``theta`` or ``q``."""
+
+    def nesting(self, matrix: Matrix, table: SymbolicTable, source: str, target: str) -> Nesting:
+        """Return what nests the entries of a matrix between two frames."""
+        outermost = table.outermost(source, target, from_tool=self.style is Style.TOOL)
+        return Nesting([entry for row in matrix for entry in row], self.style, self.lengths, outermost)
+
+
+def pose_form(table: SymbolicTable, source: str, target: str, notation: FormNotation) -> Form:
     """Return the pose of a frame in another one.
 
     Args:
         table: The robot.
         source: Frame that the pose is given in.
         target: The frame.
-        style: How entries are nested.
-        lengths: Whether lengths are outside or inside; by default as the style has them.
-        names: Whether sums that recur are named #1, #2, …
-        fold: Across which axes angles are added up.
-        joint_names: ``theta`` or ``q``.
+        notation: How it is written.
 
     Raises:
         UnknownFrameError: There is no such frame.
         MismatchError: It differs from the table's oracle.
     """
-    matrix = table.pose(source, target, fold=fold)
     meaning = f"pose of {target} in {source}"
-    outermost = table.outermost(source, target, from_tool=style is Style.TOOL)
-    pose = _pose_equation(_name(table, source, target), matrix, style, lengths, outermost, meaning)
-    equations, named = with_names([pose], names=names)
-    form = Form(what="pose", table=table, equations=equations, named=named, joint_names=joint_names)
+    pose = _pose_equation(_name(table, source, target), table, source, target, notation, meaning)
+    equations, named = with_names([pose], names=notation.names)
+    form = Form(what="pose", table=table, equations=equations, named=named, joint_names=notation.joint_names)
     configurations = SampledConfigurations(table)
     expected = {pose.name: configurations.pose(source, target)}
     return replace(form, error=check_form(form, expected, configurations))
 
 
-def matrices_form(
-    table: SymbolicTable,
-    *,
-    style: Style = Style.BASE,
-    lengths: Lengths | None = None,
-    names: bool = True,
-    fold: Fold = Fold.PARALLEL,
-    joint_names: str = "theta",
-) -> Form:
+def matrices_form(table: SymbolicTable, notation: FormNotation) -> Form:
     """Return the transform A_i of every row, every DH frame in frame 0, and the poses of base and tool.
 
     Args:
         table: The robot.
-        style: How entries are nested.
-        lengths: Whether lengths are outside or inside; by default as the style has them.
-        names: Whether sums that recur are named #1, #2, …
-        fold: Across which axes angles are added up.
-        joint_names: ``theta`` or ``q``.
+        notation: How it is written.
 
     Raises:
         MismatchError: They differ from the table's oracle.
@@ -98,40 +90,28 @@ def matrices_form(
     equations, expected = [], {}
 
     def add(name: str, source: str, target: str, meaning: str) -> None:
-        matrix = table.pose(source, target, fold=fold)
-        outermost = table.outermost(source, target, from_tool=style is Style.TOOL)
-        equations.append(_pose_equation(name, matrix, style, lengths, outermost, meaning))
+        equations.append(_pose_equation(name, table, source, target, notation, meaning))
         expected[name] = configurations.pose(source, target)
 
     n = len(table.spec.rows)
-    if transform(table.path("base_link", "dh_0"), fold) != identity(4):
+    if transform(table.path("base_link", "dh_0"), notation.fold) != identity(4):
         add("T_base_0", "base_link", "dh_0", "pose of dh_0 in base_link")
     for i, row in enumerate(table.spec.rows, start=1):
         add(f"A_{i}", f"dh_{i - 1}", f"dh_{i}", row.name)
     for i in range(2, n + 1):
         add(f"T_0_{i}", "dh_0", f"dh_{i}", f"pose of dh_{i} in dh_0")
-    if transform(table.path(f"dh_{n}", "tool0"), fold) != identity(4):
+    if transform(table.path(f"dh_{n}", "tool0"), notation.fold) != identity(4):
         add(f"T_{n}_tool", f"dh_{n}", "tool0", f"pose of tool0 in dh_{n}")
         add("T", "base_link", "tool0", "pose of tool0 in base_link")
-    shown, named = with_names(equations, names=names)
-    form = Form(what="matrices", table=table, equations=shown, named=named, joint_names=joint_names)
+    shown, named = with_names(equations, names=notation.names)
+    form = Form(what="matrices", table=table, equations=shown, named=named, joint_names=notation.joint_names)
     return replace(form, error=check_form(form, expected, configurations))
 
 
 VELOCITIES: Final = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
-def jacobian_form(
-    table: SymbolicTable,
-    source: str = "base_link",
-    target: str = "tool0",
-    *,
-    style: Style = Style.BASE,
-    lengths: Lengths | None = None,
-    names: bool = True,
-    fold: Fold = Fold.PARALLEL,
-    joint_names: str = "theta",
-) -> Form:
+def jacobian_form(table: SymbolicTable, source: str, target: str, notation: FormNotation) -> Form:
     """Return the geometric Jacobian of a frame in another one, and its determinant in factors.
 
     The determinant is that of the joints that move the frame. If they are fewer than six, it is that of the rows that
@@ -141,11 +121,7 @@ def jacobian_form(
         table: The robot.
         source: Frame in which velocities are expressed.
         target: The frame that moves.
-        style: How entries are nested.
-        lengths: Whether lengths are outside or inside; by default as the style has them.
-        names: Whether sums that recur are named #1, #2, …
-        fold: Across which axes angles are added up.
-        joint_names: ``theta`` or ``q``.
+        notation: How it is written.
 
     Raises:
         UnknownFrameError: There is no such frame.
@@ -155,13 +131,12 @@ def jacobian_form(
     if not table.moving:
         raise Dh2simError(f"{table.spec.name}: has no joint that moves, and so no Jacobian")
     configurations = SampledConfigurations(table)
-    J = geometric_jacobian_matrix(table, source, target, fold=fold)
+    J = geometric_jacobian_matrix(table, source, target, fold=notation.fold)
     numbers = configurations.jacobian(source, target)
     moves = moving_between(table, source, target)
     forward = table.frames[source] <= table.frames[target]
     numbers = numbers * np.array(moves, dtype=np.float64) * (1.0 if forward else -1.0)
-    outermost = table.outermost(source, target, from_tool=style is Style.TOOL)
-    nesting = Nesting([entry for row in J for entry in row], style, lengths, outermost)
+    nesting = notation.nesting(J, table, source, target)
     columns = tuple(f"q{i}" for i in table.moving)
     shown = equation(
         "J",
@@ -171,7 +146,7 @@ def jacobian_form(
         entry_names=tuple(tuple(f"J{r}{c}" for c in range(1, len(columns) + 1)) for r in range(1, 7)),
         columns=columns,
     )
-    equations, named = with_names([shown], names=names)
+    equations, named = with_names([shown], names=notation.names)
     expected = {"J": numbers}
     length = configurations.length
     scales: dict[str, Array | float] = {"J": np.array([[length]] * 3 + [[1.0]] * 3)}
@@ -180,7 +155,7 @@ def jacobian_form(
     own = [list(itertools.compress(row, moves)) for row in J]
     rows = square_rows(own)
     if rows is not None:
-        found = factored_determinant(table, own, rows, moves, configurations, fold=fold)
+        found = factored_determinant(table, own, rows, moves, configurations, fold=notation.fold)
         if found is None:
             notes = ("The determinant has no factors that its structure shows; it is left out.",)
         else:
@@ -206,7 +181,7 @@ def jacobian_form(
         named=named,
         conditions=conditions,
         notes=notes,
-        joint_names=joint_names,
+        joint_names=notation.joint_names,
     )
     return replace(form, error=check_form(form, expected, configurations, scales=scales))
 
@@ -229,14 +204,10 @@ def _signed(
 
 
 def _pose_equation(
-    name: str,
-    matrix: Matrix,
-    style: Style,
-    lengths: Lengths | None,
-    outermost: Sequence[Sequence[Atom]],
-    meaning: str,
+    name: str, table: SymbolicTable, source: str, target: str, notation: FormNotation, meaning: str
 ) -> Equation:
-    nesting = Nesting([entry for row in matrix for entry in row], style, lengths, outermost)
+    matrix = table.pose(source, target, fold=notation.fold)
+    nesting = notation.nesting(matrix, table, source, target)
     return equation(name, matrix, nesting, meaning=meaning, entry_names=POSE_ENTRIES)
 
 

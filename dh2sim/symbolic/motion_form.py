@@ -24,13 +24,7 @@ MOST_JOINTS: Final = 4
 READABLE_JOINTS: Final = 3
 
 
-def dynamics_form(
-    table: SymbolicTable,
-    bodies: Bodies | None,
-    *,
-    names: bool = True,
-    joint_names: str = "theta",
-) -> Form:
+def dynamics_form(table: SymbolicTable, bodies: Bodies | None, *, names: bool, joint_names: str) -> Form:
     """Return the mass matrix, the Coriolis matrix and the gravity vector.
 
     Args:

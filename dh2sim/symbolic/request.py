@@ -11,7 +11,7 @@ from dh2sim.kinematics.chain import SpecLike, serial_spec_of
 from dh2sim.messages import member
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.form import Equation, Form
-from dh2sim.symbolic.kinematics import jacobian_form, matrices_form, pose_form
+from dh2sim.symbolic.kinematics import FormNotation, jacobian_form, matrices_form, pose_form
 from dh2sim.symbolic.reading import symbolic_table
 from dh2sim.symbolic.table import Fold
 from dh2sim.symbolic.text import form_text
@@ -136,28 +136,22 @@ def symbolic_form(
         if numbers and bodies is None:
             raise Dh2simError("dynamics in numbers needs bodies; pass letters=True for letters")
     table = symbolic_table(serial_spec_of(robot), letters=letters, numbers=numbers)
-    style_ = member(Style, style, "style")
-    lengths_ = None if lengths is None else member(Lengths, lengths, "lengths")
-    fold_ = member(Fold, fold, "fold")
+    notation = FormNotation(
+        style=member(Style, style, "style"),
+        lengths=None if lengths is None else member(Lengths, lengths, "lengths"),
+        names=names,
+        fold=member(Fold, fold, "fold"),
+        joint_names=joint_names,
+    )
     match wanted:
         case What.DYNAMICS:
             from dh2sim.symbolic.motion_form import dynamics_form
 
             form = dynamics_form(table, None if letters else bodies, names=names, joint_names=joint_names)
-        case What.POSE | What.JACOBIAN:
-            between_frames = pose_form if wanted is What.POSE else jacobian_form
-            form = between_frames(
-                table,
-                source,
-                target,
-                style=style_,
-                lengths=lengths_,
-                names=names,
-                fold=fold_,
-                joint_names=joint_names,
-            )
+        case What.POSE:
+            form = pose_form(table, source, target, notation)
+        case What.JACOBIAN:
+            form = jacobian_form(table, source, target, notation)
         case What.MATRICES:
-            form = matrices_form(
-                table, style=style_, lengths=lengths_, names=names, fold=fold_, joint_names=joint_names
-            )
+            form = matrices_form(table, notation)
     return SymbolicForm(form)

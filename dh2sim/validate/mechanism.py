@@ -24,7 +24,7 @@ from dh2sim.kinematics.transforms import pose_errors
 from dh2sim.kinematics.tree import tree_frames
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.typing import Array
-from dh2sim.validate.report import Check, Quantity, RobotReport, Worst
+from dh2sim.validate.report import Check, Quantity, RobotReport, Worst, unread_check
 
 GAP_LIMIT = 1e-3
 """Of loops in motion, in sizes of the mechanism, and rad."""
@@ -102,13 +102,8 @@ def _other_readers(path: Path, model: MechanismModel, q: Array, tolerance: float
             with signals_deferred():
                 reader = make(path, [names[k] for k in own], tuple(table[0]))
             poses = reader.frame_poses(np.ascontiguousarray(vectors[:, own]))
-        except ImportError as error:
-            reason = f"not installed ({error}); pip install {package}"
-            checks.append(Check(engine=engine, quantity=Quantity.POSE, ok=None, reason=reason))
-        except EngineCapacityError as error:
-            checks.append(Check(engine=engine, quantity=Quantity.POSE, ok=None, reason=str(error)))
-        except EngineError as error:
-            checks.append(Check(engine=engine, quantity=Quantity.FILE, ok=False, reason=str(error)))
+        except (ImportError, EngineCapacityError, EngineError) as error:
+            checks.append(unread_check(engine, package, error))
         except MemoryError:
             raise
         except Exception as error:  # a file may contain anything

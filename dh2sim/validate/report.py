@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from dh2sim.errors import EngineCapacityError, EngineError
 from dh2sim.model.slips import Slip
 
 
@@ -113,6 +114,22 @@ class Check:
                 "sample": self.worst.sample,
             }
         return entry
+
+
+def unread_check(engine: str, package: str, error: ImportError | EngineCapacityError | EngineError) -> Check:
+    """Return why an engine did not read its file: not installed or too small, which says nothing of it, or wrong.
+
+    Args:
+        engine: The engine.
+        package: What installs it, as ``pip install`` is told.
+        error: What it raised.
+    """
+    if isinstance(error, ImportError):
+        reason = f"not installed ({error}); pip install {package}"
+        return Check(engine=engine, quantity=Quantity.POSE, ok=None, reason=reason)
+    if isinstance(error, EngineCapacityError):
+        return Check(engine=engine, quantity=Quantity.POSE, ok=None, reason=str(error))
+    return Check(engine=engine, quantity=Quantity.FILE, ok=False, reason=str(error))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

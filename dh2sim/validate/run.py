@@ -38,7 +38,7 @@ from dh2sim.validate.kinematics import (
     table_jacobian,
 )
 from dh2sim.validate.mechanism import validate_mechanism
-from dh2sim.validate.report import Check, Quantity, RobotReport
+from dh2sim.validate.report import Check, Quantity, RobotReport, unread_check
 
 if TYPE_CHECKING:  # what reads sources takes a tenth of the time to start, and is seldom asked for
     from dh2sim.importing.sources import ImportOptions
@@ -196,13 +196,8 @@ def _read(model: RobotModel, mjcf: Path, urdf: Path) -> tuple[list[Mover | Yourd
             # an interrupted import would look like an engine that is not installed
             with signals_deferred(), np.errstate(all="ignore"):
                 engines.append(make(path, names, len(model.joints)))
-        except ImportError as error:
-            reason = f"not installed ({error}); pip install {package}"
-            unread.append(Check(engine=name, quantity=Quantity.POSE, ok=None, reason=reason))
-        except EngineCapacityError as error:
-            unread.append(Check(engine=name, quantity=Quantity.POSE, ok=None, reason=str(error)))
-        except EngineError as error:
-            unread.append(Check(engine=name, quantity=Quantity.FILE, ok=False, reason=str(error)))
+        except (ImportError, EngineCapacityError, EngineError) as error:
+            unread.append(unread_check(name, package, error))
     return engines, unread
 
 

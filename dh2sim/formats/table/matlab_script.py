@@ -32,9 +32,11 @@ from dh2sim.formats.table.toolbox import (
     ToolboxLink,
     ToolboxRobot,
     Unknown,
+    are_links,
     described,
     elementwise,
     links_in,
+    loose_robot,
     number,
     numbers_of,
     pose_function,
@@ -134,16 +136,7 @@ class _MatlabScript:
 
     def loose_robot(self) -> list[ToolboxRobot]:
         """Return the robot of all links, where a script makes none."""
-        if not self._links:
-            return []
-        held = [value for value in self.values.values() if isinstance(value, list) and _is_links(value)]
-        try:
-            links = links_in(max(held, key=len)) if held else self._links
-        except ScriptError as error:
-            links = self._links
-            if not self.problems:
-                self.problems.append(ScriptError(str(error), links[0].line, links[0].column))
-        return [ToolboxRobot(line=links[0].line, column=links[0].column, links=links)]
+        return loose_robot(self._links, self.values.values(), self.problems)
 
     def _concerns_robots(self, tokens: Sequence[Token]) -> bool:
         """Whether a statement makes a link or a robot, or changes one."""
@@ -158,7 +151,7 @@ class _MatlabScript:
         changes = len(tokens) > 2 and any(token.text == "=" for token in tokens)
         if isinstance(held, ToolboxRobot):
             return changes and bool(names_in_tokens(tokens) & {"base", "tool", "links", "offset", "qlim"})
-        return changes and (isinstance(held, ToolboxLink) or (isinstance(held, list) and _is_links(held)))
+        return changes and (isinstance(held, ToolboxLink) or are_links(held))
 
     def _forget(self, tokens: Sequence[Token], first: Token, *, reported: bool) -> None:
         """Make unknown what a statement that is passed over may assign."""
@@ -222,7 +215,7 @@ class _MatlabScript:
                 self._put(name, holder, index, value)
                 return
             if not isinstance(holder, list) or not isinstance(index, int) or not 0 < index <= len(holder):
-                if isinstance(holder, list) and _is_links(holder):
+                if are_links(holder):
                     raise ScriptError(f"{shown(name)} has no such link")
                 return
             holder = holder[index - 1]
@@ -241,7 +234,7 @@ class _MatlabScript:
     def _put(self, name: str, holder: object, index: int | None, value: object) -> None:
         held = holder if isinstance(holder, list) else NumberArray()
         if index is None or not 0 < index <= MAX_ITEMS:
-            if isinstance(value, ToolboxLink) or _is_links(held):
+            if isinstance(value, ToolboxLink) or are_links(held):
                 raise ScriptError("the index of the link cannot be read")
             self.values[name] = Unknown(f"{shown(name)} is assigned at an index that cannot be read")
             return
@@ -279,10 +272,6 @@ class _MatlabScript:
         if name in ("inches", "inch") and len(arguments) == 1:
             return number(arguments[0]) * 0.0254
         return Unknown(f"the function {shown(name)} on line {token.line} is not known")
-
-
-def _is_links(value: object) -> bool:
-    return isinstance(value, list) and any(isinstance(item, ToolboxLink) for item in value)
 
 
 _VECTOR: Final = ("theta", "d", "a", "alpha", "sigma", "offset")
@@ -343,7 +332,7 @@ def _set_vector(link: ToolboxLink, values: list[object], names: Sequence[str]) -
 
 def _robot(token: Token, arguments: Sequence[object]) -> ToolboxRobot:
     first, rest = arguments[0], list(arguments[1:])
-    if isinstance(first, list) and first and not _is_links(first) and not isinstance(first[0], Unknown):
+    if isinstance(first, list) and first and not are_links(first) and not isinstance(first[0], Unknown):
         rows = first if isinstance(first[0], list) else [first]
         links = []
         for row in rows:

@@ -25,8 +25,10 @@ from dh2sim.formats.table.toolbox import (
     ToolboxLink,
     ToolboxRobot,
     Unknown,
+    are_links,
     elementwise,
     links_in,
+    loose_robot,
     numbers_of,
     pose_function,
     power,
@@ -101,16 +103,7 @@ class _PythonScript:
 
     def loose_robot(self) -> list[ToolboxRobot]:
         """Return the robot of all links, where a script makes none."""
-        if not self._links:
-            return []
-        held = [value for value in self.scopes[0].values() if isinstance(value, list) and _has_links(value)]
-        try:
-            links = links_in(max(held, key=len)) if held else self._links
-        except ScriptError as error:
-            links = self._links
-            if not self.problems:
-                self.problems.append(ScriptError(str(error), links[0].line, links[0].column))
-        return [ToolboxRobot(line=links[0].line, column=links[0].column, links=links)]
+        return loose_robot(self._links, self.scopes[0].values(), self.problems)
 
     def block(self, statements: Sequence[ast.stmt]) -> None:
         """Follow statements, one after the other; what cannot be read of robots goes to the problems."""
@@ -228,7 +221,7 @@ class _PythonScript:
             case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
                 held = node.func.value if isinstance(node.func, ast.Attribute) else None
                 if name == "append" and isinstance(held, ast.Name):
-                    return _has_links(self._named(held.id))
+                    return are_links(self._named(held.id))
                 return self._function(name) in (*LINKS, *ROBOTS) or (name == "__init__" and _is_super(node))
             case ast.Attribute(attr=attribute, ctx=ast.Store()):
                 return attribute in ("tool", "base", "offset", "qlim", "alpha", "flip", "_tool", "_base")
@@ -400,7 +393,7 @@ class _PythonScript:
 
     def _gives_links(self, node: ast.Call) -> bool:
         first = node.args[0] if node.args else next((w.value for w in node.keywords if w.arg == "links"), None)
-        return first is not None and _has_links(self.value(first))
+        return first is not None and are_links(self.value(first))
 
     def _arguments(self, node: ast.Call, names: Sequence[str]) -> dict[str, object]:
         if len(node.args) > len(names) or any(isinstance(argument, ast.Starred) for argument in node.args):
@@ -465,10 +458,6 @@ def _is_super(node: ast.Call) -> bool:
             return name in ROBOTS
         case _:
             return False
-
-
-def _has_links(value: object) -> bool:
-    return isinstance(value, list) and any(isinstance(item, ToolboxLink) for item in value)
 
 
 def _element(value: object, index: object) -> object:

@@ -6,9 +6,9 @@ A script is text. What it assigns is computed here, number by number; nothing of
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, TypeAlias
+from typing import Final, TypeAlias, TypeGuard
 
 from dh2sim.formats.table.dh_table import Given, Table
 from dh2sim.formats.table.grid import Cell, Grid
@@ -359,6 +359,32 @@ def links_in(value: object, *, depth: int = 0) -> list[ToolboxLink]:
             raise ScriptError(f"the links cannot be read: {value.why}", reported=value.reported)
         case _:
             raise ScriptError(f"expected links, found {described(value)}")
+
+
+def are_links(value: object) -> TypeGuard[list[object]]:
+    """Whether a value is a list with links in it."""
+    return isinstance(value, list) and any(isinstance(item, ToolboxLink) for item in value)
+
+
+def loose_robot(
+    links: list[ToolboxLink], values: Iterable[object], problems: list[ScriptError]
+) -> list[ToolboxRobot]:
+    """Return the robot of a script that makes links, but no robot: that of its longest list of links, else of all.
+
+    Args:
+        links: All links that the script makes.
+        values: The values of its variables.
+        problems: What cannot be read of it; a list of links that cannot be used is added if there is nothing yet.
+    """
+    if not links:
+        return []
+    held = [value for value in values if are_links(value)]
+    try:
+        links = links_in(max(held, key=len)) if held else links
+    except ScriptError as error:
+        if not problems:
+            problems.append(ScriptError(str(error), links[0].line, links[0].column))
+    return [ToolboxRobot(line=links[0].line, column=links[0].column, links=links)]
 
 
 _HEADINGS: Final = ("theta (rad)", "d", "a", "alpha (rad)", "offset (rad)", "type", "flip", "min (rad)", "max (rad)")

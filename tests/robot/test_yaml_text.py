@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dh2sim.robot.write import WIDTH, comment_lines, quoted, text_lines, word
+from dh2sim.robot.yaml_text import WIDTH, comment_lines, quoted, text_lines, word
 from dh2sim.robot.yaml_tree import NOT_PRINTABLE, Report, compose, decode
 
 ALPHABET = st.characters(exclude_categories=["Cs"]) | st.sampled_from(
