@@ -22,6 +22,13 @@ settings.register_profile("thorough", settings.get_profile("full"), derandomize=
 vars(providers)["_get_local_constants"] = lambda: providers._local_constants
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add what is asked for by hand."""
+    parser.addoption(
+        "--slow-page", type=int, metavar="SEED", help="delay what pages of the viewer draw and send, at random"
+    )
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Choose how many examples property tests try, unless ``--hypothesis-profile thorough`` says it."""
     if config.getoption("hypothesis_profile", None) is None:
@@ -29,12 +36,14 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests that drive a browser by the fixture that they use; one that fails is run once more.
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the tests that drive a browser by the fixture that they use; one that fails is run twice more.
 
-    A browser that draws in software beside another test may miss a deadline; what is wrong fails twice.
+    A browser is a program of others, which may be killed for want of memory or not get a processor for a minute; what
+    is wrong fails three times. ``-p no:rerunfailures`` shows what fails once.
     """
     for item in items:
         if "browser" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.browser)
-            item.add_marker(pytest.mark.flaky(reruns=1))
+            if config.pluginmanager.hasplugin("rerunfailures"):
+                item.add_marker(pytest.mark.flaky(reruns=2))

@@ -58,7 +58,7 @@ def dh2sim_process(
         capture_output=True,
         encoding="utf-8",
         errors="surrogateescape",
-        timeout=120,
+        timeout=300,
         check=False,
     )
     return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
@@ -71,7 +71,7 @@ def shell(script: str, **variables: str) -> Outcome:
         env=environment(PYTHON=sys.executable, DH2SIM=f"{sys.executable} -m dh2sim", **variables),
         capture_output=True,
         encoding="utf-8",
-        timeout=120,
+        timeout=300,
         check=False,
     )
     return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)

@@ -60,7 +60,7 @@ def run_step(action: dict[str, Any], where: Path, **inputs: str) -> Done:
         capture_output=True,
         text=True,
         check=False,
-        timeout=120,
+        timeout=300,
     )
     outputs = dict(line.split("=", 1) for line in output.read_text().splitlines())
     return Done(done.returncode, done.stdout + done.stderr, outputs, summary.read_text())

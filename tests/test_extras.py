@@ -67,7 +67,7 @@ class Blocked:
             env=environment(PYTHONPATH=str(ROOT)),
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=300,
             check=False,
         )
         return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)

@@ -54,9 +54,11 @@ def test_a_request_that_computes_without_end_is_stopped() -> None:
     assert stopped("loop", seconds=1) == "it takes longer than 1 seconds"
 
 
-def test_a_request_that_waits_without_end_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(limited_process, "PATIENCE", 0.5)
-    assert stopped("sleep", seconds=1) == "it takes longer than 1 seconds"
+def test_a_request_that_waits_without_end_is_stopped() -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(limited_process, "PATIENCE", 0.5)
+        assert refusal(WorkerError, asked, "sleep", 1) == "it takes longer than 1 seconds"
+    assert asked("add 2 3") == b"5"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no signals here")
@@ -109,7 +111,7 @@ def test_nothing_is_left_running_when_the_caller_ends() -> None:
     assert done.stderr == ""
     for pid in done.stdout.strip("[]\n").split(","):
         if pid and os.name != "nt":
-            deadline = time.monotonic() + 5.0
+            deadline = time.monotonic() + 60.0
             while Path(f"/proc/{int(pid)}").exists() and time.monotonic() < deadline:
                 time.sleep(0.01)
             assert not Path(f"/proc/{int(pid)}").exists()

@@ -47,7 +47,7 @@ def _imported(code: str) -> set[str]:
         env=environment(),
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=True,
     )
     return set(done.stdout.split())

@@ -43,7 +43,7 @@ def test_camera_frames_the_whole_robot(robot: str) -> None:
         capture_output=True,
         text=True,
         check=False,
-        timeout=120,
+        timeout=300,
     )
     assert done.returncode == 0, done.stderr
     share, top, bottom, left, right, contrast, background = (float(word) for word in done.stdout.split())

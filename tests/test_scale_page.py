@@ -48,6 +48,6 @@ def test_its_pool_of_processes_simulates(tmp_path: Path) -> None:
     code = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)[0]
     (tmp_path / "pool.py").write_text(code.replace("rollout(64,", "rollout(4,") + "    print(run.sizes['rollout'])\n")
     done = subprocess.run(
-        [sys.executable, "pool.py"], cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=120
+        [sys.executable, "pool.py"], cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=300
     )
     assert (done.returncode, done.stdout) == (0, "4\n"), done.stderr

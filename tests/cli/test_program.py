@@ -387,6 +387,6 @@ def test_a_signal_ends_the_program_with_the_status_of_shells(
     (tmp_path / "signalled.py").write_text(SIGNALLED)
     command = [sys.executable, "-m", "signalled", str(int(kill)), when]
     done = subprocess.run(
-        command, env=environment(), cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+        command, env=environment(), cwd=tmp_path, capture_output=True, text=True, timeout=180, check=False
     )
     assert (done.returncode, done.stderr) == (status, printed)

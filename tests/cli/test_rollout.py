@@ -283,7 +283,7 @@ def test_a_bar_is_drawn_on_a_terminal_unless_it_should_be_quiet(quiet: bool, fol
         if not part:
             break
         drawn += part
-    out, _ = process.communicate(timeout=60)
+    out, _ = process.communicate(timeout=180)
     os.close(ours)
     assert process.returncode == 0
     assert bool(out) is not quiet
@@ -318,7 +318,7 @@ def test_help_of_the_command_simulates_nothing_and_imports_nothing_heavy() -> No
         "print(sorted({'mujoco', 'xarray', 'zarr', 'numpy'} & sys.modules.keys()))"
     )
     done = subprocess.run(
-        [sys.executable, "-c", script], env=environment(), capture_output=True, text=True, timeout=60, check=True
+        [sys.executable, "-c", script], env=environment(), capture_output=True, text=True, timeout=180, check=True
     )
     assert done.stdout.splitlines()[-1] == "[]"
 

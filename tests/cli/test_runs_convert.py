@@ -110,7 +110,7 @@ def test_a_terminal_sees_a_bar_that_vanishes(run: Path) -> None:
             env=environment(TERM="xterm"),
             stdout=subprocess.PIPE,
             stderr=theirs,
-            timeout=60,
+            timeout=180,
             check=True,
         )
         os.write(theirs, b"end")

@@ -180,7 +180,7 @@ def test_tikz_compiles(style: str, tmp_path: Path) -> None:
     (tmp_path / "page.tex").write_text(text, encoding="utf-8")
     done = subprocess.run(
         ["pdflatex", "-halt-on-error", "-interaction=nonstopmode", "page.tex"],
-        cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False,
+        cwd=tmp_path, capture_output=True, text=True, timeout=180, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-2000:]
     assert (tmp_path / "page.pdf").read_bytes().startswith(b"%PDF")
@@ -293,7 +293,7 @@ def test_only_png_and_pdf_need_matplotlib(tmp_path: Path) -> None:
     def run(*options: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
             [sys.executable, "-c", code, "draw", "scara", *options],
-            cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=60, check=False,
+            cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=180, check=False,
         )  # fmt: skip
 
     for ending in ("svg", "tex"):

@@ -70,7 +70,7 @@ def run(folder: Path, *command: str, **variables: str) -> Outcome:
         env={**kept, "PYTHONPATH": path, **variables},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=False,
     )
     return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
@@ -115,5 +115,5 @@ def test_modules_in_the_current_folder_are_not_run(folder: Path) -> None:
     """Finding out what renders starts another Python, perhaps in a stranger's checkout."""
     (folder / "mujoco.py").write_text("import pathlib; pathlib.Path('ran').touch()\n", encoding="utf-8")
     code = "from dh2sim.draw import offscreen; offscreen._try('egl')"
-    subprocess.run([sys.executable, "-P", "-c", code], cwd=folder, env=environment(), timeout=120, check=True)
+    subprocess.run([sys.executable, "-P", "-c", code], cwd=folder, env=environment(), timeout=300, check=True)
     assert not (folder / "ran").exists()

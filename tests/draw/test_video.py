@@ -30,7 +30,7 @@ OPTIONS = PictureOptions(width=160, height=120)
 def decoded(path: Path) -> tuple[str, NDArray[np.uint8]]:
     """What ffmpeg reports of a video of 160x120, and its pictures."""
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
-    done = subprocess.run(command, capture_output=True, check=True, timeout=60)
+    done = subprocess.run(command, capture_output=True, check=True, timeout=180)
     [about] = [line for line in done.stderr.decode().split("Output")[0].splitlines() if "Video:" in line]
     return about, np.frombuffer(done.stdout, dtype=np.uint8).reshape(-1, 120, 160, 3)
 

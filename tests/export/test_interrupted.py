@@ -77,7 +77,7 @@ def test_an_export_cut_off_at_any_moment_leaves_whole_files(tmp_path: Path, kind
         process.stdout.readline()  # the first set stands
         time.sleep(rng.uniform(0.0, 0.02))
         process.send_signal(kind)
-        stderr = process.communicate(timeout=30)[1]
+        stderr = process.communicate(timeout=180)[1]
         stands = {name: data for name, data in contents(out).items() if not name.startswith(".")}
         if kind is signal.SIGKILL:  # which nothing can put off: each file by itself is whole
             assert set(stands) == set(versions[0][1])
@@ -97,7 +97,7 @@ def test_the_program_ends_in_good_order_on_a_signal(tmp_path: Path, kind: signal
     assert process.stdout is not None
     first = process.stdout.readline()
     process.send_signal(kind)
-    _, stderr = process.communicate(timeout=30)
+    _, stderr = process.communicate(timeout=180)
     assert first == f"{builtin_robots()[0]}: {tmp_path / builtin_robots()[0]}\n"
     assert (process.returncode, stderr) == (status, "dh2sim: interrupted\n" if kind is signal.SIGINT else "")
     for folder in tmp_path.iterdir():
@@ -114,8 +114,8 @@ def test_an_interruption_during_a_long_validation_is_heeded_at_once(tmp_path: Pa
     time.sleep(moment)  # while engines are imported, and while they are compared
     process.send_signal(signal.SIGINT)
     started = time.monotonic()
-    out, stderr = process.communicate(timeout=60)
-    assert time.monotonic() - started < 8.0
+    out, stderr = process.communicate(timeout=180)
+    assert time.monotonic() - started < 15.0  # it would take half a minute
     assert (process.returncode, out, stderr) == (130, "", "dh2sim: interrupted\n")
     assert not list(tmp_path.iterdir())
 
@@ -128,7 +128,7 @@ def test_an_export_starts_no_other_process_that_an_interruption_could_hit(tmp_pa
         'import sys; sys.addaudithook(lambda event, _: event == "subprocess.Popen" and print("STARTED", event))'
     )
     process = _start("-c", f"{listening}\n{STARTED}", "export", "stanford", "--out", tmp_path)
-    out, stderr = process.communicate(timeout=60)
+    out, stderr = process.communicate(timeout=180)
     assert (process.returncode, stderr) == (0, "")
     assert "stanford.xml" in out
     assert "STARTED" not in out
@@ -143,7 +143,7 @@ def test_an_interruption_while_the_program_starts_is_no_traceback(tmp_path: Path
         process.stdout.readline()
         time.sleep(rng.uniform(0.0, 0.5))
         process.send_signal(signal.SIGINT)
-        _, stderr = process.communicate(timeout=30)
+        _, stderr = process.communicate(timeout=180)
         # before the program listens, and after it is done, the signal itself ends the process
         assert process.returncode in (0, 130, -signal.SIGINT)
         if process.returncode == 130:

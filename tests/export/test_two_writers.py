@@ -92,6 +92,6 @@ def test_an_export_waits_for_another_or_fails_where_it_is_told_not_to(tmp_path: 
     assert told == f"dh2sim: waiting for another process that is writing to '{folder}'\n"
     assert contents(out / "small") == {name.removeprefix("small/"): data for name, data in before.items()}
     lock.release()
-    assert waiting.communicate(timeout=60)[0].startswith(f"small: {folder}\n")
+    assert waiting.communicate(timeout=180)[0].startswith(f"small: {folder}\n")
     assert waiting.returncode == 0
     assert contents(out) != before

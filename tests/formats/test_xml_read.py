@@ -175,9 +175,9 @@ def test_an_entity_bomb_and_every_other_declaration_is_refused_at_once(
     doctype: str, column: int, before: int
 ) -> None:
     text = f"<!--{'-x' * (before // 2)}-->\n{doctype}<a b='&x12;'>&x12;</a>"
-    start = time.perf_counter()
+    start = time.thread_time()  # of this thread alone, however busy the machine is
     assert refused(text) == f"a.xml:2:{column}: <!DOCTYPE a ...> {REFUSED}"
-    assert time.perf_counter() - start < 2.0
+    assert time.thread_time() - start < 2.0
 
 
 def test_a_document_type_that_declares_nothing_is_harmless() -> None:

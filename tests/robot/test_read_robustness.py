@@ -89,10 +89,10 @@ def test_a_file_with_odd_keys_is_read_or_refused(pairs: list[tuple[str, str]], l
     ids=["names", "cycle", "keys", "rows", "configurations", "tags", "lines", "quotes", "empty", "dashes"],
 )
 def test_a_large_wrong_robot_file_is_refused_quickly(text: str) -> None:
-    start = time.perf_counter()
+    start = time.thread_time()
     with pytest.raises(RobotFileError):
         parse_robot(text)
-    assert time.perf_counter() - start < 60  # hours, if it were not refused
+    assert time.thread_time() - start < 60  # hours, if it were not refused
 
 
 def test_a_large_right_file_is_read_soon() -> None:
@@ -100,7 +100,7 @@ def test_a_large_right_file_is_read_soon() -> None:
         "- {type: revolute, a: 0.1, alpha: -90, d: d1, theta: 0, limits: {position: [-170, 170], velocity: 90}, "
         "link: {mass: 1, com: [0, 0, 0], inertia: {ixx: 1, iyy: 1, izz: 1}}}\n"
     )
-    start = time.perf_counter()
+    start = time.thread_time()
     spec = parse_robot("name: r\nconvention: standard\nparameters: {d1: 1}\njoints:\n" + row * 400)
-    assert time.perf_counter() - start < 10
+    assert time.thread_time() - start < 10
     assert len(spec.rows) == 400

@@ -30,7 +30,7 @@ from tests.robot_files import small
 ROLLOUTS, STEPS, BLOCK = 60, 200, 3
 CONTROLLER = "pd"
 OPTIONS = ("--rollouts", str(ROLLOUTS), "--steps", str(STEPS), "--controller", CONTROLLER, "--start", "random")
-WAIT = 60.0
+WAIT = 180.0
 
 
 def _begin(folder: Path) -> tuple[Path, RunWriter]:

@@ -144,7 +144,7 @@ def test_another_process_gives_the_same_bits() -> None:
             env=environment(PYTHONHASHSEED=hash_seed),
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=180,
             check=True,
         )
         assert done.stdout.strip() == digest()

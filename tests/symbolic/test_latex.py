@@ -39,7 +39,7 @@ def compiled(text: str, folder: Path) -> str:
         cwd=folder,
         capture_output=True,
         check=False,
-        timeout=120,
+        timeout=300,
     )
     log = (folder / "form.log").read_text(encoding="latin-1")
     assert done.returncode == 0, log[-2000:]

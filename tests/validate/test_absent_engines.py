@@ -26,7 +26,7 @@ def _without(package: str, *arguments: str | Path) -> Outcome:
         env=environment(),
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=False,
     )
     return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)

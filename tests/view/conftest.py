@@ -15,13 +15,11 @@ from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import ViewState
-from tests.view.on_page import Serve, wait_until
+from tests.view.on_page import DEADLINE, OpenPage, Serve, wait_until
+from tests.view.slow_page import slow_pages
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
-
-TIMEOUT = 60_000
-"""ms that a page may take to show something: a browser without a graphics card is slow."""
 
 NO_DRAWING = """
 for (const call of ["clear", "drawArrays", "drawElements", "drawArraysInstanced", "drawElementsInstanced"])
@@ -29,6 +27,17 @@ for (const call of ["clear", "drawArrays", "drawElements", "drawArraysInstanced"
 """
 
 Windows: TypeAlias = "Callable[[bool], BrowserContext]"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def slow_page(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Pages that are late at random, if that is asked for."""
+    seed: int | None = request.config.getoption("--slow-page")
+    if seed is None:
+        yield
+        return
+    with slow_pages(seed):
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -63,7 +72,7 @@ def windows(browser: Browser) -> Windows:
     def window(drawn: bool) -> BrowserContext:
         if drawn not in opened:
             opened[drawn] = browser.new_context(viewport={"width": 900, "height": 640}, accept_downloads=True)
-            opened[drawn].set_default_timeout(TIMEOUT)
+            opened[drawn].set_default_timeout(1000.0 * DEADLINE)  # ms
             if not drawn:
                 opened[drawn].add_init_script(NO_DRAWING)
         return opened[drawn]
@@ -89,9 +98,10 @@ def wait_for_panel(page: Page) -> None:
 
 
 @pytest.fixture
-def open_page(window: BrowserContext, viewer: Viewer) -> Iterator[Callable[[], Page]]:
+def open_page(window: BrowserContext, viewer: Viewer) -> Iterator[OpenPage]:
     """Opens pages of the viewer, which are closed when the test ends."""
-    pages = []
+    pages: list[Page] = []
+    wait_until(lambda: not viewer.pages, "those of before are closed")
 
     def opened() -> Page:
         pages.append(window.new_page())

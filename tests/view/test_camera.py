@@ -23,7 +23,7 @@ from dh2sim.view.scene.items import Label
 from dh2sim.view.scene.labels import HEIGHT, width
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import ViewState
-from tests.view.on_page import choose, open_tab, pixel, wait_until
+from tests.view.on_page import at_rest, choose, open_tab, pixel, wait_for_aim, wait_for_work, wait_until
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -87,10 +87,13 @@ def is_seen(page: Page, served: ServedPage) -> bool:
 def test_in_a_narrower_window_the_camera_moves_back(open_page: Callable[[], Page], viewer: Viewer) -> None:
     page = open_page()
     (served,) = viewer.pages
-    wait_until(lambda: served.client.camera.aspect < 1.0 and is_seen(page, served), "it is seen beside the panel")
+    wait_for_aim(served)
+    wait_until(lambda: is_seen(page, served), "it is seen beside the panel")
     near = math.dist(served.client.camera.position, served.client.camera.look_at)
     page.set_viewport_size({"width": 640, "height": 640})
-    wait_until(lambda: served.client.camera.aspect < 0.5 and is_seen(page, served), "it is seen in the narrow window")
+    wait_until(lambda: served.client.camera.aspect < 0.5, "the window is narrow")
+    wait_for_aim(served)
+    wait_until(lambda: is_seen(page, served), "it is seen in the narrow window")
     assert math.dist(served.client.camera.position, served.client.camera.look_at) > 1.3 * near
     page.set_viewport_size({"width": 900, "height": 640})
     wait_until(
@@ -101,10 +104,12 @@ def test_in_a_narrower_window_the_camera_moves_back(open_page: Callable[[], Page
 def test_a_camera_that_the_user_has_moved_stays(open_page: Callable[[], Page], viewer: Viewer) -> None:
     page = open_page()
     (served,) = viewer.pages
+    wait_for_aim(served)
     wait_until(lambda: is_seen(page, served), "it is seen")
     moved = move_the_camera(page, served, 120.0)
     page.set_viewport_size({"width": 700, "height": 640})
     wait_until(lambda: served.client.camera.aspect < 0.6, "the window is narrow")
+    wait_for_work(served)  # to aim the camera would be a part of it
     page.wait_for_timeout(500)
     assert math.dist(served.client.camera.position, moved) < 1e-3
     page.set_viewport_size({"width": 900, "height": 640})
@@ -121,15 +126,7 @@ def move_the_camera(page: Page, served: ServedPage, pixels: float) -> Array:
     page.mouse.move(x + pixels, y, steps=5)
     page.mouse.up()
     wait_until(lambda: math.dist(served.client.camera.position, before) > 0.1, "the user moves the camera")
-    last: list[Array] = []
-
-    def rests() -> bool:
-        last.append(served.client.camera.position.copy())
-        page.wait_for_timeout(500)
-        return len(last) > 1 and math.dist(last[-1], last[-2]) < 1e-6
-
-    wait_until(rests, "the camera comes to rest")
-    return last[-1]
+    return np.array(at_rest(lambda: served.client.camera.position.tolist()))
 
 
 def test_the_labels_of_a_row_can_be_read_wherever_the_camera_is(
@@ -140,11 +137,12 @@ def test_the_labels_of_a_row_can_be_read_wherever_the_camera_is(
     open_tab(page, "Table")
     choose(page, "Row", "2: joint_2")
     wait_until(lambda: "α₂ = 90°" in {label.text for label in drawn_labels(served)}, "the row is explained")
+    wait_for_aim(served)
     before = served.state.pinhole
     for pixels in (90.0, -170.0):
         move_the_camera(page, served, pixels)
-        assert served.state.pinhole not in (None, before)
-        wait_until(lambda: not covered(page, served), f"{covered(page, served)} cover each other")
+        wait_until(lambda: served.state.pinhole not in (None, before), "the camera is reported")
+        wait_until(lambda: not covered(page, served), lambda: f"{covered(page, served)} cover each other")
 
 
 def drawn_labels(served: ServedPage) -> list[Label]:

@@ -22,6 +22,7 @@ from dh2sim.view.page_export import BoundingSphere, export_page, page_html
 from dh2sim.view.scene.items import ORIGIN, Color, Placed, Scene, Solid, Vector
 from tests.draw.datasets import swinging
 from tests.sample_robots import robot
+from tests.view.on_page import DEADLINE
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Route
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 UNIT = BoundingSphere(centre=(0.0, 0.0, 0.0), radius=1.0)
 WIDTH, HEIGHT = 480, 360
-DEADLINE = 60.0
-"""s: a browser without a graphics card is slow."""
 
 
 def box(color: Color, half: float = 0.3, position: Vector = ORIGIN) -> Solid:
@@ -59,6 +58,7 @@ class Tab:
 
     def open(self, path: Path) -> None:
         context = self.browser.new_context(viewport={"width": WIDTH, "height": HEIGHT}, offline=True)
+        context.set_default_timeout(1000.0 * DEADLINE)
         context.route("**/*", lambda route: self._route(route))
         self.page = context.new_page()
         self.page.on("console", lambda entry: self.errors.append(entry.text) if entry.type == "error" else None)
@@ -235,7 +235,8 @@ def test_a_rollout_moves_the_robot_in_the_page(puma: RobotModel, tab: Tab, tmp_p
     clock.wait_for()
     stop(tab, clock)
     clock.fill("0.1")
-    away = orange(tab.picture_when(robot_is_seen))
+    tab.picture_when(robot_is_seen)
+    away = orange(tab.picture_at_rest())
     clock.fill("0.01")
     tab.picture_when(lambda seen: (orange(seen) != away).mean() > 0.005)
     first = orange(tab.picture_at_rest())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import signal
-import time
 from typing import TYPE_CHECKING
 
 import pytest
@@ -29,10 +28,7 @@ def test_an_interruption_ends_a_program_that_simulates(window: BrowserContext) -
             lambda: re.match(r"Simulated: (?!0\.0)", shown(page, "motion")) is not None, "the arm is simulated"
         )
         process.send_signal(signal.SIGINT)
-        begun = time.monotonic()
         out, err = process.communicate(timeout=TIMEOUT)
-        took = time.monotonic() - begun
         page.close()
     assert (process.returncode, out, err) == (130, "", "dh2sim: interrupted\n")
-    assert took < 10.0
     assert is_free(port)

@@ -16,7 +16,7 @@ from dh2sim.typing import Array
 from dh2sim.view.initial_state import folder_of, open_state
 from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.state import Part
-from tests.view.on_page import Serve, open_tab, pixel, wait_until
+from tests.view.on_page import Serve, open_tab, pixel, wait_for_aim, wait_until
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -64,6 +64,7 @@ def test_the_mesh_of_a_link_is_sent_to_the_browser_and_seen(serve: Serve, tmp_pa
     assert len(sent.faces) == 12  # type: ignore[attr-defined]
     assert served.client.scene.get_handle_by_name("/robot/link_1/shape_0") is None
 
+    wait_for_aim(served)
     open_tab(page, "Show")
     hidden = {"DH frames": Part.FRAMES, "Floor": Part.GRID, "Explained row": Part.ANNOTATIONS}
     for label in (*hidden, "Handle to drag tool0"):

@@ -17,7 +17,16 @@ from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.scene.scene import scene_of
 from dh2sim.view.state import Mode, Part
 from tests.program import dh2sim
-from tests.view.on_page import Serve, choose, field, open_tab, shown, wait_for_position, wait_until
+from tests.view.on_page import (
+    Serve,
+    choose,
+    field,
+    open_tab,
+    wait_for_equal,
+    wait_for_position,
+    wait_for_whole_text,
+    wait_until,
+)
 from tests.view.test_solids import pose_in_scene
 
 if TYPE_CHECKING:
@@ -55,8 +64,7 @@ def stand_at(page: Page, percent: int, rollout: int) -> float:
     page.get_by_role("button", name="Play").wait_for()
     field(page, "Time [%]").fill(str(percent))
     time = 0.01 * percent * DURATION
-    status = f"Rollout {rollout}: {time:.2f} of {DURATION:.2f} s."
-    wait_until(lambda: shown(page, "motion") == status, f"{shown(page, 'motion')}, not {status}")
+    wait_for_whole_text(page, "motion", f"Rollout {rollout}: {time:.2f} of {DURATION:.2f} s.")
     return time
 
 
@@ -76,7 +84,7 @@ def test_a_recording_is_paused_searched_changed_and_stopped(serve: Serve, run: P
         open_tab(page, "Motion")
     choose(page, "Mode", "manual")
     wait_until(lambda: served.state.mode is Mode.MANUAL, "the joints are given back")
-    wait_until(lambda: shown(page, "motion") == "", "the status of the recording is gone")
+    wait_for_whole_text(page, "motion", "")
 
 
 @pytest.mark.slow
@@ -112,14 +120,14 @@ def test_a_floating_base_moves_away_and_returns(serve: Serve, tmp_path: Path) ->
     with xr.open_dataset(run, engine="zarr", consolidated=False) as data:
         base = data.base_pose.values[0, np.abs(data.time.values - time).argmin()]
     assert base[2] < -0.5, "it falls"
-    assert drawn_at(served, "/robot") == pytest.approx(base, abs=1e-9)
+    wait_for_equal(lambda: drawn_at(served, "/robot"), pytest.approx(base, abs=1e-9))
     open_tab(page, "Joints")
     q = positions(run, 0, time)
     wait_for_position(page, STANFORD, q)
     wait_until(lambda: page.get_by_text("in base_link (which floats in the scene)").first.is_visible(), "it is said")
     open_tab(page, "Motion")
     choose(page, "Mode", "manual")
-    wait_until(lambda: drawn_at(served, "/robot") == pytest.approx([0, 0, 0, 1, 0, 0, 0], abs=0), "it is back")
+    wait_for_equal(lambda: drawn_at(served, "/robot"), pytest.approx([0, 0, 0, 1, 0, 0, 0], abs=0))
     assert pose_in_scene(scene_of(served.state), "/robot/link_6/tool0")[:3, 3] == pytest.approx(
         table_tool_pose(STANFORD, q)[:3, 3]
     )

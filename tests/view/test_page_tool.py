@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
+import threading
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
 
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.read import load_robot
@@ -17,7 +18,22 @@ from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.scene.link_poses import triad_length
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import Goal, Part
-from tests.view.on_page import OpenPage, field, open_tab, pixel, shown, wait_for_position, wait_until
+from dh2sim.workspace import workspace
+from tests.view.on_page import (
+    DEADLINE,
+    OpenPage,
+    at_rest,
+    field,
+    is_soon,
+    open_tab,
+    pixel,
+    shown,
+    wait_for_aim,
+    wait_for_position,
+    wait_for_text,
+    wait_for_whole_text,
+    wait_until,
+)
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -34,7 +50,8 @@ def goal_of(served: ServedPage) -> Goal:
 
 
 def drag(page: Page, served: ServedPage, axis: int, metres: float) -> None:
-    """LinkDrag the arrow of an axis of tool0 with the mouse, and let go; again where the handle was not there yet."""
+    """Drag the arrow of an axis of tool0 with the mouse, and let go; again where the handle was not there yet."""
+    wait_for_aim(served)
     before, T = served.state.goal, table_tool_pose(STANFORD, served.state.q)
 
     def pulled() -> bool:
@@ -44,9 +61,7 @@ def drag(page: Page, served: ServedPage, axis: int, metres: float) -> None:
         page.mouse.down()
         page.mouse.move(*end, steps=8)
         page.mouse.up()
-        with contextlib.suppress(AssertionError):
-            wait_until(lambda: served.state.goal is not before, "the handle is grabbed", seconds=5.0)
-        return served.state.goal is not before
+        return is_soon(lambda: served.state.goal is not before)
 
     wait_until(pulled, "the handle is grabbed")
     wait_until(lambda: abs(far_along(served, T, axis) / metres - 1.0) < 0.03, "the handle is where the mouse is")
@@ -77,30 +92,33 @@ def test_tool0_follows_its_handle_and_the_page_says_where_it_cannot(
 
     drag(page, served, 1, 0.12)
     wait_until(lambda: goal_of(served).reached, "tool0 is there")
-    tool = table_tool_pose(STANFORD, served.state.q)
-    assert np.allclose(tool, goal_of(served).T_base_link_tool0, rtol=0, atol=2e-6)
+    state = at_rest(lambda: served.state)
+    tool = table_tool_pose(STANFORD, state.q)
+    assert state.goal is not None
+    assert np.allclose(tool, state.goal.T_base_link_tool0, rtol=0, atol=2e-6)
     assert tool[:3, 3] @ before[:3, 1] - before[:3, 3] @ before[:3, 1] > 0.1
     assert_joints_are_inside_their_limits(served)
-    assert shown(page, "notice") == ""
+    wait_for_whole_text(page, "notice", "")
     open_tab(page, "Joints")
-    wait_for_position(page, STANFORD, served.state.q)
+    wait_for_position(page, STANFORD, state.q)
 
     drag(page, served, 0, 2.0)
     wait_until(lambda: not goal_of(served).reached, "that is out of reach")
     notice = r"The handle is out of reach, or too far for one step: tool0 is (\S+) m away and turned by (\S+)°\."
 
     def told_and_true() -> bool:  # the notice follows the handle, which is still being dragged at first
-        found = re.fullmatch(notice, shown(page, "notice"))
-        tool, goal = table_tool_pose(STANFORD, served.state.q), np.array(goal_of(served).T_base_link_tool0)
+        found, state = re.fullmatch(notice, shown(page, "notice")), served.state
+        assert state.goal is not None
+        tool, goal = table_tool_pose(STANFORD, state.q), np.array(state.goal.T_base_link_tool0)
         distance = float(np.linalg.norm(tool[:3, 3] - goal[:3, 3]))
         return found is not None and bool(np.isclose(float(found.group(1)), distance, rtol=1e-2))
 
-    wait_until(told_and_true, shown(page, "notice"))
+    wait_until(told_and_true, lambda: shown(page, "notice"))
     assert_joints_are_inside_their_limits(served)
-    wait_for_position(page, STANFORD, served.state.q)
+    wait_for_position(page, STANFORD, lambda: served.state.q)
 
     page.get_by_role("button", name="home").click()
-    wait_until(lambda: shown(page, "notice") == "", "another move is another goal")
+    wait_for_whole_text(page, "notice", "")  # another move is another goal
 
 
 def test_branches_are_listed_and_clicked_through(open_page: OpenPage, viewer: Viewer) -> None:
@@ -113,22 +131,35 @@ def test_branches_are_listed_and_clicked_through(open_page: OpenPage, viewer: Vi
     other = next(number for number, branch in enumerate(listed, start=1) if not branch.here)
     page.get_by_role("button", name=str(other), exact=True).click()
     wait_until(lambda: served.state.q == listed[other - 1].q, "the robot is in the other branch")
-    wait_until(lambda: listed[other - 1].name in shown(page, "branch"), "the page names it")
+    wait_for_text(page, "branch", listed[other - 1].name)
 
 
-def test_the_workspace_is_searched_while_the_page_goes_on(open_page: OpenPage, viewer: Viewer) -> None:
+def test_the_workspace_is_searched_while_the_page_goes_on(
+    open_page: OpenPage, viewer: Viewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go_on = threading.Event()
+
+    def compute_workspace(*arguments: Any, **options: Any) -> workspace.Workspace:
+        assert go_on.wait(DEADLINE), "a search is held up until it has been seen"
+        return searched(*arguments, **options)
+
+    searched = workspace.compute_workspace
+    monkeypatch.setattr(workspace, "compute_workspace", compute_workspace)
     page = open_page()
     open_tab(page, "Pose")
     (served,) = viewer.pages
     page.get_by_label("Reachable points").first.click()
-    wait_until(lambda: "…" in shown(page, "workspace"), "the page says that it searches")
+    wait_for_text(page, "workspace", "…")
+    go_on.set()
     wait_until(lambda: "/workspace/points" in served._painter._drawn, "the points")
-    wait_until(lambda: "best manipulability" in shown(page, "workspace"), "its figures")
+    wait_for_text(page, "workspace", "best manipulability")
     page.get_by_label("Section in scene").first.click()
     wait_until(lambda: "/section/plane/limits" in served._painter._drawn, "the section")
-    wait_until(lambda: "section" in shown(page, "workspace"), "its words")
+    wait_for_text(page, "workspace", "section")
+    go_on.clear()
     open_tab(page, "Table")
     field(page, "d₂").fill("0.25")
     wait_until(lambda: served.state.spec.rows[1].d == 0.25, "another robot")
     wait_until(lambda: served.state.workspace is None, "whose workspace is another")
+    go_on.set()
     wait_until(lambda: served.state.workspace is not None, "and is searched by itself")

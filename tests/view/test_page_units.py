@@ -11,7 +11,19 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.read import load_robot, parse_robot
 from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
 from dh2sim.view.initial_state import open_state
-from tests.view.on_page import Serve, choose, field, open_tab, shown, wait_for_position, wait_until
+from tests.view.on_page import (
+    Serve,
+    choose,
+    field,
+    open_tab,
+    shown,
+    wait_for_equal,
+    wait_for_position,
+    wait_for_text,
+    wait_for_value,
+    wait_for_whole_text,
+    wait_until,
+)
 
 STANFORD = load_robot("stanford")
 HOME = STANFORD.configurations["home"].tolist()
@@ -24,20 +36,20 @@ def test_the_table_is_written_in_radians_and_millimetres_and_the_robot_stays(ser
     open_tab(page, "Table")
     page.get_by_text("Whole table").click()
     choose(page, "Row", "2: joint_2")
-    wait_until(lambda: field(page, "α₂").input_value() == "90", "degrees")
+    wait_for_value(page, "α₂", "90")
     choose(page, "Angles in", "rad")
-    wait_until(lambda: field(page, "α₂").input_value() == "1.5707963267948966", "radians")
+    wait_for_value(page, "α₂", "1.5707963267948966")
     choose(page, "Lengths in", "mm")
-    millimetres = f"{1000.0 * STANFORD.rows[1].d:g}"
-    wait_until(lambda: field(page, "d₂").input_value() == millimetres, "millimetres")
-    assert shown(page, "cell-errors") == ""
+    wait_for_value(page, "d₂", f"{1000.0 * STANFORD.rows[1].d:g}")
+    assert served.state.table.errors == ()
+    wait_for_whole_text(page, "cell-errors", "")
     written = parse_robot(served.state.text)
     assert (served.state.table.units.angle, served.state.table.units.length) == (AngleUnit.RAD, LengthUnit.MM)
     for q in (HOME, SOMEWHERE):
         assert np.allclose(table_tool_pose(written, q), table_tool_pose(STANFORD, q), rtol=0, atol=1e-12)
     open_tab(page, "Joints")
     wait_for_position(page, STANFORD, HOME)
-    assert field(page, "joint_1 [°]").is_visible(), "the panel's own unit is another matter"
+    field(page, "joint_1 [°]").wait_for()  # the panel's own unit is another matter
 
 
 @pytest.mark.slow
@@ -74,16 +86,14 @@ def test_the_same_table_read_in_another_convention_is_another_robot(serve: Serve
 @pytest.mark.slow
 def test_sliders_show_degrees_or_radians(serve: Serve) -> None:
     page, served = serve(open_state(STANFORD))
-    wait_until(lambda: field(page, "joint_2 [°]").input_value() == f"{math.degrees(HOME[1]):g}", "degrees")
-    rpy = shown(page, "readout")
-    assert "rpy [°]" in rpy
+    wait_for_value(page, "joint_2 [°]", f"{math.degrees(HOME[1]):g}")
+    wait_for_text(page, "readout", "rpy [°]")
     choose(page, "Angles in", "rad")
-    field(page, "joint_2 [rad]").wait_for()
-    assert float(field(page, "joint_2 [rad]").input_value()) == pytest.approx(HOME[1], abs=0.6e-4)
-    assert field(page, "joint_3 [m]").is_visible()
-    wait_until(lambda: "rpy [rad]" in shown(page, "readout"), "the readout's unit")
+    wait_for_equal(lambda: float(field(page, "joint_2 [rad]").input_value()), pytest.approx(HOME[1], abs=0.6e-4))
+    field(page, "joint_3 [m]").wait_for()
+    wait_for_text(page, "readout", "rpy [rad]")
     field(page, "joint_2 [rad]").fill("0.5")
     wait_for_position(page, STANFORD, [HOME[0], 0.5, *HOME[2:]])
     assert served.state.q[1] == 0.5
     choose(page, "Angles in", "deg")
-    wait_until(lambda: field(page, "joint_2 [°]").input_value() == "28.65", "degrees again")
+    wait_for_value(page, "joint_2 [°]", "28.65")

@@ -193,9 +193,9 @@ def test_something_that_is_not_a_robot_file_is_refused(text: bytes, message: str
 
 def test_an_entity_bomb_is_refused_at_once() -> None:
     bomb = "a0: &a0 [x, x]\n" + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 20))
-    started = time.monotonic()
+    started = time.thread_time()
     state = after(STANFORD, upload(bomb))
-    assert time.monotonic() - started < 20.0
+    assert time.thread_time() - started < 20.0
     assert state.model is STANFORD.model
     assert "more than 50000 values (aliases counted each time)" in state.notice
 
@@ -208,7 +208,7 @@ def test_values_that_an_anchor_shares_are_written_out_for_the_table() -> None:
 
 
 def test_a_robot_that_would_keep_this_machine_busy_for_long_is_not_built() -> None:
-    started = time.monotonic()
+    started = time.thread_time()
     assert_refused(
         HEAD + "  - {type: revolute}\n" * 3000,
         "mine.yaml:4:3: joints: the list has 3000 entries; at most 494 are allowed",
@@ -217,7 +217,7 @@ def test_a_robot_that_would_keep_this_machine_busy_for_long_is_not_built() -> No
         HEAD + "  - {type: revolute}\n" * 300,
         "mine.yaml: the robot has 300 joints; at most 200 are allowed in an uploaded file",
     )
-    assert time.monotonic() - started < 30.0
+    assert time.thread_time() - started < 30.0
     many = "".join(f"  c{i}: [0]\n" for i in range(201))
     assert_refused(
         f"{HEAD}{ROW}configurations:\n{many}",

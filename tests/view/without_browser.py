@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from tests.view.on_page import DEADLINE
+
 CAMERA = {
     "wxyz": (1.0, 0.0, 0.0, 0.0),
     "position": (3.0, 0.0, 0.0),
@@ -36,7 +38,9 @@ def connected(url: str, **options: Any) -> Iterator[Any]:
     import viser
 
     address, protocols = url.replace("http", "ws", 1), [f"viser-v{viser.__version__}"]
-    with client.connect(address, **{"origin": url, **options}, subprotocols=protocols, max_size=None) as connection:
+    # nobody reads what comes, and to close it waits for room in its queue; a busy server answers late
+    settings: dict[str, Any] = {"max_size": None, "max_queue": None, "open_timeout": DEADLINE}
+    with client.connect(address, **{"origin": url, **settings, **options}, subprotocols=protocols) as connection:
         yield connection
 
 

@@ -145,18 +145,18 @@ def test_any_cells_are_read_or_refused(rows: list[list[str]]) -> None:
     ids=range(31),
 )
 def test_a_large_wrong_table_is_refused_quickly(text: str) -> None:
-    start = time.perf_counter()
+    start = time.thread_time()
     with pytest.raises(ImportedFileError):
         read_table(text.encode(), file="t", name="r")
-    assert time.perf_counter() - start < 20
+    assert time.thread_time() - start < 20
 
 
 def test_a_large_right_table_is_read_soon() -> None:
-    start = time.perf_counter()
+    start = time.thread_time()
     found = imported(
         HEAD + "|-|-|-|-|\n" + "".join(f"| q{i} + pi/2 | 0.1 | 0.2 | pi/2 |\n" for i in range(MOST_ROWS)), **STANDARD
     )
-    assert time.perf_counter() - start < 10
+    assert time.thread_time() - start < 10
     assert len(found.spec.rows) == MOST_ROWS
 
 

@@ -30,7 +30,7 @@ def _python(code: str, *arguments: str | Path) -> Outcome:
         env=environment(),
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=False,
     )
     return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
@@ -157,7 +157,7 @@ def test_a_full_file_system_is_reported_and_nothing_is_left(run: Path, tmp_path:
             env=environment(),
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=180,
             check=False,
         )
     except FileNotFoundError:

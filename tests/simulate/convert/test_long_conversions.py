@@ -60,7 +60,7 @@ def test_an_interruption_leaves_nothing(
             time.sleep(0.001)  # until there is something to be left behind
         time.sleep(rng.uniform(0.0, 0.3))
         process.send_signal(kill)
-        reported = process.communicate(timeout=60)[1]
+        reported = process.communicate(timeout=180)[1]
         if process.returncode == 0:
             continue  # it was done before
         interrupted += 1

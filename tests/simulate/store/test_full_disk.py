@@ -73,7 +73,7 @@ shutil.copytree(path, sys.argv[2])
 
 def _run(*command: str | Path) -> list[str]:
     done = subprocess.run(
-        [str(word) for word in command], env=environment(), capture_output=True, text=True, timeout=60, check=False
+        [str(word) for word in command], env=environment(), capture_output=True, text=True, timeout=180, check=False
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
