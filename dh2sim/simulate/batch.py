@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import mujoco
@@ -41,7 +42,7 @@ class JointSpace:
 
     def inertia(self, mass: Array) -> Array:
         """Return the inertia, shape (batch, n, n), from MuJoCo's sparse ``M``, shape (batch, entries)."""
-        M = np.take(mass, self._index, axis=1)
+        M = _dense(mass, self._index)
         if not self._floating:
             return M
         follows = np.linalg.solve(_of_base(M), M[:, :BASE, BASE:])
@@ -64,8 +65,8 @@ class JointSpace:
     def force(self, mass: Array, force: Array) -> Array:
         """Return the joints' forces, shape (batch, n), from those of all degrees of freedom, shape (batch, nv)."""
         if not self._floating:
-            return np.array(force)
-        M = np.take(mass, self._index, axis=1)
+            return np.array(force, order="F")
+        M = _dense(mass, self._index)
         follows = np.linalg.solve(_of_base(M), force[:, :BASE, None])[:, :, 0]
         reduced = force[:, BASE:].copy()
         for k in range(BASE):
@@ -136,6 +137,11 @@ class LoopSpace:
         return self._now
 
 
+def _dense(mass: Array, index: NDArray[np.intp]) -> Array:
+    """Return dense matrices, shape (batch, nv, nv), from MuJoCo's sparse ones; rollouts next to each other."""
+    return np.take(np.array(mass.T, order="C"), index, axis=0).transpose(2, 0, 1)
+
+
 def _of_base(M: Array) -> Array:
     """Return the floating base's own inertia, or the identity where a simulation failed before it was computed."""
     own = M[:, :BASE, :BASE].copy()
@@ -158,7 +164,11 @@ def _dense_index(model: mujoco.MjModel) -> NDArray[np.intp]:
 
 
 class BatchObservation:
-    """The current states of a persistent batch; see ``Observation``. Arrays are copies."""
+    """The current states of a persistent batch; see ``Observation``.
+
+    Arrays are copies, in memory with the rollouts next to each other: NumPy computes with all of them in one go, and
+    with what is computed of them, while the few joints of each would be a loop of their own.
+    """
 
     def __init__(self, plant: Plant, batch: Batch, gravity_forces: GravityForces) -> None:
         """Observe a batch that is at its start; ``plant`` is the robot as its controller sees it."""
@@ -184,12 +194,12 @@ class BatchObservation:
     @property
     def q(self) -> Array:
         """Joint positions, shape (batch, n)."""
-        return np.array(self._qpos[:, self._plant.positions])
+        return np.array(self._qpos[:, self._plant.positions], order="F")
 
     @property
     def v(self) -> Array:
         """Joint velocities, shape (batch, n)."""
-        return np.array(self._qvel[:, self._plant.velocities])
+        return np.array(self._qvel[:, self._plant.velocities], order="F")
 
     @property
     def mass_matrix(self) -> Array:
@@ -207,14 +217,14 @@ class BatchObservation:
         passive = self._field("qfrc_passive")
         if self._plant.loops is not None:
             return self._space.force(self._field("M"), passive)
-        return np.array(passive[:, self._plant.velocities])
+        return np.array(passive[:, self._plant.velocities], order="F")
 
     @property
     def gravity(self) -> Array:
         """Forces that balance gravity, shape (batch, n)."""
         if self._gravity is None:
             self._gravity = self._gravity_forces.forces(self._qpos)
-        return self._gravity.copy()
+        return self._gravity.copy(order="F")
 
     @property
     def _space(self) -> JointSpace | LoopSpace:
@@ -230,6 +240,10 @@ class BatchObservation:
         return self._fields[name]
 
 
+_UNFELT = int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT) | int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+"""What MuJoCo need not compute for forces of gravity: contacts and limits, and sensors."""
+
+
 class GravityForces:
     """Forces of gravity alone, computed by the same models at rest."""
 
@@ -241,7 +255,10 @@ class GravityForces:
     def forces(self, qpos: Array) -> Array:
         """Return the joint forces, N·m or N, that balance gravity at the given positions, shape (batch, n)."""
         if self._batch is None:
-            self._batch = Batch(self._plant.model, self._simulations, self._threads)
+            model = copy.copy(self._plant.model)  # where designs have models of their own, they are used as they are
+            if self._plant.loops is None:
+                model.opt.disableflags |= _UNFELT
+            self._batch = Batch(model, self._simulations, self._threads)
             set_models(self._batch, self._plant, as_fields=bool(self._drawn))
             apply_draws(self._batch, self._plant, self._drawn)
             self._space = _joint_space(self._plant, self._batch)
@@ -275,10 +292,14 @@ class MonitoredBatch:
         if effort is not None:
             scale = np.where(motors(plant), effort, 1.0)
             self._lower, self._upper = self._lower * scale, self._upper * scale
+        self._limited = bool(np.isfinite(self._lower).any() or np.isfinite(self._upper).any())
         self.batch = batch
         self.recorder = recorder
         self.steps = steps
         self.alive: NDArray[np.bool_] = np.ones(batch.nsim, dtype=bool)
+        self.ids: NDArray[np.int32] | None = None
+        """The simulations that still run, or None if all do."""
+        self._none = np.zeros(0, dtype=np.intp)
         self.status = np.full(batch.nsim, FINISHED, dtype=np.int8)
         self.stop_step = np.full(batch.nsim, -1, dtype=np.int64)
         self.saturation = np.zeros((batch.nsim, len(plant.actuators)), dtype=np.int64)
@@ -292,15 +313,14 @@ class MonitoredBatch:
         return self.batch.nsim, len(self.plant.actuators)
 
     @property
-    def ids(self) -> NDArray[np.int32] | None:
-        """The simulations that still run, or None if all do."""
-        return None if self.alive.all() else np.flatnonzero(self.alive).astype(np.int32)
+    def running(self) -> bool:
+        """Whether any simulation still runs."""
+        return self.ids is None or bool(len(self.ids))
 
     @property
     def rows(self) -> Any:
         """The simulations that still run, to index arrays with."""
-        ids = self.ids
-        return slice(None) if ids is None else ids
+        return slice(None) if self.ids is None else self.ids
 
     def clipped(self, wanted: Array) -> tuple[Array, NDArray[np.bool_] | None]:
         """Return controls moved inside their ranges, and where they were outside: None if nowhere.
@@ -309,6 +329,8 @@ class MonitoredBatch:
             wanted: Controls, shape (batch, …, actuators).
         """
         lower, upper = self._lower, self._upper
+        if not self._limited:
+            return wanted, None
         if wanted.ndim > lower.ndim > 1:
             lower, upper = lower[:, None], upper[:, None]
         outside = (wanted < lower) | (wanted > upper)
@@ -335,13 +357,15 @@ class MonitoredBatch:
 
     def call(self, function: Any, *args: Any, **kwargs: Any) -> NDArray[np.intp]:
         """Call a method of the batch and return the simulations that MuJoCo warned of or failed on."""
-        failed = np.zeros(self.batch.nsim, dtype=bool)
+        raised = self._none
         try:
             function(*args, **kwargs)
         except SimulationError as error:
-            failed[error.ids] = True
-        if self.batch.warning.any():
-            failed |= self.batch.warning[:, :, 1].any(axis=1)
+            raised = error.ids
+        if not len(raised) and not self.batch.warning.any():
+            return self._none
+        failed = self.batch.warning[:, :, 1].any(axis=1)
+        failed[raised] = True
         return np.flatnonzero(failed & self.alive)
 
     def see_gaps(self, simulations: Any, sensors: Array) -> None:
@@ -368,7 +392,7 @@ class MonitoredBatch:
             simulations: Which of those that still run; by default all.
         """
         ids = self.ids if simulations is None else simulations.astype(np.int32)
-        if self.alive.any() and (ids is None or len(ids)):
+        if self.running and (ids is None or len(ids)):
             self.stop(self.call(self.batch.forward, ids, stage=VELOCITY_STAGE), step)
 
     def stop(self, simulations: NDArray[np.intp], step: int) -> None:
@@ -377,6 +401,8 @@ class MonitoredBatch:
             self.alive[i] = False
             self.stop_step[i] = step
             self.status[i] = STATUS[self._reason(int(i))]
+        if len(simulations):
+            self.ids = np.flatnonzero(self.alive).astype(np.int32)
 
     def _reason(self, i: int) -> str:
         for kind, reason in WARNINGS.items():

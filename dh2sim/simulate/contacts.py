@@ -52,9 +52,8 @@ class FirstContacts:
             contacts: How many contacts they have, shape (simulations,).
             qpos: Their positions, shape (simulations, nq).
         """
-        if contacts.any():
-            for k in np.flatnonzero((contacts > 0) & (self.step[simulations] < 0)):
-                self._note(int(simulations[k]), step, qpos[k])
+        for k in np.flatnonzero((contacts > 0) & (self.step[simulations] < 0)):
+            self._note(int(simulations[k]), step, qpos[k])
 
     def see_many(
         self, simulations: NDArray[np.intp], first: int, contacts: NDArray[Any], before: Array, after: Array

@@ -71,7 +71,7 @@ def simulate_open_loop(monitored: MonitoredBatch, controller: OpenLoop, name: st
     """
     segment = _Segment(monitored)
     for first in range(0, monitored.steps, segment.steps):
-        if not monitored.alive.any():
+        if not monitored.running:
             break
         count = min(segment.steps, monitored.steps - first)
         controls, outside = monitored.clipped(controls_of(controller, first, count, monitored.shape, name))
@@ -265,26 +265,26 @@ def simulate_closed_loop(
     batch, recorder = monitored.batch, monitored.recorder
     controls = batch.bind("ctrl")
     derived = {field: batch.bind(field) for field in recorder.derived_fields}
-    states = {field: batch.bind(field) for field in recorder.state_fields}
-    pages = _Pages(monitored)
     contacts, qpos = batch.bind("ncon"), batch.bind("qpos")
     sensors = batch.bind("sensordata") if monitored.plant.gaps else None
+    pages, before = _Pages(monitored), np.empty_like(batch.state)
     monitored.look(0)
     for step in range(monitored.steps):
-        if not monitored.alive.any():
+        if not monitored.running:
             break
-        monitored.contacts.see(np.flatnonzero(monitored.alive), step, contacts[monitored.rows], qpos[monitored.rows])
+        if contacts.any():
+            rows = monitored.rows
+            monitored.contacts.see(np.flatnonzero(monitored.alive), step, contacts[rows], qpos[rows])
         if sensors is not None:
             monitored.see_gaps(monitored.rows, sensors[monitored.rows][:, None])
         for field, values in derived.items():
             if field != "qacc":
-                pages.note(field, "before", values)
+                pages.note(field, values, BEFORE_STEP)
         wanted = control_of(controller, observation, controls.shape, name)
         if pushes is not None:
             pushes.apply(step)
         controls[:], outside = monitored.clipped(wanted)
-        pages.note("ctrl", "before", controls)
-        before = batch.state.copy()
+        np.copyto(before, batch.state)
         # step and look at once: what is kept of a simulation is in the processor's cache then
         failed = in_step = monitored.call(batch.step, monitored.ids, stage=VELOCITY_STAGE)
         if len(failed):  # again, one after the other, to tell which of them fails
@@ -292,12 +292,10 @@ def simulate_closed_loop(
             in_step = monitored.call(batch.step, failed.astype(np.int32))
         for field in ("qacc", "sensordata"):
             if field in derived:
-                pages.note(field, "after", derived[field])
-        for field, values in states.items():
-            pages.note(field, "state", values)
+                pages.note(field, derived[field], INTERVALS)
         pages.turn()
-        monitored.stop(in_step, step)
         if len(failed):
+            monitored.stop(in_step, step)
             monitored.look(step + 1, np.setdiff1d(failed, in_step))
         if outside is not None:
             monitored.count(outside[:, None], step, 1)
@@ -310,37 +308,43 @@ def simulate_closed_loop(
 
 
 class _Pages:
-    """Keeps copies of fields step by step, and passes many steps at once to the recorder."""
+    """Keeps states, controls and other fields step by step, and passes many steps at once to the recorder."""
 
     def __init__(self, monitored: MonitoredBatch) -> None:
-        self._recorder = monitored.recorder
-        self._kept: dict[tuple[str, str], NDArray[Any]] = {}
+        """Begin at the first step."""
+        self._recorder, self._state = monitored.recorder, monitored.batch.state
+        parts = (mujoco.mjtState.mjSTATE_QPOS, mujoco.mjtState.mjSTATE_QVEL, mujoco.mjtState.mjSTATE_CTRL)
+        model = monitored.plant.model
+        # a component of a row comes after those of the lesser bits
+        starts = [mujoco.mj_stateSize(model, int(part) - 1) for part in parts]
+        ends = [start + mujoco.mj_stateSize(model, int(part)) for start, part in zip(starts, parts, strict=True)]
+        self._qpos, self._qvel, self._ctrl = map(slice, starts, ends)
+        self._rows = np.empty((monitored.batch.nsim, PAGE_STEPS, ends[-1]))
+        """Beginnings of the rows of states after each step, with the controls of that step."""
+        self._kept: dict[tuple[str, tuple[str, ...]], NDArray[Any]] = {}
         self._first = self._count = 0
 
-    def note(self, field: str, when: str, values: NDArray[Any]) -> None:
-        """Keep a copy of a field in the current step; shape (batch, …)."""
-        if (field, when) not in self._kept:
-            self._kept[field, when] = np.empty((PAGE_STEPS, *values.shape), values.dtype)
-        self._kept[field, when][self._count] = values
+    def note(self, field: str, values: NDArray[Any], variables: tuple[str, ...]) -> None:
+        """Keep a copy of a field in the current step, shape (batch, …), for some variables."""
+        key = field, variables
+        if key not in self._kept:
+            self._kept[key] = np.empty((len(values), PAGE_STEPS, *values.shape[1:]), values.dtype)
+        self._kept[key][:, self._count] = values
 
     def turn(self) -> None:
-        """Proceed to the next step."""
+        """Keep states and controls after a step, and proceed to the next one."""
+        self._rows[:, self._count] = self._state[:, : self._rows.shape[2]]
         self._count += 1
         if self._count == PAGE_STEPS:
             self.flush()
 
     def flush(self) -> None:
         """Record what was kept."""
-        for (field, when), values in self._kept.items():
-            seen = values[: self._count].swapaxes(0, 1)
-            match when:
-                case "state":
-                    self._recorder.put_field(field, self._first + 1, seen)
-                case "before" if field == "ctrl":
-                    self._recorder.put("ctrl", self._first, seen)
-                case "before":
-                    self._recorder.put_field(field, self._first, seen, only=BEFORE_STEP)
-                case _:
-                    self._recorder.put_field(field, self._first, seen, only=INTERVALS)
+        rows, recorder = self._rows[:, : self._count], self._recorder
+        recorder.put("ctrl", self._first, rows[..., self._ctrl])
+        recorder.put_field("qpos", self._first + 1, rows[..., self._qpos])
+        recorder.put_field("qvel", self._first + 1, rows[..., self._qvel])
+        for (field, variables), values in self._kept.items():
+            recorder.put_field(field, self._first, values[:, : self._count], only=variables)
         self._first += self._count
         self._count = 0

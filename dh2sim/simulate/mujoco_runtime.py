@@ -21,6 +21,8 @@ from dh2sim.mujoco_warnings import mujoco_warnings
 if TYPE_CHECKING:
     from dh2sim.simulate.plant import Plant
 
+POSITION_STAGE = int(mujoco.mjtStage.mjSTAGE_POS)
+"""MuJoCo has computed all that follows from positions, contacts among them."""
 VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 """MuJoCo has computed all that follows from positions and velocities."""
 
@@ -55,10 +57,10 @@ def quiet_engine() -> Iterator[None]:
                 timer.value = _saved
 
 
-def forward(batch: Batch, ids: NDArray[np.intp] | None = None) -> None:
+def forward(batch: Batch, ids: NDArray[np.intp] | None = None, *, stage: int = VELOCITY_STAGE) -> None:
     """Compute what MuJoCo derives from positions and velocities; simulations that fail keep their old values."""
     with suppress(SimulationError):
-        batch.forward(ids, stage=VELOCITY_STAGE)
+        batch.forward(ids, stage=stage)
 
 
 def set_models(batch: Batch, plant: Plant, *, as_fields: bool = False) -> None:

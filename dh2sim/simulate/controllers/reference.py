@@ -6,7 +6,7 @@ import numpy as np
 
 from dh2sim.errors import ControllerError, TrajectoryError
 from dh2sim.simulate.controllers.protocol import RolloutBatch
-from dh2sim.simulate.controllers.trajectories import Motion
+from dh2sim.simulate.controllers.trajectories import Motion, StepByStep
 from dh2sim.trajectory.files import SampledTrajectory, read_trajectory
 from dh2sim.typing import Array
 
@@ -41,16 +41,12 @@ class SampledReference:
         except TrajectoryError as error:
             raise ControllerError(f"reference: {error}") from None
         self._timestep, self._batch = batch.plant.timestep, len(batch.rollouts)
+        self.at = StepByStep(self.motion)
 
     def motion(self, first: int, count: int) -> Motion:
         """Return the motion at the beginning of time steps ``first`` to ``first + count - 1``."""
         q, v, a, _ = self._trajectory.at(np.arange(first, first + count) * self._timestep)
         return Motion(q=self._for_all(q), v=self._for_all(v), a=self._for_all(a))
 
-    def at(self, step: int) -> tuple[Array, Array, Array]:
-        """Return position, velocity and acceleration at the beginning of one time step, each of shape (batch, n)."""
-        motion = self.motion(step, 1)
-        return motion.q[:, 0], motion.v[:, 0], motion.a[:, 0]
-
     def _for_all(self, rows: Array) -> Array:
-        return np.repeat(rows[None], self._batch, axis=0)
+        return np.broadcast_to(rows, (self._batch, *rows.shape))

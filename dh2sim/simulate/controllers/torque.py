@@ -247,12 +247,12 @@ class ComputedTorque:
         """Return torques or forces, N·m or N, shape (batch, n)."""
         q, v, a = self._followed.at(observation.step)
         wanted = a + self._kd * (v - observation.v) + self._kp * (q - observation.q)
-        torque = observation.bias - observation.passive
-        inertia = observation.mass_matrix
-        term = np.empty_like(torque)
-        for j in range(wanted.shape[1]):  # column by column: the same order of additions for any batch
-            np.multiply(inertia[:, :, j], wanted[:, j, None], out=term)
-            torque += term
+        batch, n = wanted.shape
+        terms = np.empty((1 + n, n, batch))
+        np.subtract(observation.bias.T, observation.passive.T, out=terms[0])
+        np.multiply(observation.mass_matrix.T, wanted.T[:, None], out=terms[1:])
+        # one after the other, as the last axis is the one of long loops: the same order of additions for any batch
+        torque: Array = np.add.reduce(terms, axis=0).T
         return torque
 
     def reference(self, first: int, count: int) -> tuple[Array, Array]:

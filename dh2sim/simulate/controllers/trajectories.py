@@ -11,13 +11,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Final, TypeAlias
 
-import mujoco
 import numpy as np
+from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from dh2sim.errors import ControllerError
 from dh2sim.simulate.controllers.options import Within
 from dh2sim.simulate.controllers.protocol import RolloutBatch
+from dh2sim.simulate.mujoco_runtime import POSITION_STAGE, forward, set_models
 from dh2sim.typing import Array
 
 MINIMUM_JERK_PEAK: Final = 1.875
@@ -190,14 +191,36 @@ class Motion:
     a: Array
 
 
+class StepByStep:
+    """A motion that is used one time step after the other, computed for many at a time."""
+
+    def __init__(self, motion: Callable[[int, int], Motion]) -> None:
+        """Take what returns the motion at the beginning of some steps, from a first one and their number."""
+        self._motion = motion
+        self._ahead: Motion | None = None
+        self._first = 0
+
+    def __call__(self, step: int) -> tuple[Array, Array, Array]:
+        """Return position, velocity and acceleration at the beginning of a time step, each of shape (batch, n)."""
+        k = step % _AHEAD
+        if self._ahead is None or step - k != self._first:
+            self._first = step - k
+            self._ahead = self._motion(self._first, _AHEAD)
+        return self._ahead.q[:, k], self._ahead.v[:, k], self._ahead.a[:, k]
+
+
 _TRIES: Final = 20
 """Draws of a waypoint; if links would touch on the way to each, the arm rests instead."""
 _LOOK: Final = 0.08
 """rad or m: how far a joint moves at most between the places at which contacts are looked for."""
 
 
-def _clear_of_links(batch: RolloutBatch, targets: Array, center: Array, reach: Array, most: Array) -> Array:
-    """Return waypoints as ``follow`` does; a target is drawn again if links would touch on the way to it.
+_Reached: TypeAlias = Callable[[NDArray[np.intp], Array, Array], NDArray[np.bool_]]
+"""Takes rollouts and where each goes from and to, shape (rollouts, n); returns which of them can."""
+
+
+def _reachable(batch: RolloutBatch, targets: Array, center: Array, reach: Array, most: Array) -> Array:
+    """Return waypoints as ``follow`` does; a target is drawn again if something is in the way to it.
 
     Args:
         batch: The rollouts.
@@ -206,72 +229,77 @@ def _clear_of_links(batch: RolloutBatch, targets: Array, center: Array, reach: A
         reach: Half of its width, shape (n,) or (batch, n).
         most: Greatest distance between neighbouring waypoints, shape (n,) or (batch, n).
     """
+    model = batch.plant.model
+    reached: _Reached
     if batch.plant.loops is not None:
-        return _reached_by_loops(batch, targets, center, reach, most)
-    waypoints = follow(batch.q0, targets, most)
-    models = batch.plant.models
-    model = models[0]
-    if not (model.geom_contype.any() and model.geom_conaffinity.any()):
-        return waypoints
-    data = mujoco.MjData(model)
-    first = model.nq - batch.plant.n
+        reached = _closes_loops(batch)
+    elif model.geom_contype.any() and model.geom_conaffinity.any():
+        reached = _clear_of_links(batch)
+    else:
+        return follow(batch.q0, targets, most)
     reach, most = (np.broadcast_to(array, batch.q0.shape) for array in (reach, most))
-
-    def touches(model: mujoco.MjModel, start: Array, end: Array) -> bool:
-        looks = max(1, math.ceil(float(np.abs(end - start).max()) / _LOOK))
-        for k in range(1, looks + 1):
-            q = start + (k / looks) * (end - start)
-            data.qpos[first:] = q
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_collision(model, data)
-            if data.ncon:
-                return True
-        return False
-
-    for i, generator in enumerate(batch.generators):
-        model = models[i % len(models)]
-        again: np.random.Generator | None = None
-        for k in range(1, len(waypoints)):
-            before, target = waypoints[k - 1, i], targets[k - 1, i]
-            for _ in range(_TRIES):
-                waypoints[k, i] = before + np.clip(target - before, -most[i], most[i])
-                if not touches(model, before, waypoints[k, i]) or touches(
-                    model, before, before
-                ):  # or it could never leave
-                    break
-                # a stream of its own: a longer run, which draws more targets first, must begin alike
-                again = again or generator.spawn(1)[0]
-                target = center[i] + reach[i] * again.uniform(-1.0, 1.0, size=len(target))
-            else:
-                waypoints[k, i] = before
-    return waypoints
-
-
-def _reached_by_loops(batch: RolloutBatch, targets: Array, center: Array, reach: Array, most: Array) -> Array:
-    """Return the like for a mechanism: a target is drawn again if the loops cannot be closed all the way to it."""
-    loops = batch.plant.loops
-    assert loops is not None
-    assert batch.qpos0 is not None
-    qpos = batch.qpos0.copy()
     again: dict[int, np.random.Generator] = {}
     waypoints = [np.array(batch.q0)]
     for drawn in targets:
-        before, wanted, left = waypoints[-1], drawn.copy(), np.arange(len(qpos))
+        before, wanted, left = waypoints[-1], drawn.copy(), np.arange(len(drawn))
         point = before.copy()  # where none is found, it rests
         for _ in range(_TRIES):
-            there = before[left] + np.clip(wanted[left] - before[left], -most, most)
-            found, reached = loops.follow(qpos[left], there)
-            good = left[reached]
-            qpos[good], point[good] = found[reached], there[reached]
-            left = left[~reached]
-            for i in left.tolist():  # a stream of its own, as above
+            there = before[left] + np.clip(wanted[left] - before[left], -most[left], most[left])
+            good = reached(left, before[left], there)
+            point[left[good]] = there[good]
+            left = left[~good]
+            for i in left.tolist():
+                # a stream of its own: a longer run, which draws more targets first, must begin alike
                 if i not in again:
                     again[i] = batch.generators[i].spawn(1)[0]
-                wanted[i] = center[i] + reach * again[i].uniform(-1.0, 1.0, size=len(wanted[i]))
+                wanted[i] = center[i] + reach[i] * again[i].uniform(-1.0, 1.0, size=len(wanted[i]))
             if not len(left):
                 break
         waypoints.append(point)
     return np.stack(waypoints)
+
+
+def _clear_of_links(batch: RolloutBatch) -> _Reached:
+    """Return what tells whether no links touch on the way, or do already where it begins, which could not be left."""
+    model = batch.plant.model
+    looking = Batch(model, len(batch.rollouts), nthread=1)
+    set_models(looking, batch.plant)
+    contacts, q = looking.bind("ncon"), looking.bind("qpos")[:, model.nq - batch.plant.n :]
+
+    def touch(which: NDArray[np.intp], at: Array) -> NDArray[np.bool_]:
+        q[which] = at
+        forward(looking, which, stage=POSITION_STAGE)
+        return np.asarray(contacts[which] > 0)
+
+    def reached(left: NDArray[np.intp], start: Array, end: Array) -> NDArray[np.bool_]:
+        looks = np.maximum(1.0, np.ceil(np.abs(end - start).max(axis=1, initial=0.0) / _LOOK))
+        clear = np.ones(len(left), dtype=bool)
+        for k in range(1, int(looks.max()) + 1):
+            now = np.flatnonzero(clear & (k <= looks))
+            if len(now):
+                share = (k / looks[now])[:, None]
+                clear[now] = ~touch(left[now], start[now] + share * (end[now] - start[now]))
+        blocked = np.flatnonzero(~clear)
+        if len(blocked):
+            clear[blocked] = touch(left[blocked], start[blocked])
+        return clear
+
+    return reached
+
+
+def _closes_loops(batch: RolloutBatch) -> _Reached:
+    """Return what tells whether the loops of a mechanism can be closed all the way."""
+    loops = batch.plant.loops
+    assert loops is not None
+    assert batch.qpos0 is not None
+    qpos = batch.qpos0.copy()
+
+    def reached(left: NDArray[np.intp], _start: Array, end: Array) -> NDArray[np.bool_]:
+        found, good = loops.follow(qpos[left], end)
+        qpos[left[good]] = found[good]
+        return good
+
+    return reached
 
 
 _LOOK_EVERY: Final = 0.1
@@ -332,9 +360,8 @@ class SmoothReference:
         targets = center + reach * uniform(batch.generators, self._motions, plant.n)
         # no joint exceeds its velocity limit, even where a start outside the limits makes the way longer
         most = INSIDE * plant.velocity * period / MINIMUM_JERK_PEAK
-        self._waypoints = _clear_of_links(batch, targets, center, reach, most)
-        self._ahead = Motion(q=np.empty((0, 0, 0)), v=np.empty((0, 0, 0)), a=np.empty((0, 0, 0)))
-        self._ahead_first = -1
+        self._waypoints = _reachable(batch, targets, center, reach, most)
+        self.at = StepByStep(self.motion)
 
     def motion(self, first: int, count: int) -> Motion:
         """Return the motion at the beginning of time steps ``first`` to ``first + count - 1``."""
@@ -342,18 +369,12 @@ class SmoothReference:
         position, speed, acceleration = minimum_jerk(s)
         speed, acceleration = speed / self._period, acceleration / (self._period * self._period)
         weights = np.stack((1.0 - position, position))
-        q, v, a = np.empty((3, self._waypoints.shape[1], count, self._waypoints.shape[2]))
+        # rollouts next to each other, as in what is observed of them
+        _, batch, n = self._waypoints.shape
+        q, v, a = np.empty((3, count, n, batch)).transpose(0, 3, 1, 2)
         for i, part in runs_of(piece):
             start, end = self._waypoints[i], self._waypoints[i + 1]
             weighted_sum(weights[:, part], [start, end], q[:, part])
             weighted_sum(speed[None, part], [end - start], v[:, part])
             weighted_sum(acceleration[None, part], [end - start], a[:, part])
         return Motion(q=np.clip(q, self._lower[:, None], self._upper[:, None], out=q), v=v, a=a)
-
-    def at(self, step: int) -> tuple[Array, Array, Array]:
-        """Return position, velocity and acceleration at the beginning of one time step, each of shape (batch, n)."""
-        k = step % _AHEAD
-        if step - k != self._ahead_first:
-            self._ahead_first = step - k
-            self._ahead = self.motion(self._ahead_first, _AHEAD)
-        return self._ahead.q[:, k], self._ahead.v[:, k], self._ahead.a[:, k]
