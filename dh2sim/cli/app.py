@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from itertools import takewhile
 from typing import Annotated, Any, Final, NamedTuple
@@ -9,7 +12,7 @@ from typing import Annotated, Any, Final, NamedTuple
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperGroup
 
-from dh2sim.cli.common import MANY, guarded
+from dh2sim.cli.common import MANY, complain, guarded
 from dh2sim.cli.values import PlainValues
 
 
@@ -26,6 +29,9 @@ class Command(NamedTuple):
     bare: tuple[str, ...] = ()
     """Those of them that may have no word."""
 
+
+UsageError: Final[type[Any]] = typer.BadParameter.__base__
+"""Of typer, or of click in its earlier versions."""
 
 NEGATIVE_NUMBERS: Final = {"ignore_unknown_options": True}
 """A negative number is an argument, not an option."""
@@ -134,24 +140,39 @@ class LazyGroup(PlainValues, TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the command that the first argument names."""
         name = args[0]
-        if name not in COMMANDS and not name.startswith("-"):
-            from dh2sim.messages import did_you_mean, shown
+        if name not in COMMANDS and not name.startswith("-") and not ctx.resilient_parsing:
+            from dh2sim.cli.usage import unknown
 
-            ctx.fail(f"unknown command {shown(name)}.{did_you_mean(name, COMMANDS)}".rstrip("."))
+            raise SystemExit(complain(unknown("command", name, COMMANDS, ctx)))
         return super().resolve_command(ctx, args)
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the options of the program itself."""
+        with _usage_errors(ctx):
+            return super().parse_args(ctx, args)
+
     def invoke(self, ctx: Any) -> Any:
-        """Run the command; report a wrong value of an option in the words of this program."""
-        try:
+        """Run the command."""
+        with _usage_errors(ctx):
             return super().invoke(ctx)
-        except typer.BadParameter as error:
-            error.message = _plain(error)
-            raise
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002
         """List the commands without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, command.help) for name, command in COMMANDS.items()])
+
+
+@contextmanager
+def _usage_errors(ctx: Any) -> Iterator[None]:
+    """Report errors in how a command was called as this program reports all errors."""
+    try:
+        yield
+    except UsageError as error:
+        if ctx.resilient_parsing:  # a shell completes a word
+            raise
+        from dh2sim.cli.usage import complain_usage
+
+        raise SystemExit(complain_usage(error, error.ctx or ctx)) from None
 
 
 class PlainCommand(PlainValues, TyperCommand):
@@ -164,6 +185,23 @@ class PlainCommand(PlainValues, TyperCommand):
             if isinstance(parameter, TyperArgument):
                 parameter.display_type_rich = _no_type  # type: ignore[method-assign]
         return parameters
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return the options and arguments; a required one has no braces."""
+        return [re.sub(r"^{(.*)}", r"\1", piece) for piece in super().collect_usage_pieces(ctx)]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the options and arguments; where those may be negative numbers, refuse unknown options itself."""
+        typed = list(takewhile("--".__ne__, args))
+        with _usage_errors(ctx):
+            rest = super().parse_args(ctx, args)
+        if ctx.ignore_unknown_options and not ctx.resilient_parsing:
+            for word in (word for value in ctx.params.values() if isinstance(value, list) for word in value):
+                if isinstance(word, str) and word.startswith("--") and word in typed:
+                    from dh2sim.cli.usage import unknown_option
+
+                    raise SystemExit(complain(unknown_option(word, ctx)))
+        return rest
 
 
 def _no_type(ctx: Any) -> str:  # noqa: ARG001
@@ -193,29 +231,6 @@ def _taking_many(options: tuple[str, ...], bare: tuple[str, ...] = ()) -> type[T
 
 def _is_value(word: str) -> bool:
     return not word.startswith("--") and word != "-h"
-
-
-_PLAIN: Final = {
-    "int_parsing": "must be a whole number",
-    "int_from_float": "must be a whole number",
-    "float_parsing": "must be a number",
-    "greater_than_equal": "must be at least {ge:g}",
-    "less_than_equal": "must be at most {le:g}",
-}
-"""What is required of a value, by the kind of pydantic's error."""
-
-
-def _plain(error: typer.BadParameter) -> str:
-    """Return the message for a wrong value; typer passes on that of pydantic, which does not quote the value."""
-    details: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
-    required = _PLAIN.get(details[0]["type"]) if details else None
-    if required is None:
-        return error.message
-    from dh2sim.messages import shown
-
-    value = details[0]["input"]
-    limits = details[0].get("ctx", {})
-    return f"{required.format(**limits)}, got {value if 'ge' in limits or 'le' in limits else shown(value)}"
 
 
 _SETTINGS: Final = {"help_option_names": ["-h", "--help"], "max_content_width": 100}

@@ -15,8 +15,10 @@ from dh2sim.cli.common import (
     QuietOption,
     RobotArgument,
     SeedOption,
+    choice,
     load_one,
     refuse_options,
+    words_of,
 )
 from dh2sim.cli.output import WIDTH, json_text, require_free, table_lines, wrapped
 from dh2sim.messages import counted, listed, printable, shown
@@ -53,19 +55,19 @@ def calibrate(
         ),
     ] = None,
     unknown: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
             metavar="NAMES",
-            help="What to fit, with commas: base, tool, a, alpha, d, theta, beta; a row's name; or one number such "
-            "as joint_2.theta. [default: all]",
+            help="What to fit, with commas or repeated: base, tool, a, alpha, d, theta, beta; a row's name; or one "
+            "number such as joint_2.theta. [default: all]",
         ),
     ] = None,
     prior: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
             metavar="SIGMAS",
-            help="How far the table's numbers may be off, one sigma: '1mm,1mrad', or by name: 'theta=5mrad,d=2mm'. "
-            "[default: not known]",
+            help="How far the table's numbers may be off, one sigma: '1mm,1mrad', or by name: 'theta=5mrad,d=2mm'; "
+            "with commas or repeated. [default: not known]",
         ),
     ] = None,
     robust: Annotated[bool, typer.Option("--robust", help="Find rows that are far off, and leave them out.")] = False,
@@ -144,9 +146,9 @@ def calibrate(
         return
     if (data is None) == (from_run is None):
         raise typer.BadParameter(
-            "give a file of measurements, or a run with --from-run"
+            "is missing: give a file of measurements, or a run with --from-run"
             if data is None
-            else "cannot be combined with DATA",
+            else "must not be given together with DATA",
             param_hint="DATA" if data is None else "--from-run",
         )
     if out is not None and report is not None and out.resolve() == report.resolve():
@@ -158,7 +160,7 @@ def calibrate(
 
     sigma = _noise(noise)
     measured = _measured(spec, data, from_run, kind, groups, sigma, rows, seed)
-    names = None if unknown is None else [word.strip() for word in unknown.split(",") if word.strip()]
+    names = words_of(unknown) if unknown else None
     found = calibrated(spec, measured, unknown=names, prior=_prior(prior), robust=robust, noise=sigma, seed=seed)
     _write(found, out, report)
     if as_json:
@@ -279,7 +281,6 @@ def _measured(
 
 def _kind(text: str | None) -> Kind | None:
     from dh2sim.calibrate.measurements import OTHER_KINDS, Kind
-    from dh2sim.cli.common import choice
 
     return choice(text, Kind, "--kind", other_names=OTHER_KINDS)
 
@@ -299,7 +300,7 @@ def _quantity(text: str, option: str, *, angle: bool | None = None) -> tuple[flo
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
         raise typer.BadParameter(
-            f"expected a positive number with a unit ({listed(_UNITS)}), found {shown(text)}", param_hint=option
+            f"must be a positive number with a unit ({listed(_UNITS)}), got {shown(text)}", param_hint=option
         )
     factor, is_angle = _UNITS.get(unit, (1.0, None))
     if angle is not None and is_angle is not None and is_angle is not angle:
@@ -312,15 +313,13 @@ def _noise(text: str | None) -> float | tuple[float, float] | None:
         return None
     parts = [_quantity(part, "--noise", angle=k == 1) for k, part in enumerate(text.split(","))]
     if len(parts) > 2:
-        raise typer.BadParameter("expected one or two numbers, of lengths and of angles", param_hint="--noise")
+        raise typer.BadParameter("must be one number, or two, of lengths and of angles", param_hint="--noise")
     return (parts[0][0], parts[1][0]) if len(parts) == 2 else parts[0][0]
 
 
-def _prior(text: str | None) -> dict[str, float] | None:
-    if text is None:
-        return None
+def _prior(texts: list[str] | None) -> dict[str, float] | None:
     found: dict[str, float] = {}
-    for part in text.split(","):
+    for part in words_of(texts):
         name, is_named, number = part.partition("=")
         if is_named:
             found[name.strip()] = _quantity(number, "--prior")[0]
@@ -331,7 +330,7 @@ def _prior(text: str | None) -> dict[str, float] | None:
                 f"{shown(part.strip())} needs a unit, such as 1mm or 1mrad", param_hint="--prior"
             )
         found["angle" if angle else "length"] = value
-    return found
+    return found or None
 
 
 def _write(found: Calibration, out: Path | None, report: Path | None) -> None:

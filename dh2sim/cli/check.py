@@ -16,6 +16,7 @@ from dh2sim.cli.common import (
     choice,
     refuse_other_formats,
     tolerance_of,
+    words_of,
 )
 from dh2sim.cli.output import progress_bar
 from dh2sim.messages import printable
@@ -38,9 +39,9 @@ def check(
     only: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="files|drift|poses",
-            help="Part to check; may be repeated. files: schema, meshes, likely slips. drift: exports up to date. "
-            "poses: all engines match the table. [default: all]",
+            metavar="files,drift,poses",
+            help="Parts to check, with commas or repeated. files: schema, meshes, likely slips. drift: exports up to "
+            "date. poses: all engines match the table. [default: all]",
         ),
     ] = None,
     form: Annotated[
@@ -97,11 +98,11 @@ def check(
     """
     tolerance_of(tolerance)
     if pictures is not None and changed_since is None:
-        raise typer.BadParameter("only with --changed-since", param_hint="--pictures")
+        raise typer.BadParameter("needs --changed-since", param_hint="--pictures")
     if baseline is not None and write_baseline is not None:
-        raise typer.BadParameter("not together with --write-baseline", param_hint="--baseline")
+        raise typer.BadParameter("must not be given together with --write-baseline", param_hint="--baseline")
     if json_ and form not in ("text", "json"):
-        raise typer.BadParameter("not together with --format", param_hint="--json")
+        raise typer.BadParameter("must not be given together with --format", param_hint="--json")
     from dh2sim.checking.files import find_robot_files
     from dh2sim.checking.findings import Baseline, CheckPart
     from dh2sim.checking.formats import ReportFormat, format_of, report_text
@@ -109,7 +110,7 @@ def check(
 
     shown = ReportFormat.JSON if json_ else choice(form, ReportFormat, "--format")
     assert shown is not None
-    parts = [part for name in only or () if (part := choice(name, CheckPart, "--only")) is not None]
+    parts = [part for name in words_of(only) if (part := choice(name, CheckPart, "--only")) is not None]
     forms = [(path, format_of(path)) for path in out or ()]
     accepted = None if baseline is None else Baseline.read(baseline)
     for path in paths or ():

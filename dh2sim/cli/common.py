@@ -135,14 +135,19 @@ def refuse_options(what: str, options: Mapping[str, object]) -> None:
             raise typer.BadParameter(f"does not apply to {what}", param_hint=name)
 
 
-def named_values(text: str, option: str, form: str) -> dict[str, str]:
+def words_of(texts: Sequence[str] | None) -> list[str]:
+    """Return the words of an option that takes several, with commas between them, or repeated, or both."""
+    return [word for text in texts or () for part in re.split(f"[,{MANY}]", text) if (word := part.strip())]
+
+
+def named_values(texts: Sequence[str] | None, option: str, form: str) -> dict[str, str]:
     """Return the values by name of an option ``name=value,…``; ``form`` says what each is like.
 
     Raises:
         BadParameter: The text is not of that form, or has a name twice.
     """
     values: dict[str, str] = {}
-    for item in filter(None, (part.strip() for part in text.split(","))):
+    for item in words_of(texts):
         name, equals, value = (part.strip() for part in item.partition("="))
         if not equals or not name or not value:
             raise typer.BadParameter(f"'{item}' is not of the form {form}", param_hint=option)

@@ -98,7 +98,7 @@ def _options(
 
     for name, given in zip(("--base", "--tip"), links, strict=True):
         if given is not None and len(given) > 2:
-            raise typer.BadParameter("give it once for both robots, or twice", param_hint=name)
+            raise typer.BadParameter("must be given once for both robots, or twice", param_hint=name)
     base, tip = (None if not given else given[min(which, len(given) - 1)] for given in links)
     convention, angle, length = words
     read = (

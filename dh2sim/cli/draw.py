@@ -81,8 +81,7 @@ def draw(
         raise typer.BadParameter("gives the configuration already; leave Q out", param_hint="--configuration")
     spec = load_one(robot)
     texts = [configuration] if configuration is not None else q
-    options = "--configuration, --as, --style, --workspace, --reach, --out, --degrees, --radians, --help"
-    vector = read_joint_vector(spec, texts, degrees=degrees, radians=radians, command="draw", options=options)
+    vector = read_joint_vector(spec, texts, degrees=degrees, radians=radians)
     if spec.is_mechanism:
         warn_open_loops(build_tree(spec), vector)
     format_ = DrawingFormat.SVG if kind is None else member(DrawingFormat, kind, "format")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, RobotsArgument, StrictOption, build_any, complain
+from dh2sim.cli.common import DONE, FELL_SHORT, RobotsArgument, StrictOption, build_any, choice, complain, words_of
 from dh2sim.cli.output import print_wrapped
 from dh2sim.errors import Dh2simError, OutputError
 from dh2sim.messages import listed, printable
@@ -30,7 +30,9 @@ def export(
     ] = Path("generated"),
     formats: Annotated[
         list[str] | None,
-        typer.Option("--format", metavar="urdf|mjcf", help="Format to write; may be repeated. [default: both]"),
+        typer.Option(
+            "--format", metavar="urdf,mjcf", help="Formats to write, with commas or repeated. [default: both]"
+        ),
     ] = None,
     check: Annotated[
         bool,
@@ -98,12 +100,8 @@ def _report_waiting(folder: Path) -> None:
 def _formats(names: list[str] | None) -> list[Format]:
     from dh2sim.export import Format
 
-    chosen = []
-    for name in names or [format_.value for format_ in Format]:
-        if name not in list(Format):
-            raise typer.BadParameter(f"unknown format '{name}'; allowed are urdf, mjcf", param_hint="--format")
-        chosen.append(Format(name))
-    return list(dict.fromkeys(chosen))
+    chosen = [format_ for name in words_of(names) if (format_ := choice(name, Format, "--format")) is not None]
+    return list(dict.fromkeys(chosen or Format))
 
 
 def _check(

@@ -70,8 +70,7 @@ def fk(
     if every and (frame or target or source):
         raise typer.BadParameter("prints every row; leave the other option out", param_hint="--all")
     spec = load_one(robot)
-    options = "--frame, --from, --to, --all, --degrees, --radians, --json, --help"
-    vector = read_joint_vector(spec, q, degrees=degrees, radians=radians, command="fk", options=options)
+    vector = read_joint_vector(spec, q, degrees=degrees, radians=radians)
     if spec.is_mechanism:
         if every:
             raise Dh2simError(f"{spec.name}: --all prints the rows of serial robots; use --frame")
@@ -189,8 +188,7 @@ def jacobian(
     from dh2sim.kinematics.singularity import lost_directions, manipulability, rank, singular_values, still_motions
 
     spec = load_one(robot)
-    options = "--frame, --degrees, --radians, --json, --help"
-    vector = read_joint_vector(spec, q, degrees=degrees, radians=radians, command="jacobian", options=options)
+    vector = read_joint_vector(spec, q, degrees=degrees, radians=radians)
     with np.errstate(all="ignore"):
         if spec.is_mechanism:
             J = mechanism_jacobian(spec, vector.q, frame)

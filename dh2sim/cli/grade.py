@@ -72,7 +72,7 @@ def grade(
     from dh2sim.robot.spec import CONVENTIONS, AngleUnit, Convention, LengthUnit
 
     if as_csv and as_json:
-        raise typer.BadParameter("give --csv or --json, not both", param_hint="--csv")
+        raise typer.BadParameter("must not be given together with --json", param_hint="--csv")
     options = ImportOptions(
         convention=choice(
             convention, Convention, "--convention", without=(Convention.HAYATI,), other_names=CONVENTIONS

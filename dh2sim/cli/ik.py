@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, MANY, JsonOption, RobotArgument, complain, load_one
+from dh2sim.cli.common import DONE, FELL_SHORT, MANY, JsonOption, RobotArgument, complain, load_one, words_of
 from dh2sim.cli.output import json_text
 from dh2sim.errors import ConfigurationError, Dh2simError, SettingsError
 from dh2sim.messages import did_you_mean, listed, shown
@@ -20,10 +20,6 @@ if TYPE_CHECKING:
     from dh2sim.robot.spec import RobotSpec
     from dh2sim.typing import Array
 
-OPTIONS = (
-    "--pose, --xyz, --rpy, --quaternion, --at, --frame, --near, --lock, --free, --no-limits, --numeric, --explain, "
-    "--json, --help"
-)
 FREE: tuple[Free, ...] = ("rotation", "roll")
 Words = tuple[str, str, str]
 
@@ -69,7 +65,10 @@ def ik(
     ] = None,
     lock: Annotated[
         list[str] | None,
-        typer.Option(metavar="JOINT=VALUE...", help="Joints that stay where they are, in the robot file's units."),
+        typer.Option(
+            metavar="JOINT=VALUE...",
+            help="Joints that stay where they are, in the robot file's units; with blanks, commas or repeated.",
+        ),
     ] = None,
     free: Annotated[
         str | None,
@@ -240,7 +239,7 @@ def _vector(spec: RobotSpec, text: str | None, option: str, problems: list[tuple
         return None
     try:
         words = text.split(MANY)
-        vector = read_joint_vector(spec, words, degrees=False, radians=False, command="ik", options=OPTIONS)
+        vector = read_joint_vector(spec, words, degrees=False, radians=False)
     except ConfigurationError as error:
         problems.append((option, str(error)))
         return None
@@ -276,7 +275,7 @@ def _locked(
     from dh2sim.cli.goal import numbers
     from dh2sim.inverse.reach import amount_text, beyond_limits
 
-    words = [word for text in options.lock or () for part in text.split(MANY) for word in part.split(",") if word]
+    words = words_of(options.lock)
     rows = {row.name: row for row in spec.moving_rows}
     lock: dict[str, float] = {}
     for word in words:

@@ -200,7 +200,7 @@ def _argument(text: str) -> tuple[str, str]:
     """Return the name and the value of ``--arg``."""
     name, between, value = text.partition(":=")
     if not between or not name.strip():
-        raise typer.BadParameter(f"expected NAME:=VALUE, found {text!r}", param_hint="--arg")
+        raise typer.BadParameter(f"must be NAME:=VALUE, got {text!r}", param_hint="--arg")
     return name.strip(), value
 
 

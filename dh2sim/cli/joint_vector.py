@@ -48,9 +48,7 @@ class JointVector:
         return f"{self.name}: {text}" if self.name and text else text or self.name
 
 
-def read_joint_vector(
-    spec: RobotSpec, texts: Sequence[str] | None, *, degrees: bool, radians: bool, command: str, options: str
-) -> JointVector:
+def read_joint_vector(spec: RobotSpec, texts: Sequence[str] | None, *, degrees: bool, radians: bool) -> JointVector:
     """Read the argument Q; print a warning for coordinates outside their limits.
 
     Args:
@@ -58,8 +56,6 @@ def read_joint_vector(
         texts: The argument; without any the robot is at home.
         degrees: Whether the command was called with ``--degrees``.
         radians: Whether it was called with ``--radians``.
-        command: Its name, for messages.
-        options: Its options, for messages.
 
     Raises:
         ConfigurationError: The number of coordinates is wrong, one is not a number, or a name is unknown.
@@ -75,11 +71,6 @@ def read_joint_vector(
     if len(words) == 1 and words[0] in known:
         vector = JointVector(q=_named(spec, words[0]), name=words[0], units=units, rows=rows)
     else:
-        for word in words:
-            if word.startswith("--"):
-                from dh2sim.messages import shown
-
-                raise ConfigurationError(f"{command} has no option {shown(word)}. Options: {options}")
         vector = JointVector(q=_coordinates(spec, words, units), name="", units=units, rows=rows)
     _warn_outside(vector)
     return vector

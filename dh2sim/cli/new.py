@@ -79,7 +79,7 @@ def new(
         text = template(name, _types(DEFAULT_JOINTS if joints is None else joints), kind)
     elif joints is not None or convention is not None:
         option = "--convention" if joints is None else "--joints"
-        raise typer.BadParameter("not with --from, whose table has its own", param_hint=option)
+        raise typer.BadParameter("must not be given together with --from, whose table has its own", param_hint=option)
     else:
         text = _renamed(source, name)
     spec = parse_robot(text, file=str(path), directory=path.absolute().parent)
@@ -103,7 +103,9 @@ def _types(letters: str) -> list[str]:
     unknown = next((letter for letter in letters if letter.upper() not in TYPES), None)
     if unknown is not None:
         known = ", ".join(f"{letter} {kind}" for letter, kind in TYPES.items())
-        raise typer.BadParameter(f"unknown letter '{unknown}'; allowed are {known}", param_hint="--joints")
+        raise typer.BadParameter(
+            f"must not contain the letter '{unknown}'; allowed are {known}", param_hint="--joints"
+        )
     if not 0 < len(letters) <= MOST_JOINTS:
         raise typer.BadParameter(f"needs 1 to {MOST_JOINTS} letters, got {len(letters)}", param_hint="--joints")
     return [TYPES[letter.upper()] for letter in letters]

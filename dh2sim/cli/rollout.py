@@ -74,33 +74,34 @@ def rollout(
         ),
     ] = 0,
     record: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
             metavar="NAMES",
-            help="What to record, separated by commas: qpos, qvel, ctrl, tool_pose, reference, qacc, torque, energy, "
-            "contacts.",
+            help="What to record, with commas or repeated: qpos, qvel, ctrl, tool_pose, reference, qacc, torque, "
+            "energy, contacts. [default: the first five]",
         ),
-    ] = "qpos,qvel,ctrl,tool_pose,reference",
+    ] = None,
     every: Annotated[int, typer.Option(metavar="N", help="Record every N-th state.")] = 1,
     randomize: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
             metavar="NAME=X,…|FILE.yaml",
             help="Draw for each rollout, link or joint factors in 1 - X to 1 + X of mass, friction, damping, "
             "armature, gain, kp, kv, effort; offsets in -X to X of com, payload_com, zero, row_length, row_angle, "
             "encoder_bias; payload, gravity (tilt), encoder_noise, sensor_delay, control_delay, push in 0 to X; SI "
-            "units. NAME[joint_3]=X for one; X may be uniform:LOW:HIGH, loguniform:LOW:HIGH, normal:SIGMA, fixed:X.",
+            "units. NAME[joint_3]=X for one; X may be uniform:LOW:HIGH, loguniform:LOW:HIGH, normal:SIGMA, fixed:X. "
+            "With commas or repeated.",
         ),
-    ] = "",
+    ] = None,
     vary: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
             metavar="NAME=HOW,…",
             help="Draw numbers of the robot file for each rollout: X (a factor from 1 - X to 1 + X), normal:SD, "
             "uniform:LOW:HIGH or loguniform:LOW:HIGH, in the file's units. A parameter of the file, a cell such as "
-            "a2 or theta1, or a path such as joint_2.link.mass.",
+            "a2 or theta1, or a path such as joint_2.link.mass. With commas or repeated.",
         ),
-    ] = "",
+    ] = None,
     designs: Annotated[
         Path | None,
         typer.Option(metavar="FILE.csv", help="Simulate the designs of a file: a column for each number."),
@@ -180,7 +181,7 @@ def rollout(
     """
     model = build_any([robot])[0]
     from dh2sim.simulate.description import describe
-    from dh2sim.simulate.options import RolloutOptions
+    from dh2sim.simulate.options import DEFAULT_RECORD, RolloutOptions
     from dh2sim.simulate.prepare import prepare
     from dh2sim.simulate.run import check_share, choose_blocks, fill, open_run, with_block_size, workers_of
 
@@ -193,7 +194,7 @@ def rollout(
         controller=controller,
         start=start,
         seed=seed,
-        record=record,
+        record=",".join(record) if record else DEFAULT_RECORD,
         every=every,
         randomize=_randomized(randomize),
         vary=named_values(vary, "--vary", "name=how, as in a2=0.05"),
@@ -278,7 +279,7 @@ def _named(blocks: slice | None, count: int) -> range | None:
     if blocks is not None and not chosen and blocks.stop != 0:
         there = "only block 0" if count == 1 else f"blocks 0 to {count - 1}"
         found = f"{blocks.start}:{blocks.stop or ''}"
-        raise typer.BadParameter(f"the run has {there}, got {found}", param_hint="--blocks")
+        raise typer.BadParameter(f"must be of the run, which has {there}; got {found}", param_hint="--blocks")
     return chosen
 
 
@@ -286,14 +287,15 @@ def _is_number(text: str) -> bool:
     return text.isascii() and text.isdigit() and len(text) < 19
 
 
-def _randomized(text: str) -> dict[str, float | str]:
+def _randomized(texts: list[str] | None) -> dict[str, float | str]:
     """Read ``name=value,…``, or the file that is named."""
-    if text.strip().lower().endswith((".yaml", ".yml")):
-        from dh2sim.simulate.randomization_file import read_randomization
+    match texts:
+        case [text] if text.strip().lower().endswith((".yaml", ".yml")):
+            from dh2sim.simulate.randomization_file import read_randomization
 
-        return read_randomization(text.strip())
+            return read_randomization(text.strip())
     settings: dict[str, float | str] = {}
-    for name, value in named_values(text, "--randomize", "name=value, as in mass=0.1 or com=normal:0.01").items():
+    for name, value in named_values(texts, "--randomize", "name=value, as in mass=0.1 or com=normal:0.01").items():
         try:
             settings[name] = float(value)
         except ValueError:

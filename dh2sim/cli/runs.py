@@ -14,7 +14,7 @@ import typer
 from dh2sim.cli.common import DONE, FELL_SHORT, QuietOption, complain
 from dh2sim.cli.output import make_console, progress_bar, size_text, wrapped
 from dh2sim.errors import Dh2simError
-from dh2sim.messages import counted, did_you_mean, listed, printable
+from dh2sim.messages import counted, did_you_mean, listed, printable, shown
 
 if TYPE_CHECKING:
     from dh2sim.simulate.description import RunDescription
@@ -64,15 +64,17 @@ def runs(
     if to is None:
         if out is not None or overwrite:
             option = "--overwrite" if out is None else "--out"
-            raise typer.BadParameter("only with --to: without it nothing is written", param_hint=option)
+            raise typer.BadParameter("needs --to: without it nothing is written", param_hint=option)
         return _describe(paths, as_json=as_json, verify=verify)
     if verify:
-        raise typer.BadParameter("not with --to", param_hint="--verify")
+        raise typer.BadParameter("must not be given together with --to", param_hint="--verify")
     if to not in FORMATS:
         guess = did_you_mean(to, FORMATS)
-        raise typer.BadParameter(f"unknown format '{to}'.{guess} Allowed: {', '.join(FORMATS)}", param_hint="--to")
+        raise typer.BadParameter(
+            f"{shown(to)} is not one of {', '.join(FORMATS)}.{guess}".rstrip("."), param_hint="--to"
+        )
     if as_json:
-        raise typer.BadParameter("not with --to", param_hint="--json")
+        raise typer.BadParameter("must not be given together with --to", param_hint="--json")
     if out is not None and len(paths) > 1:
         raise typer.BadParameter("is one file; convert one run at a time", param_hint="--out")
     _convert(paths, to, out, overwrite=overwrite, quiet=quiet)

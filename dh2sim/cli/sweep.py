@@ -22,24 +22,24 @@ def sweep(
         Path | None, typer.Option(metavar="FILE.csv", help="File of designs: a column for each number.")
     ] = None,
     vary: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
             metavar="NAME=HOW,…",
-            help="Draw numbers of the robot file: X (a factor from 1 - X to 1 + X), normal:SD, uniform:LOW:HIGH or "
-            "loguniform:LOW:HIGH, in the file's units.",
+            help="Draw numbers of the robot file, with commas or repeated: X (a factor from 1 - X to 1 + X), "
+            "normal:SD, uniform:LOW:HIGH or loguniform:LOW:HIGH, in the file's units.",
         ),
-    ] = "",
+    ] = None,
     count: Annotated[
         int | None, typer.Option(metavar="N", help="Number of designs that --vary draws. [default: 256]")
     ] = None,
     measure: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
             metavar="NAMES",
-            help="What to measure, separated by commas: workspace, manipulability, reach, payload, or "
-            "MODULE:FUNCTION of your own, which is given a Robot.",
+            help="What to measure, with commas or repeated: workspace, manipulability, reach, payload, or "
+            "MODULE:FUNCTION of your own, which is given a Robot. [default: the first four]",
         ),
-    ] = "workspace,manipulability,reach,payload",
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -81,7 +81,7 @@ def sweep(
     model = build_serial(robot)
     from dh2sim.robot_facade import Robot
     from dh2sim.simulate.designs import read_design_table
-    from dh2sim.sweep.sweep import DEFAULT_COUNT, measure_designs, prepare_task
+    from dh2sim.sweep.sweep import DEFAULT_COUNT, DEFAULT_MEASURES, measure_designs, prepare_task
 
     draws = named_values(vary, "--vary", "name=how, as in a2=0.05")
     table = None if designs is None else read_design_table(designs)
@@ -92,7 +92,7 @@ def sweep(
             vary=draws,
             designs=table,
             count=count,
-            names=measure,
+            names=",".join(measure) if measure else DEFAULT_MEASURES,
             samples=samples,
             voxel=voxel,
             seed=seed,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dh2sim.cli.common import ForceOption, RobotArgument, choice, load_one, refuse_options
+from dh2sim.cli.common import ForceOption, RobotArgument, choice, load_one, refuse_options, words_of
 from dh2sim.cli.output import hand_over, json_text, require_free
 from dh2sim.cli.symbolic_code import LANGUAGES, is_about_code, print_code
 from dh2sim.codegen.program import What as CodeWhat
@@ -30,8 +30,13 @@ class Format(StrEnum):
 def symbolic(
     robot: RobotArgument,
     what: Annotated[
-        str, typer.Option(metavar="WHAT", help="pose, matrices, jacobian, dynamics, inverse-dynamics.")
-    ] = "pose",
+        list[str] | None,
+        typer.Option(
+            metavar="WHAT",
+            help="pose, matrices, jacobian, dynamics, inverse-dynamics; for code several, with commas or repeated. "
+            "[default: pose]",
+        ),
+    ] = None,
     source: Annotated[
         str, typer.Option("--from", metavar="FRAME", help="Frame that the pose is given in.")
     ] = "base_link",
@@ -77,19 +82,21 @@ def symbolic(
     nesting = {
         "--style": style != "base",
         "--lengths": lengths is not None,
-        "--fold": fold != "parallel" or no_fold,
+        "--fold": fold != "parallel",
+        "--no-fold": no_fold,
     }
-    if is_about_code(what, as_):
+    parts = words_of(what) or ["pose"]
+    if is_about_code(parts, as_):
         words = {"--no-names": not names, "--numbers": numbers, "--letters": letters, "--q": q}
         refuse_options("code", frames | nesting | words)
-        print_code(robot, what, as_, out, force=force)
+        print_code(robot, parts, as_, out, force=force)
         return
     # imported here: code needs none of it
     from dh2sim.symbolic.expression import Lengths, Style
     from dh2sim.symbolic.request import What, symbolic_form
     from dh2sim.symbolic.table import Fold
 
-    wanted = choice(what, What, "--what", others=(CodeWhat.INVERSE_DYNAMICS,))
+    wanted = choice(parts[0], What, "--what", others=(CodeWhat.INVERSE_DYNAMICS,))
     format_ = choice(as_, Format, "--as", others=LANGUAGES)
     nested = choice(style, Style, "--style")
     place = choice(lengths, Lengths, "--lengths")

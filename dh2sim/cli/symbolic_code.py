@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,17 +22,17 @@ if TYPE_CHECKING:
 LANGUAGES = tuple(Language)
 
 
-def is_about_code(what: str, as_: str) -> bool:
+def is_about_code(what: Sequence[str], as_: str) -> bool:
     """Whether options ask for code: for a language, or for what there is code of alone."""
-    return as_.lower() in LANGUAGES or "," in what or what.lower() == What.INVERSE_DYNAMICS
+    return as_.lower() in LANGUAGES or len(what) > 1 or what[0].lower() == What.INVERSE_DYNAMICS
 
 
-def print_code(robot: str, what: str, as_: str, out: Path | None, *, force: bool) -> None:
+def print_code(robot: str, what: Sequence[str], as_: str, out: Path | None, *, force: bool) -> None:
     """Write code, or with ``--as text`` and ``--as json`` what the inverse dynamics cost.
 
     Args:
         robot: Path or name.
-        what: Of ``--what``: words with commas between them.
+        what: Of ``--what``.
         as_: Of ``--as``.
         out: File to write.
         force: Whether to overwrite it.
@@ -41,7 +42,7 @@ def print_code(robot: str, what: str, as_: str, out: Path | None, *, force: bool
     """
     from dh2sim.codegen.generate import generate_code, summarize
 
-    wanted = [choice(word.strip(), What, "--what") for word in what.split(",")]
+    wanted = [choice(word, What, "--what") for word in what]
     require_free(out, force=force)
     spec = load_one(robot)
     about = ", ".join(word for word in wanted if word is not None)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import MANY, ForceOption, JsonOption, RobotArgument, build_any
+from dh2sim.cli.common import ForceOption, JsonOption, RobotArgument, build_any, words_of
 from dh2sim.cli.output import json_text, require_free, table_lines, wrapped
 from dh2sim.errors import ConfigurationError, SettingsError, TrajectoryError
 from dh2sim.messages import did_you_mean, listed, printable, shown
@@ -56,11 +56,12 @@ def trajectory(
         typer.Option(metavar="S", help="Duration of the whole motion, s. [default: as short as limits allow]"),
     ] = None,
     limits: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
             metavar="NAME=VALUE...",
             help="velocity, acceleration and jerk of joints in the robot file's units, or '50%' of the robot's own; "
-            "JOINT.velocity of one; tool_speed, tool_turn. Alone: the robot's own, as by default.",
+            "JOINT.velocity of one; tool_speed, tool_turn; with blanks, commas or repeated. Alone: the robot's own, "
+            "as by default.",
         ),
     ] = None,
     through: Annotated[
@@ -180,9 +181,7 @@ def _typed(spec: RobotSpec, words: Sequence[str]) -> list[Any]:
 
     def finish() -> None:
         if pending:
-            read = read_joint_vector(
-                spec, pending, degrees=False, radians=False, command="trajectory", options=_OPTIONS
-            )
+            read = read_joint_vector(spec, pending, degrees=False, radians=False)
             points.append(list(read.q))
             pending.clear()
 
@@ -192,8 +191,6 @@ def _typed(spec: RobotSpec, words: Sequence[str]) -> list[Any]:
             spec.configuration(word)  # refuses an unknown name
             points.append(word)
             continue
-        if word.startswith("--"):
-            raise ConfigurationError(f"trajectory has no option {shown(word)}. Options: {_OPTIONS}")
         parts = split([word], count)
         if len(parts) > 1:
             finish()
@@ -204,12 +201,7 @@ def _typed(spec: RobotSpec, words: Sequence[str]) -> list[Any]:
     return points
 
 
-_OPTIONS = (
-    "--kind, --profile, --duration, --limits, --through, --free, --out, --rate, --samples, --force, --json, --help"
-)
-
-
-def _limits(model: RobotModel, text: str | None) -> dict[str, Any]:
+def _limits(model: RobotModel, texts: Sequence[str] | None) -> dict[str, Any]:
     """Return what ``--limits`` requests, in rad and m."""
     from dh2sim.cli.goal import numbers
     from dh2sim.trajectory.limits import GIVEN, QUANTITIES
@@ -218,8 +210,7 @@ def _limits(model: RobotModel, text: str | None) -> dict[str, Any]:
     problems: list[tuple[str, str]] = []
     found: dict[str, Any] = {}
     joints = [joint.name for joint in model.moving_joints]
-    words = [word for part in (text or "").split(MANY) for word in part.split(",") if word]
-    for word in words:
+    for word in words_of(texts):
         name, equals, value = word.partition("=")
         joint, _, quantity = name.rpartition(".")
         quantity = quantity.replace("-", "_")
@@ -227,7 +218,7 @@ def _limits(model: RobotModel, text: str | None) -> dict[str, Any]:
         share = value.strip().endswith("%")
         values, wrong = numbers([value.strip().removesuffix("%")])
         if not equals:
-            problems.append(("limits", f"expected NAME=VALUE, got {shown(word)}"))
+            problems.append(("limits", f"must be NAME=VALUE, got {shown(word)}"))
         elif joint and joint not in joints:
             known = f"{did_you_mean(joint, joints)} Joints: {listed(joints)}"
             problems.append(("limits", f"{model.name} has no joint {shown(joint)} that moves.{known}"))

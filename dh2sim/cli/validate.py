@@ -87,7 +87,7 @@ def validate(
         raise typer.BadParameter("is the source of one robot", param_hint="--source")
     if source is None and (base is not None or tip is not None):
         option = "--base" if tip is None else "--tip"
-        raise typer.BadParameter("only with --source", param_hint=option)
+        raise typer.BadParameter("needs --source", param_hint=option)
     from dh2sim.engines.yourdfpy_engine import start_yourdfpy
 
     start_yourdfpy()

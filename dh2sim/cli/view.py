@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import RobotArgument, StrictOption, load_one, report_slips
+from dh2sim.cli.common import RobotArgument, StrictOption, load_one, report_slips, words_of
 from dh2sim.cli.output import require_free
 from dh2sim.messages import printable
 
@@ -49,7 +49,7 @@ def view(
     ] = "127.0.0.1",
     allow_host: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="Name of this machine that browsers may use, too; may be repeated."),
+        typer.Option(metavar="NAME", help="Names of this machine that browsers may use, with commas or repeated."),
     ] = None,
     share: Annotated[str, typer.Option(metavar="never", help="Pages are never shared over the internet.")] = NEVER,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
@@ -88,7 +88,7 @@ def view(
     require_free(export, force=force)
     spec = load_one(robot)
     if spec.is_mechanism:
-        names = _host_names(allow_host or [])
+        names = _host_names(allow_host)
         _view_mechanism(spec, run, rollout, export, host=host, allow_hosts=names, port=port, browser=browser)
         return
     from dh2sim.view.initial_state import folder_of, open_state
@@ -101,12 +101,13 @@ def view(
 
         state = replace(state, planned=tool_path(state.model, motion), q=tuple(motion.q[0].tolist()))
     if export is None:
-        _serve(state, run, host=host, allow_hosts=_host_names(allow_host or []), port=port, browser=browser)
+        _serve(state, run, host=host, allow_hosts=_host_names(allow_host), port=port, browser=browser)
     else:
         _export(state, run, rollout, export, motion)
 
 
-def _host_names(names: list[str]) -> list[str]:
+def _host_names(texts: list[str] | None) -> list[str]:
+    names = words_of(texts)
     for name in names:
         if not re.fullmatch(r"[\w.-]{1,253}", name):
             raise typer.BadParameter(

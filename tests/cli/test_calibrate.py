@@ -78,7 +78,7 @@ def test_json_is_the_same_as_data(points: Path) -> None:
     [
         ([], "give a file of measurements, or a run with --from-run"),
         (["no.csv"], "no.csv: cannot be read"),
-        (["DATA", "--noise", "fast"], "expected a positive number with a unit"),
+        (["DATA", "--noise", "fast"], "must be a positive number with a unit"),
         (["DATA", "--prior", "1"], "'1' needs a unit, such as 1mm or 1mrad"),
         (["DATA", "--kind", "points"], "It is called 'position' here"),
         (["DATA", "--unknown", "thta"], "Did you mean 'theta'?"),

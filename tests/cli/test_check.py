@@ -81,9 +81,9 @@ def test_robots_that_changed_are_drawn_before_and_after(folder: Path) -> None:
         (["--only", "pose"], "--only: 'pose' is not one of files, drift, poses"),
         (["--format", "html"], "--format: 'html' is not one of text, github, sarif, json, junit, markdown"),
         (["-o", "report.html"], "report.html: a report ends in .txt or .sarif or .json or .xml or .md"),
-        (["--pictures", "x"], "--pictures: only with --changed-since"),
-        (["--baseline", "a", "--write-baseline", "b"], "--baseline: not together with --write-baseline"),
-        (["--json", "--format", "sarif"], "--json: not together with --format"),
+        (["--pictures", "x"], "--pictures needs --changed-since"),
+        (["--baseline", "a", "--write-baseline", "b"], "--baseline must not be given together with --write-baseline"),
+        (["--json", "--format", "sarif"], "--json must not be given together with --format"),
         (["--baseline", "none.json"], "cannot read the baseline 'none.json'"),
         (["nowhere"], "no file or folder named 'nowhere'"),
         (["-o", "no/report.json"], "there is no folder 'no'"),
@@ -92,7 +92,7 @@ def test_robots_that_changed_are_drawn_before_and_after(folder: Path) -> None:
 def test_wrong_usage_is_status_2(arguments: list[str], message: str, folder: Path) -> None:
     run = dh2sim("check", "--samples", "1", *arguments)
     assert run.status == 2
-    assert message in " ".join(run.err.split()).replace("Invalid value for ", "")
+    assert message in " ".join(run.err.split())
     assert sorted(path.name for path in folder.iterdir()) == ["arm.yaml"]
 
 

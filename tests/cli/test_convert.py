@@ -42,7 +42,7 @@ def test_a_wrong_convention_is_reported() -> None:
 def test_the_convention_wanted_must_be_named() -> None:
     run = dh2sim("convert", "scara")
     assert run.status == 2
-    assert "Missing option '--to'" in run.err
+    assert run.err == "dh2sim: option --to is missing. 'dh2sim convert --help' has examples\n"
 
 
 def test_a_mesh_is_found_from_where_the_new_file_stands(tmp_path: Path) -> None:

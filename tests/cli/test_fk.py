@@ -102,7 +102,7 @@ def test_coordinates_are_read_in_the_units_of_the_robot_file_unless_an_option_sa
     run = dh2sim("fk", robot, "--degrees", "--radians", "0.5", "250")
     assert (run.status, run.err.splitlines()[-1]) == (
         2,
-        "Error: Invalid value for --degrees, --radians: cannot be combined",
+        "dh2sim: --degrees, --radians cannot be combined",
     )
 
 
@@ -183,7 +183,7 @@ def test_all_prints_every_rows_transform_and_every_frame(tmp_path: Path) -> None
     run = dh2sim("fk", "rpr", "--all", "--frame", "dh_1")
     assert (run.status, run.err.splitlines()[-1]) == (
         2,
-        "Error: Invalid value for --all: prints every row; leave the other option out",
+        "dh2sim: --all prints every row; leave the other option out",
     )
 
 
@@ -209,7 +209,6 @@ quaternion  1.000000000 0.000000000 0.000000000 0.000000000  (w, x, y, z)
 
 
 JOINTS = "joint_1 (deg), joint_2 (deg), joint_3 (m), joint_4 (deg), joint_5 (deg), joint_6 (deg)"
-OPTIONS = "Options: --frame, --from, --to, --all, --degrees, --radians, --json, --help"
 
 
 @pytest.mark.parametrize(
@@ -235,8 +234,6 @@ OPTIONS = "Options: --frame, --from, --to, --all, --degrees, --radians, --json, 
             "--frame toll0",
             "unknown frame 'toll0'. Did you mean 'tool0'? Frames: base_link, link_1 to link_6, dh_0 to dh_6, tool0",
         ),
-        ("--jsn", f"fk has no option '--jsn'. {OPTIONS}"),
-        ("1 2 3 4 5 6 --deg=1", f"fk has no option '--deg=1'. {OPTIONS}"),
     ],
 )
 def test_what_is_wrong_is_reported_in_words(arguments: str, message: str) -> None:

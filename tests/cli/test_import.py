@@ -187,7 +187,7 @@ def test_errors_of_xacro_name_the_options_that_help(tmp_path: Path) -> None:
 def test_an_argument_of_xacro_has_a_name_and_a_value(urdf: Path) -> None:
     run = dh2sim("import", urdf, "--arg", "tip=hand")
     assert run.status == 2
-    assert "--arg: expected NAME:=VALUE, found 'tip=hand'" in " ".join(run.err.split())
+    assert "--arg must be NAME:=VALUE, got 'tip=hand'" in " ".join(run.err.split())
     run = dh2sim("import", urdf, "--arg", "tip:=hand")
     assert (run.status, run.err) == (2, f"dh2sim: {urdf}: arguments are for xacro files; this one needs no xacro\n")
 

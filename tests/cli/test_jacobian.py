@@ -80,7 +80,6 @@ def test_a_robot_that_does_not_move_has_an_empty_jacobian(tmp_path: Path) -> Non
     [
         ("--frame toll0", "unknown frame 'toll0'. Did you mean 'tool0'?"),
         ("1 2", "stanford has 6 joint coordinates, got 2: joint_1 (deg)"),
-        ("--jsn", "jacobian has no option '--jsn'. Options: --frame, --degrees, --radians, --json, --help"),
     ],
 )
 def test_what_is_wrong_is_reported(arguments: str, message: str) -> None:

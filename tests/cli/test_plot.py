@@ -87,8 +87,8 @@ def test_a_run_can_be_plotted_from_inside(run: Path, monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize(
     ("arguments", "printed"),
     [
-        (["--size", "100x100"], "Invalid value for --size: must be from 200 to 20000 pixels each way, got 100x100"),
-        (["--size", "100"], "Invalid value for --size: '100' must have the form WIDTHxHEIGHT, such as 1280x720"),
+        (["--size", "100x100"], "--size must be from 200 to 20000 pixels each way, got 100x100"),
+        (["--size", "100"], "--size: '100' must have the form WIDTHxHEIGHT, such as 1280x720"),
     ],
 )
 def test_sizes_that_cannot_be_are_reported(run: Path, arguments: list[str], printed: str) -> None:

@@ -151,23 +151,24 @@ def test_the_package_runs_as_a_module() -> None:
 def test_wrong_usage_is_reported_on_standard_error_and_exits_with_2(arguments: list[str]) -> None:
     run = dh2sim(*arguments)
     assert (run.status, run.out) == (2, "")
-    assert "rror: " in run.err
+    assert run.err.startswith("dh2sim: ")
+    assert run.err.count("\n") == 1
     assert "Traceback" not in run.err
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["validate", "stanford", "--samples", "0"], "'--samples': must be at least 1, got 0"),
-        (["validate", "stanford", "--samples", "many"], "'--samples': must be a whole number, got 'many'"),
-        (["rollout", "stanford", "--out", "r", "--duration", "long"], "'--duration': must be a number, got 'long'"),
-        (["view", "stanford", "--port", "99999"], "'--port': must be at most 65535, got 99999"),
+        (["validate", "stanford", "--samples", "0"], "--samples must be at least 1, got 0"),
+        (["validate", "stanford", "--samples", "many"], "--samples must be a whole number, got 'many'"),
+        (["rollout", "stanford", "--out", "r", "--duration", "long"], "--duration must be a number, got 'long'"),
+        (["view", "stanford", "--port", "99999"], "--port must be at most 65535, got 99999"),
     ],
     ids=lambda value: value[2] if isinstance(value, list) else "",
 )
 @pytest.mark.skipif(find_spec("typer._coercion") is None, reason="this version of typer words them itself")
 def test_wrong_numbers_are_reported_in_plain_words(arguments: list[str], message: str) -> None:
-    assert dh2sim(*arguments).err.splitlines()[-1] == f"Error: Invalid value for {message}"
+    assert dh2sim(*arguments).err.splitlines()[-1] == f"dh2sim: {message}"
 
 
 @pytest.mark.parametrize(
@@ -185,7 +186,7 @@ def test_other_names_of_the_conventions_are_translated(
     run = dh2sim(*arguments)
     assert (run.status, run.out) == (2, "")
     assert run.err.splitlines()[-1] == (
-        f"Error: Invalid value for {option}: '{arguments[-1]}' is not one of {allowed}. It is called '{meant}' here"
+        f"dh2sim: {option}: '{arguments[-1]}' is not one of {allowed}. It is called '{meant}' here"
     )
 
 
@@ -219,8 +220,36 @@ def test_list_prints_json_alone() -> None:
 def test_an_unknown_command_is_reported_with_the_one_that_may_be_meant() -> None:
     run = dh2sim("exprot", "stanford")
     assert (run.status, run.out) == (2, "")
-    assert run.err.endswith("\nError: unknown command 'exprot'. Did you mean 'export'?\n")
-    assert dh2sim("xyzzy").err.endswith("\nError: unknown command 'xyzzy'\n")
+    assert run.err == "dh2sim: unknown command 'exprot'. Did you mean 'export'? 'dh2sim --help' lists them all\n"
+    assert dh2sim("xyzzy").err == "dh2sim: unknown command 'xyzzy'. 'dh2sim --help' lists them all\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("info", "argument ROBOT is missing. 'dh2sim info --help' has examples"),
+        ("info rpr scara", "unexpected argument 'scara'. 'dh2sim info --help' shows how to call it"),
+        ("info rpr --jsn", "unknown option '--jsn'. Did you mean '--json'? 'dh2sim info --help' lists them all"),
+        ("info rpr -z", "unknown option '-z'. 'dh2sim info --help' lists them all"),
+        ("fk rpr --frame", "option '--frame' requires an argument. 'dh2sim fk --help' shows how to call it"),
+        ("fk rpr 1 2 --deg=1", "unknown option '--deg'. Did you mean '--degrees'? 'dh2sim fk --help' lists them all"),
+        (
+            "jacobian rpr --jsn",
+            "unknown option '--jsn'. Did you mean '--json'? 'dh2sim jacobian --help' lists them all",
+        ),
+        (
+            "trajectory rpr home --fre",
+            "unknown option '--fre'. Did you mean '--free'? 'dh2sim trajectory --help' lists",
+        ),
+        ("--foo", "unknown option '--foo'. 'dh2sim --help' lists them all"),
+        ("check --only file,drift", "--only: 'file' is not one of files, drift, poses. Did you mean 'files'?"),
+    ],
+)
+def test_wrong_usage_is_one_line_that_says_what_to_do(arguments: str, message: str) -> None:
+    run = dh2sim(*arguments.split())
+    assert (run.status, run.out) == (2, "")
+    assert run.err.startswith(f"dh2sim: {message}")
+    assert run.err.count("\n") == 1
 
 
 def test_only_the_module_of_the_called_command_is_imported() -> None:

@@ -196,7 +196,7 @@ def test_one_mistake_is_reported_and_nothing_is_made(options: list[str], problem
 def test_a_share_that_cannot_be_read_is_wrong_usage(share: str, problem: str, folder: Path) -> None:
     run = dh2sim("rollout", "rich.yaml", "--out", "run.zarr", "--randomize", share)
     assert (run.status, run.out) == (2, "")
-    assert run.err.splitlines()[-1] == f"Error: Invalid value for --randomize: {problem}"
+    assert run.err.splitlines()[-1] == f"dh2sim: --randomize: {problem}"
 
 
 @pytest.mark.parametrize(

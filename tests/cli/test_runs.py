@@ -229,19 +229,19 @@ def test_what_is_not_a_run_is_reported_and_the_others_all_the_same(run: Path) ->
     [
         (
             ["--to", "hdf"],
-            "Invalid value for --to: unknown format 'hdf'. Did you mean 'hdf5'? Allowed: parquet, hdf5",
+            "--to: 'hdf' is not one of parquet, hdf5. Did you mean 'hdf5'?",
         ),
-        (["--out", "x"], "Invalid value for --out: only with --to: without it nothing is written"),
-        (["--overwrite"], "Invalid value for --overwrite: only with --to: without it nothing is written"),
-        (["--to", "hdf5", "--json"], "Invalid value for --json: not with --to"),
-        (["b.zarr", "--to", "hdf5", "--out", "x"], "Invalid value for --out: is one file; convert one run at a time"),
+        (["--out", "x"], "--out needs --to: without it nothing is written"),
+        (["--overwrite"], "--overwrite needs --to: without it nothing is written"),
+        (["--to", "hdf5", "--json"], "--json must not be given together with --to"),
+        (["b.zarr", "--to", "hdf5", "--out", "x"], "--out is one file; convert one run at a time"),
     ],
     ids=["format", "out", "overwrite", "json", "several"],
 )
 def test_options_that_make_no_sense_are_reported(run: Path, options: list[str], message: str) -> None:
     printed = dh2sim("runs", run, *options)
     assert (printed.status, printed.out) == (2, "")
-    assert printed.err.splitlines()[-1] == f"Error: {message}"
+    assert printed.err.splitlines()[-1] == f"dh2sim: {message}"
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,7 @@ def test_the_report_fits_into_80_columns(name: str) -> None:
         ),
         (["home", "zero", "--limits", "veloctiy=3"], "--limits 'veloctiy' is not a limit. Did you mean 'velocity'?"),
         (["home", "zero", "--limits", "j.velocity=3"], "--limits puma560 has no joint 'j' that moves."),
-        (["home", "zero", "--limits", "velocity"], "--limits expected NAME=VALUE, got 'velocity'"),
+        (["home", "zero", "--limits", "velocity"], "--limits must be NAME=VALUE, got 'velocity'"),
         (["home", "zero", "--limits", "velocity=0"], "--limits velocity must be a finite number above 0, got 0.0"),
         (["home", "zero", "--rate", "5"], "needs --out"),
         (["home", "zero", "-o", "motion.txt"], "--out must end in .csv or .npz, got 'motion.txt'"),
