@@ -30,7 +30,7 @@ class Command(NamedTuple):
     """Those of them that may have no word."""
 
 
-UsageError: Final[type[Any]] = typer.BadParameter.__base__
+UsageError: Any = typer.BadParameter.__base__
 """Of typer, or of click in its earlier versions."""
 
 NEGATIVE_NUMBERS: Final = {"ignore_unknown_options": True}

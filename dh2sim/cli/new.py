@@ -71,7 +71,7 @@ def new(
 
     name = name.removesuffix(".yaml")
     if (problem := name_problem(name)) is not None:
-        raise typer.BadParameter(problem, param_hint="NAME")
+        raise typer.BadParameter(problem.removeprefix("a name "), param_hint="NAME")
     path = Path(f"{name}.yaml") if out is None else out
     require_free(path, force=force)
     if source is None:

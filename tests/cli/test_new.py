@@ -95,7 +95,7 @@ def test_a_file_is_never_overwritten_without_force() -> None:
     [
         (
             ["my arm"],
-            "NAME: a name is made of letters, digits, '_' and '-', starting with a letter; found 'my arm'",
+            "NAME is made of letters, digits, '_' and '-', starting with a letter; found 'my arm'",
         ),
         (
             ["arm", "--joints", "RRX"],

@@ -419,3 +419,15 @@ def test_a_signal_ends_the_program_with_the_status_of_shells(
         command, env=environment(), cwd=tmp_path, capture_output=True, text=True, timeout=180, check=False
     )
     assert (done.returncode, done.stderr) == (status, printed)
+
+
+def test_lists_are_given_with_commas_or_by_repeating_the_option() -> None:
+    sweep = ("sweep", "rpr", "--count", "2", "--samples", "20", "--json", "-q")
+    commas = dh2sim(*sweep, "--vary", "L2=0.1,a1=normal:0.02", "--measure", "reach,workspace")
+    repeated = dh2sim(
+        *sweep, "--vary", "L2=0.1", "--vary", "a1=normal:0.02", "--measure", "reach", "--measure", "workspace"
+    )
+    assert commas.status == 0
+    assert commas == repeated
+    code = ("symbolic", "rpr", "--as", "python")
+    assert dh2sim(*code, "--what", "pose,jacobian") == dh2sim(*code, "--what", "pose", "--what", "jacobian")

@@ -57,8 +57,8 @@ def test_what_inverse_dynamics_costs_is_printed_with_its_base_parameters() -> No
     ("arguments", "error"),
     [
         (["--what", "pose,jacobin", "--as", "c"], "--what: 'jacobin' is not one of pose, jacobian, inverse-dynamics"),
-        (["--what", ALL], "--as: takes one of python, numpy, c, cpp, matlab, javascript for several functions"),
-        (["--what", "inverse-dynamics", "--as", "latex"], "--as: takes one of text, json, python, numpy, c"),
+        (["--what", ALL], "--as takes one of python, numpy, c, cpp, matlab, javascript for several functions"),
+        (["--what", "inverse-dynamics", "--as", "latex"], "--as takes one of text, json, python, numpy, c"),
         (["--style", "tool", "--as", "c"], "--style does not apply to code"),
         (["--to", "dh_2", "--as", "python"], "--to does not apply to code"),
         (["--no-names", "--as", "python"], "--no-names does not apply to code"),
