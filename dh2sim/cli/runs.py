@@ -42,7 +42,7 @@ def runs(
             "--out", "-o", metavar="FILE", help="File to write. [default: RUN.parquet or RUN.h5, beside the run]"
         ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite existing files.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", "--force", help="Overwrite existing files.")] = False,
     quiet: QuietOption = False,
 ) -> int:
     """Describe runs, or convert them to other formats.

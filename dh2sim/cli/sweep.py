@@ -60,7 +60,7 @@ def sweep(
     jobs: Annotated[
         int, typer.Option(metavar="N", help="Number of processes; 0: one for each processor; changes no result.")
     ] = 1,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Measure everything again.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", "--force", help="Measure everything again.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, alone.")] = False,
     quiet: QuietOption = False,
 ) -> None:

@@ -104,7 +104,7 @@ def test_a_terminal_sees_a_bar_that_vanishes(run: Path) -> None:
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))
     command = [sys.executable, "-m", "dh2sim", "runs", str(run), "--to", "hdf5"]
-    for option, shown in (([], True), (["--overwrite", "--quiet"], False)):
+    for option, shown in (([], True), (["--force", "--quiet"], False)):
         subprocess.run(
             [*command, *option],
             env=environment(TERM="xterm"),
