@@ -299,6 +299,11 @@ class ExportReport:
     warnings: tuple[str, ...] = ()
     """What MuJoCo finds questionable in the files, one sentence each."""
 
+    def __repr__(self) -> str:
+        files = listed(file.path.name for file in self.files)
+        checked = "compared with the table" if self.verified else "not compared with the table"
+        return f"<ExportReport of '{self.name}': {files}; {checked}>"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:

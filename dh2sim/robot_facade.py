@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -875,4 +875,4 @@ class Robot:
 
 
 def _restored(kind: type[Robot], spec: RobotSpec, notes: tuple[str, ...]) -> Robot:
-    return kind.from_spec(replace(spec), notes=notes)  # checked again, which makes its arrays read-only
+    return kind.from_spec(spec, notes=notes)

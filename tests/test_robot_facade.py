@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import inspect
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from html.parser import HTMLParser
 from math import pi
 from pathlib import Path
@@ -19,7 +20,8 @@ from dh2sim import Continuous, Fixed, Pose, Prismatic, Revolute, Robot
 from dh2sim.draw.diagram.drawing import draw_robot
 from dh2sim.errors import ConfigurationError, Dh2simError, OutputError, UnknownFrameError
 from dh2sim.kinematics.singularity import manipulability, singular_values
-from dh2sim.robot.spec import Convention, JointType
+from dh2sim.robot.spec import Convention, JointType, RobotSpec
+from dh2sim.validate.report import RobotReport
 
 GENERATED = Path(__file__).parents[1] / "generated"
 ROBOTS = ["stanford", "puma560", "scara"]
@@ -245,6 +247,43 @@ def test_a_robot_can_be_copied_and_sent_to_another_process(copied: Callable[[Rob
     assert again.mjcf() == robot.mjcf()
     assert again.spec.parameters == robot.spec.parameters
     assert not again.spec.gravity.flags.writeable
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda spec: pickle.loads(pickle.dumps(spec))])
+@pytest.mark.parametrize("name", ["puma560", "four_bar"])
+def test_a_copied_specification_is_as_frozen_as_the_original(
+    copied: Callable[[RobotSpec], RobotSpec], name: str
+) -> None:
+    arrays: list[np.ndarray[Any, Any]] = []
+
+    def collect(value: object) -> None:
+        if isinstance(value, np.ndarray):
+            arrays.append(value)
+        elif dataclasses.is_dataclass(value):
+            for each in dataclasses.fields(value):
+                collect(getattr(value, each.name))
+        elif isinstance(value, Mapping | tuple):
+            for inner in value.values() if isinstance(value, Mapping) else value:
+                collect(inner)
+
+    collect(copied(Robot.load(name).spec))
+    assert len(arrays) > 5
+    assert not [array for array in arrays if array.flags.writeable]
+
+
+def test_results_print_a_line_or_few_in_a_python_prompt(arm: Robot) -> None:
+    goal = arm.fk(arm.configurations["home"])
+    results = [
+        arm.spec, arm.model, arm.chain, arm.ik(goal), arm.symbolic(), arm.mobility(), arm.draw(),
+        arm.explain_ik(goal), arm.trajectory(["home", [0.1, 0.2, 0.5]]), arm.diff("scara"),
+        RobotReport(name='my_arm', samples=1, reach=1.0, checks=()), Robot.load("four_bar").mechanism
+    ]  # fmt: skip
+    for result in results:
+        kind = type(result).__name__
+        assert repr(result).startswith(f"<{kind}"), kind
+        assert len(repr(result)) < 200
+        assert "\n" not in repr(result)
+    assert str(arm.ik(goal)).splitlines()[0] == repr(arm.ik(goal))
 
 
 def test_a_robot_prints_its_table(arm: Robot) -> None:

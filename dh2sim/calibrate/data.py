@@ -48,7 +48,7 @@ def calibration_data(found: Calibration) -> dict[str, Any]:
             {
                 "name": parameter.name,
                 "unit": "rad" if parameter.is_angle else "m",
-                "told": parameter.status.value,
+                "status": parameter.status.value,
                 "nominal": parameter.nominal,
                 "value": parameter.value,
                 "change": parameter.change,

@@ -24,7 +24,7 @@ from dh2sim.calibrate.measurements import OTHER_KINDS, Kind
 from dh2sim.calibrate.parameters import Group, Parameter, RobotParameters, Values
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
-from dh2sim.messages import member
+from dh2sim.messages import counted, member
 from dh2sim.model.build import build_model
 from dh2sim.mujoco_warnings import mujoco_warnings
 from dh2sim.robot.spec import RobotSpec
@@ -76,6 +76,9 @@ class Plan:
     noise: float
     """Sigma of a component, m."""
     note: str = ""
+
+    def __repr__(self) -> str:
+        return f"<Plan: {counted(len(self.q), 'configuration')}, {self.kind.value}s, error {self.error:.3g} sigma>"
 
 
 def plan_measurements(

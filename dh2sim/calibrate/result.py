@@ -78,6 +78,10 @@ class Calibration:
     robust: bool = False
     prior: Mapping[str, float] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        error = f"{1e3 * self.errors_before.length:.3g} mm to {1e3 * self.errors.length:.3g} mm"
+        return f"<Calibration of '{self.robot.name}': {self.identifiable} parameters fitted, rms {error}>"
+
     @property
     def chi2_spread(self) -> float:
         """Standard deviation of chi-squared per degree of freedom, where all is well."""

@@ -225,10 +225,10 @@ def _plan(
     share = found.error / found.random_error
     facts = [
         ("identifiable", f"{found.parameters} parameters of the robot"),
-        ("the tool", f"known to {found.error:.2f} of the noise, rms inside the limits"),
+        ("the tool", f"known to {found.error:.2f} times the noise, rms inside the limits"),
         (
             "at random",
-            f"to {found.random_error:.2f} of it, by the median of as many: the plan has {share:.2f} of that",
+            f"to {found.random_error:.2f} times, by the median of as many: the plan has {share:.2f} of that",
         ),
         ("self-contact", f"{counted(found.touching, 'candidate')} left out"),
     ]

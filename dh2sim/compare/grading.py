@@ -110,6 +110,9 @@ class Grade:
     comparison: Comparison | None = field(default=None, repr=False)
     """None of an unreadable submission."""
 
+    def __repr__(self) -> str:
+        return f"<Grade of '{self.submission}': {self.points:g} of {self.out_of:g}, {self.outcome}>"
+
     @property
     def full(self) -> bool:
         """Whether nothing was taken off."""

@@ -37,6 +37,9 @@ class Imported:
     assignment: Assignment | None = field(default=None, repr=False)
     """How the frames were assigned."""
 
+    def __repr__(self) -> str:
+        return f"<Imported '{self.spec.name}': {len(self.spec.rows)} rows, {len(self.notes)} notes>"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlacedFrames:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from dh2sim.messages import counted
 from dh2sim.typing import Array
 
 
@@ -57,6 +58,16 @@ class Solutions:
     """Why there is no solution, as a phrase: ``out of reach by 0.12 m``; empty where there is one."""
     nearest: Array | None = None
     """Where there is no solution: the nearest configuration that was found, rad and m, shape (n,)."""
+
+    def __repr__(self) -> str:
+        found = f"{counted(len(self), 'configuration')}{'' if self.complete else ', perhaps more'}"
+        if self.curves:
+            found += f", {counted(len(self.curves), 'curve')}"
+        return f"<Solutions: {found if len(self) or self.curves else f'none, {self.reason}'}>"
+
+    def __str__(self) -> str:
+        rows = np.array2string(self.q, precision=6, suppress_small=True, threshold=200, max_line_width=80)
+        return f"{self!r}\n{rows}" if len(self) else repr(self)
 
     def __len__(self) -> int:
         """Return the number of configurations."""

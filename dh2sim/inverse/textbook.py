@@ -78,6 +78,9 @@ class Explanation:
     """Singular cases, and what is out of reach, in whole sentences."""
     _table: tuple[str, ...] = field(default=(), repr=False)
 
+    def __repr__(self) -> str:
+        return f"<Explanation of '{self.robot}': {self.form or self.reason}; print it>"
+
     def __str__(self) -> str:
         """Return the derivation as one text."""
         return self.text

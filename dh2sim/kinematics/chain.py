@@ -70,6 +70,9 @@ class KinematicChain:
     code: CodeCache = field(default_factory=CodeCache, init=False, repr=False)
     """What was made to compute with it, no part of its value."""
 
+    def __repr__(self) -> str:
+        return f"<KinematicChain: {', '.join(joint.name for joint in self.joints)}>"
+
     @property
     def moving_joints(self) -> tuple[Joint, ...]:
         """The joints that have a coordinate, in the order of a joint vector."""

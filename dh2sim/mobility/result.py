@@ -48,6 +48,12 @@ class Mobility:
     actuation: Actuation | None
     """None where the mechanism does not say what is driven."""
 
+    def __repr__(self) -> str:
+        return f"<Mobility of '{self.mechanism.name}': {self.finite}, counted {self.gruebler}>"
+
+    def __str__(self) -> str:
+        return f"{self.mechanism.name}: {self.verdict}"
+
     @property
     def instantaneous(self) -> int:
         """Return the number of independent velocities that violate no constraint."""

@@ -49,6 +49,9 @@ class MechanismModel:
     excluded: tuple[ExcludedPair, ...]
     """Pairs of links that do not collide: those of loops never do."""
 
+    def __repr__(self) -> str:
+        return f"<MechanismModel '{self.name}': {len(self.joints)} joints, {len(self.spec.closures)} closures>"
+
     @property
     def name(self) -> str:
         """The mechanism's name."""

@@ -155,6 +155,9 @@ class RobotModel:
     home: Array
     """The configuration 'home', or zero moved inside the limits; rad or m, shape (m,)."""
 
+    def __repr__(self) -> str:
+        return f"<RobotModel '{self.name}': {len(self.links)} links, {self.mass:.4g} kg, reach {self.reach:.4g} m>"
+
     @property
     def name(self) -> str:
         """The robot's name."""

@@ -14,6 +14,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Final
 
+import numpy as np
+
 from dh2sim.errors import ConfigurationError, Problem, RobotError
 from dh2sim.messages import Loc, did_you_mean, listed, path_of, shown
 from dh2sim.robot.checks import check, default_name
@@ -556,6 +558,10 @@ class RobotSpec:
     source_file: Annotated[SourceFile | None, Internal("", SourceFile)] = None
     """None for a robot made in code."""
 
+    def __repr__(self) -> str:
+        conventions = " and ".join(dict.fromkeys(row.convention.value for row in self.all_rows))
+        return f"<RobotSpec '{self.name}': {len(self.all_rows)} rows, {conventions}>"
+
     def __post_init__(self) -> None:
         """Check the robot and fill in what is left out."""
         problems = _Problems()
@@ -571,7 +577,7 @@ class RobotSpec:
         """Let a robot be pickled and copied: read-only mappings cannot be."""
         given = {each.name: getattr(self, each.name) for each in dataclasses.fields(self)}
         plain = {name: dict(value) if isinstance(value, Mapping) else value for name, value in given.items()}
-        return robot_of_checked, (plain,)
+        return _restored, (plain,)
 
     @property
     def all_rows(self) -> tuple[Row, ...]:
@@ -634,6 +640,25 @@ def robot_of_checked(given: Mapping[str, Any]) -> RobotSpec:
             value = each.default_factory()
         object.__setattr__(robot, each.name, value)
     return robot
+
+
+def _restored(given: Mapping[str, Any]) -> RobotSpec:
+    """Return a robot that was pickled; numpy lets arrays be written to then."""
+    robot = robot_of_checked(given)
+    _freeze(robot)
+    return robot
+
+
+def _freeze(value: object) -> None:
+    """Make all arrays of a robot, or of a part of it, read-only."""
+    if isinstance(value, np.ndarray):
+        value.setflags(write=False)
+    elif isinstance(value, Mapping | tuple):
+        for inner in value.values() if isinstance(value, Mapping) else value:
+            _freeze(inner)
+    elif dataclasses.is_dataclass(value):
+        for each in dataclasses.fields(value):
+            _freeze(getattr(value, each.name))
 
 
 class _Problems:

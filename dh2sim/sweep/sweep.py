@@ -18,6 +18,7 @@ from typing import Any, Final, SupportsIndex, TypedDict
 import numpy as np
 
 from dh2sim.errors import Dh2simError, MeasureError, Problem, RobotError, SettingsError
+from dh2sim.messages import counted, listed
 from dh2sim.model.build import ModelLike, build_model, model_of
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import load_robot
@@ -89,6 +90,9 @@ class Sweep:
     columns: Mapping[str, Array] = field(repr=False)
     """The whole table by column, each of shape (designs,): ``design``, the parameters in the units of the robot file,
     the measures. Empty where it was written to a file."""
+
+    def __repr__(self) -> str:
+        return f"<Sweep of '{self.robot}': {counted(self.count, 'design')}; {listed(self.measures)}>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -49,6 +49,10 @@ class SymbolicForm:
 
     form: Form
 
+    def __repr__(self) -> str:
+        name, what = self.form.table.spec.name, self.form.what
+        return f"<SymbolicForm of '{name}': {what}; print it, or .latex(), .markdown(), .data()>"
+
     @property
     def equations(self) -> tuple[Equation, ...]:
         """The matrices, in nested expressions."""

@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import Any
 
 from dh2sim.errors import EngineCapacityError, EngineError
+from dh2sim.messages import counted, listed
 from dh2sim.model.slips import Slip
 
 
@@ -146,6 +147,11 @@ class RobotReport:
     warnings: tuple[str, ...] = ()
     """What MuJoCo finds questionable in the files, one sentence each; it fails nothing."""
 
+    def __repr__(self) -> str:
+        failed = [f"{check.engine} {check.quantity.value}" for check in self.checks if check.ok is False]
+        verdict = f"failed: {listed(failed)}" if failed else "ok"
+        return f"<RobotReport of '{self.name}': {counted(len(self.checks), 'check')}, {verdict}>"
+
     @property
     def ok(self) -> bool:
         """Whether no check failed."""
@@ -169,6 +175,9 @@ class ValidationReport:
     """All robots of a validation."""
 
     robots: tuple[RobotReport, ...]
+
+    def __repr__(self) -> str:
+        return f"<ValidationReport: {listed(map(repr, self.robots))}>"
 
     @property
     def ok(self) -> bool:

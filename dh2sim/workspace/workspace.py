@@ -99,6 +99,12 @@ class Workspace:
     notes: tuple[str, ...]
     """What was assumed, one sentence each."""
 
+    def __repr__(self) -> str:
+        size = f"{self.volume:.4g} m³" if self.volume is not None else f"{self.area:.4g} m²" if self.area else "flat"
+        farthest = self.extremes.get("farthest")
+        far = "" if farthest is None else f", at most {farthest.value:.4g} m away"
+        return f"<Workspace of '{self.robot}', {self.frame}: {size}{far}>"
+
     @property
     def volume(self) -> float | None:
         """m³: the section's where there is one, else that of all voxels, also at the boundary; None if flat."""

@@ -69,7 +69,7 @@ def test_json_is_the_same_as_data(points: Path) -> None:
     assert data["kind"] == "position"
     assert data["grouped_by"] == "placement"
     assert len(data["held_out"]["folds"]) == 6
-    assert {each["told"] for each in data["parameters"] if each["name"].endswith(".alpha")} == {"held"}
+    assert {each["status"] for each in data["parameters"] if each["name"].endswith(".alpha")} == {"held"}
     assert data["errors"]["nominal"]["length"] > data["errors"]["calibrated"]["length"] > 5e-5
 
 

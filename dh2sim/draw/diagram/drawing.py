@@ -61,6 +61,9 @@ class RobotDrawing:
 
     sheet: Sheet
 
+    def __repr__(self) -> str:
+        return f"<RobotDrawing: {len(self.sheet.strokes)} strokes; .svg, .tikz, .save('arm.pdf')>"
+
     @property
     def svg(self) -> str:
         """The drawing as SVG."""
