@@ -25,7 +25,7 @@ from dh2sim.kinematics.parallelograms import find_couplings
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_mechanism_frames, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
-from dh2sim.messages import listed
+from dh2sim.messages import counted, listed
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import FilledIn, RobotModel
 from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
@@ -257,7 +257,7 @@ def _verify_mechanism(model: MechanismModel, folder: Path, formats: Collection[F
             gap, freedoms = engine.loops_at_home()
             own = model.tree.n - int(np.linalg.matrix_rank(constraint_jacobian(model.tree, model.q), tol=1e-8))
             faults += [f"leaves loops open by {gap:.3g} m"] if gap > allowed else []
-            faults += [f"leaves {freedoms} freedoms at home instead of {own}"] if freedoms != own else []
+            faults += [f"leaves {counted(freedoms, 'freedom')} at home instead of {own}"] if freedoms != own else []
         if faults:
             raise MismatchError(
                 f"{model.name}: the {format_.value.upper()} {listed(faults, ' and ')} ({position:.3g} m, "

@@ -6,8 +6,9 @@ import json
 import math
 import sys
 import textwrap
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -103,7 +104,9 @@ def _not_finite(value: object, place: str) -> Iterator[tuple[str, float]]:
 
 
 @contextmanager
-def progress_bar(doing: str, what: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
+def progress_bar(
+    doing: str, what: str, total: int, *, quiet: bool = False, after: float = 0.0
+) -> Iterator[Callable[[int], None]]:
     """Show a bar on standard error if that is a terminal; it vanishes in the end.
 
     Args:
@@ -111,6 +114,7 @@ def progress_bar(doing: str, what: str, total: int, *, quiet: bool = False) -> I
         what: what is counted, as in 'poses'.
         total: how many there are.
         quiet: show nothing.
+        after: s: work that is done sooner shows none.
 
     Yields:
         A function to call with how many are done since the last call.
@@ -118,6 +122,27 @@ def progress_bar(doing: str, what: str, total: int, *, quiet: bool = False) -> I
     if quiet or not sys.stderr.isatty():
         yield lambda _: None
         return
+    begun = time.monotonic()
+    shown: list[Callable[[int], None]] = []
+    done_before = 0
+
+    with ExitStack() as stack:
+
+        def advance(done: int) -> None:
+            nonlocal done_before
+            if not shown and time.monotonic() - begun >= after:
+                shown.append(stack.enter_context(_bar(doing, what, total)))
+                shown[0](done_before)
+            if shown:
+                shown[0](done)
+            done_before += done
+
+        advance(0)
+        yield advance
+
+
+@contextmanager
+def _bar(doing: str, what: str, total: int) -> Iterator[Callable[[int], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from dh2sim.cli.common import choice
 from dh2sim.cli.output import json_text, print_wrapped
 
 
@@ -58,9 +59,7 @@ class SchemaOf(StrEnum):
 
 
 def schema(
-    of: Annotated[
-        SchemaOf, typer.Argument(metavar="robot|waypoints", help="What the files describe.")
-    ] = SchemaOf.ROBOT,
+    of: Annotated[str, typer.Argument(metavar="robot|waypoints", help="What the files describe.")] = "robot",
 ) -> None:
     """Print the JSON Schema of robot files or waypoint files, with which editors complete and check them.
 
@@ -71,7 +70,7 @@ def schema(
       # then, on the first line of a file:
       # yaml-language-server: $schema=robot.schema.json
     """
-    if of is SchemaOf.ROBOT:
+    if choice(of, SchemaOf, "robot|waypoints") is SchemaOf.ROBOT:
         from dh2sim.robot.schema import json_schema
 
         print(json_text(json_schema()))

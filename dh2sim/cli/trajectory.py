@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dh2sim.cli.common import ForceOption, JsonOption, RobotArgument, build_any, words_of
-from dh2sim.cli.output import json_text, require_free, table_lines, wrapped
+from dh2sim.cli.output import json_text, progress_bar, require_free, table_lines, wrapped
 from dh2sim.errors import ConfigurationError, SettingsError, TrajectoryError
 from dh2sim.messages import did_you_mean, listed, printable, shown
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from contextlib import AbstractContextManager
+
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.robot.spec import RobotSpec, Units
     from dh2sim.trajectory.mechanism import MechanismTrajectory
@@ -24,6 +27,8 @@ if TYPE_CHECKING:
 
 _FILES = (".yaml", ".yml", ".json")
 _OTHER_FILES = (".csv", ".txt", ".toml", ".parquet")
+_SOON = 0.5
+"""s: what is done sooner shows no progress."""
 
 
 def trajectory(
@@ -128,12 +133,16 @@ def trajectory(
         "through": through or bool(file and file.through),
         "free": free or (file and file.free),
     }
+
+    def stage(doing: str, what: str, total: int) -> AbstractContextManager[Callable[[int], None]]:
+        return progress_bar(doing, what, total, after=_SOON)
+
     try:
         wanted: Any = {k: v for k, v in request.items() if v is not None}
         planned = (
-            plan_mechanism_trajectory(built, points, **wanted)
+            plan_mechanism_trajectory(built, points, stage=stage, **wanted)
             if isinstance(built, MechanismModel)
-            else plan_trajectory(built, points, **wanted)
+            else plan_trajectory(built, points, stage=stage, **wanted)
         )
     except TrajectoryError as error:
         raise TrajectoryError(_as_option(str(error))) from None

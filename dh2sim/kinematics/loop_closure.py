@@ -28,7 +28,7 @@ from dh2sim.typing import Array, read_only
 TOLERANCE: Final = 1e-12
 """Of closed loops: m for mechanisms up to 1 m, then of their size; and rad."""
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-_POSITIONS: Final = {
+POSITIONS: Final = {
     ClosureType.CYLINDRICAL: (0, 1),
     ClosureType.PRISMATIC: (0, 1),
 }
@@ -142,7 +142,7 @@ def _rows_of(tree: KinematicTree, closure: Closure, poses: Sequence[Array]) -> _
     T_a_b = compose(T_a_base, placed(poses, b)).tolist()
     origin: Vector = (T_a_b[0][3], T_a_b[1][3], T_a_b[2][3])
     rotations, axes = _rotation_residual(closure.type, [row[:3] for row in T_a_b[:3]])
-    kept = _POSITIONS.get(closure.type, (0, 1, 2))
+    kept = POSITIONS.get(closure.type, (0, 1, 2))
     position_rows = [[0.0] * tree.n for _ in kept]
     rotation_rows = [[0.0] * tree.n for _ in axes]
     for body, side in _loop(tree, a.body, b.body):

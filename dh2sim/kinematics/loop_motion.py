@@ -9,29 +9,23 @@ branches nor passes one unseen.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Final, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import AssemblyError, ConfigurationError, SingularPositionError
 from dh2sim.kinematics.chain import SpecLike, spec_of
-from dh2sim.kinematics.loop_closure import (
-    assembly,
-    close_loops,
-    closure_residual,
-    constraint_jacobian,
-    is_closed,
-    mechanism_size,
-)
+from dh2sim.kinematics.loop_batch import LoopBatch
+from dh2sim.kinematics.loop_closure import assembly, close_loops, is_closed
 from dh2sim.kinematics.transforms import identity
 from dh2sim.kinematics.tree import Frame, KinematicTree, body_poses, joint_values, placed
-from dh2sim.messages import listed
+from dh2sim.messages import counted, listed
 from dh2sim.robot.spec import ClosureType, RobotSpec
 from dh2sim.typing import Array, read_only
 
-_LONGEST: Final = 0.1
+LONGEST: Final = 0.1
 """rad, or mechanism sizes: of a step of any joint."""
 _SINGULAR: Final = 1e-5
 """Least singular value of the passive joints' Jacobian, lengths in mechanism sizes, of a regular position."""
@@ -76,7 +70,9 @@ def mechanism_configuration(robot: SpecLike, q: ArrayLike) -> Array:
         )
     if not np.isfinite(values).all():
         raise ConfigurationError(f"joint coordinates must be finite ({names}), got {values.tolist()}")
-    return read_only(_Motion(spec, tree, driven).follow(q0, values))
+    motion = Continuation(spec, tree, driven)
+    motion.check(q0)
+    return read_only(motion.follow(q0, values))
 
 
 def driven_motion(robot: SpecLike, q: ArrayLike, target: ArrayLike) -> Array:
@@ -97,43 +93,9 @@ def driven_motion(robot: SpecLike, q: ArrayLike, target: ArrayLike) -> Array:
     spec = spec_of(robot)
     tree, _ = assembly(spec)
     start = np.array(joint_values(tree, q))
-    motion = _Motion(spec, tree, sorted(actuated_joints(spec)))
+    motion = Continuation(spec, tree, sorted(actuated_joints(spec)))
+    motion.check(start)
     return read_only(motion.follow(start, np.asarray(target, dtype=np.float64)))
-
-
-class DrivenPath(NamedTuple):
-    """Where a mechanism goes as its driven joints go through targets."""
-
-    q: Array
-    """Joint vectors at which the loops are closed, rad and m, shape (N, n)."""
-    rates: Array
-    """Velocities of all joints for a unit velocity of each driven one, shape (N, n, k)."""
-    tool: Array
-    """Twist of tool0 for the same, shape (N, 6, k), as ``mechanism_jacobian``."""
-
-
-def driven_path(robot: SpecLike, q: ArrayLike, targets: ArrayLike) -> DrivenPath:
-    """Return where moving the driven joints straight from one target to the next leads.
-
-    Args:
-        robot: The robot.
-        q: Joint vector at which the loops are closed, rad and m, shape (n,).
-        targets: Coordinates of the driven joints in the order of ``actuated``, shape (N, k).
-
-    Raises:
-        SingularPositionError: On the way there is a dead or singular position; the text says where.
-        ConfigurationError: ``q`` has another shape or is not finite.
-    """
-    spec = spec_of(robot)
-    tree, _ = assembly(spec)
-    motion = _Motion(spec, tree, actuated_joints(spec))
-    place, found, rates, tool = np.array(joint_values(tree, q)), [], [], []
-    for target in np.asarray(targets, dtype=np.float64):
-        place = motion.follow(place, target)
-        found.append(place)
-        rates.append(motion.followed(place))
-        tool.append(_twists(tree, body_poses(tree, place), tree.frame("tool0")) @ rates[-1])
-    return DrivenPath(read_only(found), read_only(rates), read_only(tool))
 
 
 def named_configuration(robot: SpecLike, name: str) -> Array:
@@ -210,7 +172,7 @@ def mechanism_jacobian(robot: SpecLike, q: ArrayLike | str, frame: str = "tool0"
     vector = named_configuration(spec, q) if isinstance(q, str) else mechanism_configuration(spec, q)
     poses = body_poses(tree, vector)
     J = _twists(tree, poses, Frame(body, T_body_frame))
-    return read_only(J @ _Motion(spec, tree, sorted(actuated_joints(spec))).followed(vector))
+    return read_only(J @ Continuation(spec, tree, sorted(actuated_joints(spec))).followed(vector))
 
 
 def _refuse(options: Mapping[str, object]) -> None:
@@ -234,22 +196,27 @@ def _twists(tree: KinematicTree, poses: Sequence[Array], frame: Frame) -> Array:
     return J
 
 
-class _Motion:
+class Continuation:
     """A mechanism that its driven joints move."""
 
     def __init__(self, spec: RobotSpec, tree: KinematicTree, driven: Sequence[int]) -> None:
         self._spec, self._tree = spec, tree
         self._driven = list(driven)
         self._passive = [k for k in range(tree.n) if k not in driven]
-        self._size = mechanism_size(tree)
-        self._scale = np.array([1.0 if joint.type.turns else self._size for joint in tree.moving_joints])
-        lengths = np.array(closure_residual(tree, np.zeros(tree.n))[1])
-        self._weights = np.where(lengths, 1.0 / self._size, 1.0)
+        self._loops = LoopBatch(tree)
+        self._size, self._scale = self._loops.size, self._loops.scale
         self._determined = len(self._passive)
         """How many independent motions of the passive joints the loops determine."""
 
-    def follow(self, q: Array, target: Array) -> Array:
+    def follow(
+        self, q: Array, target: Array, passing: Callable[[float, Array], None] = lambda _share, _q: None
+    ) -> Array:
         """Return the configuration that moving the driven joints straight to a target leads to.
+
+        Args:
+            q: Where to begin; ``check`` has found nothing against it or where it was reached from.
+            target: Coordinates of the driven joints.
+            passing: Called with the share of the way that is done, and the configuration, after each step.
 
         Raises:
             SingularPositionError: There is none, or a singular position is on the way.
@@ -257,8 +224,7 @@ class _Motion:
         start = q[self._driven].copy()
         way = (target - start) / self._scale[self._driven]
         length = float(np.abs(way).max(initial=0.0))
-        self._check(q)
-        done, step = 0.0, min(1.0, _LONGEST / length) if length else 1.0
+        done, step = 0.0, min(1.0, LONGEST / length) if length else 1.0
         for _ in range(_MOST_STEPS):
             if done >= 1.0:
                 return q
@@ -266,17 +232,18 @@ class _Motion:
             if least < _SINGULAR:
                 raise self._stuck(start, target, done)
             fastest = max(length, float(np.abs(rates).max(initial=0.0)))
-            limit = _LONGEST * min(1.0, 4.0 * least) / fastest if fastest else 1.0
+            limit = LONGEST * min(1.0, 4.0 * least) / fastest if fastest else 1.0
             step = min(2.0 * step, limit, 1.0 - done)
             while (moved := self._moved(q, start, target, done + step, step * rates)) is None:
                 step /= 2.0
                 if step * length < 1e-9:
                     raise self._stuck(start, target, done)
             q, done = moved, 1.0 if step == 1.0 - done else done + step
+            passing(done, q)
         raise self._stuck(start, target, done)
 
     def _jacobian(self, q: Array) -> Array:
-        return np.asarray(self._weights[:, None] * constraint_jacobian(self._tree, q) * self._scale)
+        return np.asarray(self._loops.evaluate(q[None])[1][0])
 
     def _rates(self, q: Array, way: Array) -> tuple[Array, float]:
         """Return the passive joints' rates along a way of the driven ones, and the least singular value."""
@@ -293,9 +260,8 @@ class _Motion:
         new[self._passive] += guess * self._scale[self._passive]
         predicted = new[self._passive].copy()
         for _ in range(8):
-            residual = self._weights * closure_residual(self._tree, new)[0]
-            J = self._jacobian(new)[:, self._passive]
-            correction = np.linalg.lstsq(J, -residual, rcond=_RANK)[0]
+            residual, J = self._loops.evaluate(new[None])
+            correction = np.linalg.lstsq(J[0][:, self._passive], -residual[0], rcond=_RANK)[0]
             new[self._passive] += correction * self._scale[self._passive]
             if float(np.abs(correction).max(initial=0.0)) < 1e-14:
                 break
@@ -309,15 +275,29 @@ class _Motion:
         Raises:
             SingularPositionError: They are not determined.
         """
-        self._check(q, where="there")
-        J = self._jacobian(q)
-        rates = np.linalg.lstsq(J[:, self._passive], -J[:, self._driven], rcond=_RANK)[0]
+        self.check(q, where="there")
+        rates = self.passive_rates(self._jacobian(q)[None])[0]
         S = np.zeros((self._tree.n, len(self._driven)))
         S[self._driven, range(len(self._driven))] = 1.0
         S[self._passive] = self._scale[self._passive, None] * rates / self._scale[self._driven]
         return S
 
-    def _check(self, q: Array, where: str = "at the assembly") -> None:
+    def passive_rates(self, J: Array) -> Array:
+        """Return the least velocities of passive joints for a unit velocity of each driven one, in units of scale.
+
+        Args:
+            J: Jacobians of the loops' constraints, shape (N, c, n).
+
+        Returns:
+            Shape (N, passive, driven).
+        """
+        u, values, v = np.linalg.svd(J[:, :, self._passive], full_matrices=False)
+        kept = np.arange(values.shape[1]) < self._determined
+        gains = np.where(kept, 1.0 / np.maximum(values, 1e-300), 0.0)
+        moved = np.swapaxes(u, 1, 2) @ J[:, :, self._driven]
+        return np.asarray(-np.swapaxes(v, 1, 2) @ (gains[:, :, None] * moved))
+
+    def check(self, q: Array, where: str = "at the assembly") -> None:
         """Refuse driven joints that do not determine the others, or that the loops do not leave free.
 
         Raises:
@@ -329,14 +309,15 @@ class _Motion:
         names = listed(self._tree.moving_joints[k].name for k in self._driven)
         self._determined = passive
         if passive < len(self._passive) and not self._is_idle(q, J):
+            left = len(self._passive) - passive
             raise SingularPositionError(
-                f"{self._spec.name}: {names} driven, {free} freedoms {where}: "
-                f"{len(self._passive) - passive} of them stay open, so that the passive joints are not determined"
+                f"{self._spec.name}: {names} driven, {counted(free, 'freedom')} {where}: {left} of them "
+                f"stay{'s' if left == 1 else ''} open, so that the passive joints are not determined"
             )
         if free < len(self._driven):
             raise SingularPositionError(
-                f"{self._spec.name}: {names} driven, but the loops leave {free} freedoms: these joints cannot be "
-                "moved independently; give the coordinates of all joints"
+                f"{self._spec.name}: {names} driven, but the loops leave {counted(free, 'freedom')}: these joints "
+                "cannot be moved independently; give the coordinates of all joints"
             )
 
     def _is_idle(self, q: Array, J: Array) -> bool:

@@ -178,8 +178,9 @@ def _singular(mobility: Mobility) -> str:
     if not finite:
         return f"{start}, but none goes on: it is shaky."
     if len(walk.branches) > 1:
-        freedoms = " and ".join(str(dimension) for dimension in walk.branches)
-        return f"{start}; branches of motion with {freedoms} freedoms meet here (bifurcation)."
+        first, *others = walk.branches
+        freedoms = " and ".join([str(first), *(_count(each, "freedom") for each in others)])
+        return f"{start}; branches of motion with {freedoms} meet here (bifurcation)."
     if walk.tangents > finite:
         return f"{start}; {walk.tangents - finite} of them go nowhere wherever it moves: it is shaky throughout."
     if walk.spread > finite:

@@ -7,7 +7,7 @@ to add. Source of the continuation: E. Allgower, K. Georg, Numerical Continuatio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -30,6 +30,8 @@ _SHORTEST: Final = 1e-8
 _ODD_SHARE: Final = 0.7289
 _BEND: Final = 0.25
 """rad or sizes of the arm, by which a step's end may be off its tangent's."""
+_DEPENDENT: Final = 1e-7
+"""Share of the greatest singular value below which those of a singular configuration are rounding."""
 TAIL: Final = 2e-12
 """Size of the last terms of a series from which on it is accurate."""
 
@@ -64,15 +66,29 @@ class Task:
     dq: Array
     """What they change by along the path, shape (n,)."""
     rank: int
-    """Of the Jacobian away from singularities."""
+    """Of the Jacobian away from singularities, or all along a path in one."""
+    least: float = 1e-13
+    """Share of the greatest singular value below which the equations say nothing."""
     singular: tuple[bool, bool] = (False, False)
     """Whether the path starts, and ends, in a singularity."""
 
     @classmethod
     def of(
-        cls, chain: KinematicChain, path: ToolPath, q0: Array, q1: Array | None, *, size: float, free: Free | None
+        cls,
+        chain: KinematicChain,
+        path: ToolPath,
+        q0: Array,
+        q1: Array | None,
+        *,
+        size: float,
+        free: Free | None,
+        inside: bool = False,
     ) -> Task:
-        """Return the task of a path from ``q0``, to ``q1`` where that is given."""
+        """Return the task of a path from ``q0``, to ``q1`` where that is given.
+
+        With ``inside`` it is that of a path in a singularity all along, as it is at its start: what joints can do
+        there without moving the tool is to spare.
+        """
         units = np.where([joint.type.turns for joint in chain.moving_joints], 1.0, size)
         n = len(units)
         dq = np.zeros(n) if q1 is None else q1 - q0
@@ -82,13 +98,15 @@ class Task:
         _, jacobian = plain.equations(ends, np.linspace(0.0, 1.0, len(ends)))
         spread = np.stack([q0 + units * np.sin(1.7 * np.arange(1, n + 1) + k) for k in range(4)])
         _, general = plain.equations(spread, np.zeros(len(spread)))
-        values = np.linalg.svd(general, compute_uv=False)
-        rank = int((values > 1e-9 * values.max(initial=0.0)).sum(axis=1).max())
+        values = np.linalg.svd(jacobian[:1] if inside else general, compute_uv=False)
+        dependent = _DEPENDENT if inside else 1e-9
+        rank = int((values > dependent * values.max(initial=0.0)).sum(axis=1).max())
         spare = none
         if n > rank:  # the directions that move the tool least at both ends
             square = sum(J.T @ np.linalg.pinv(J @ J.T, rcond=1e-12) @ J for J in jacobian)
             spare = np.linalg.eigh(square)[1][:, : n - rank].T
-        return cls(chain=chain, path=path, free=free, units=units, size=size, spare=spare, q0=q0, dq=dq, rank=rank)
+        task = cls(chain=chain, path=path, free=free, units=units, size=size, spare=spare, q0=q0, dq=dq, rank=rank)
+        return replace(task, least=_DEPENDENT) if inside else task
 
     def along(self, u: Array) -> tuple[Array, Array]:
         """Return the path's own parameter, 0 to 1, and its derivative, shape (N,) each."""
@@ -101,6 +119,18 @@ class Task:
                 return u * (2.0 - u), 2.0 - 2.0 * u
             case _:
                 return u, np.ones(len(u))
+
+    def parameter(self, x: Array) -> Array:
+        """Return the parameter at which the path's own is x, shape (N,)."""
+        match self.singular:
+            case True, True:
+                return np.asarray(0.5 - np.sin(np.arcsin(np.clip(1.0 - 2.0 * x, -1.0, 1.0)) / 3.0))
+            case True, False:
+                return np.sqrt(x)
+            case False, True:
+                return 1.0 - np.sqrt(1.0 - x)
+            case _:
+                return x
 
     @property
     def fastest(self) -> float:
@@ -139,6 +169,14 @@ class Task:
 
     def tangent(self, q: Array, u: Array) -> tuple[Array, Array]:
         """Return the derivative of the joints along the path, shape (N, n), and the least singular value, (N,)."""
+        _, jacobian = self.equations(q, u)
+        steps = self._solve(jacobian, self._rates(q, u)) * self.units
+        own = jacobian[:, : jacobian.shape[1] - len(self.spare)]
+        values = np.linalg.svd(own, compute_uv=False)
+        return steps, np.asarray(values[:, min(self.rank, values.shape[1]) - 1])
+
+    def _rates(self, q: Array, u: Array) -> Array:
+        """Return what the equations require of the joints' rates, shape (N, m)."""
         x, rate = self.along(u)
         goal = self.path.poses(x)
         moved = self.path.velocities(goal) * rate[:, None]
@@ -152,11 +190,14 @@ class Task:
             )
         if len(self.spare):
             parts.append(np.broadcast_to(self.dq / self.units @ self.spare.T, (len(q), len(self.spare))))
-        _, jacobian = self.equations(q, u)
-        steps = _solve(jacobian, np.concatenate(parts, axis=1)) * self.units
-        own = jacobian[:, : jacobian.shape[1] - len(self.spare)]
-        values = np.linalg.svd(own, compute_uv=False)
-        return steps, np.asarray(values[:, min(self.rank, values.shape[1]) - 1])
+        return np.concatenate(parts, axis=1)
+
+    def unmoved(self) -> float:
+        """Return the share of the tool's motion at the start that is across all that joints can do there."""
+        q, u = self.q0[None], np.zeros(1)
+        rates, jacobian = self._rates(q, u), self.equations(q, u)[1]
+        left = rates - (jacobian @ self._solve(jacobian, rates)[:, :, None])[:, :, 0]
+        return float(np.linalg.norm(left) / max(float(np.linalg.norm(rates)), 1e-300))
 
     def polished(self, q: Array, u: Array) -> tuple[Array, Array]:
         """Return configurations moved onto the path by Newton's method, and what is left of each, shape (N,)."""
@@ -164,7 +205,7 @@ class Task:
         going = np.ones(len(q), dtype=np.bool_)
         for _ in range(12):
             left, jacobian = self.equations(q, u)
-            step = _solve(jacobian, left)
+            step = self._solve(jacobian, left)
             size = np.abs(step).max(axis=1, initial=0.0)
             going &= size <= 1.0  # not where it is lost
             q -= np.where(going[:, None], step * self.units, 0.0)
@@ -175,15 +216,14 @@ class Task:
         left, _ = self.equations(q, u)
         return q, np.abs(left).max(axis=1)
 
+    def _solve(self, jacobian: Array, right: Array) -> Array:
+        """Return the shortest least-squares solutions, shape (N, n)."""
+        return np.asarray((np.linalg.pinv(jacobian, rcond=self.least) @ right[:, :, None])[:, :, 0])
+
 
 def _crossed(across: Array, z: Array) -> Array:
     """Return rows r x ... : what an angular velocity w changes across · z by, for w x z, shape (N, 2, 3)."""
     return np.stack([np.cross(z, across[:, row]) for row in range(across.shape[1])], axis=1)
-
-
-def _solve(jacobian: Array, right: Array) -> Array:
-    """Return the shortest least-squares solutions, shape (N, n)."""
-    return np.asarray((np.linalg.pinv(jacobian, rcond=1e-13) @ right[:, :, None])[:, :, 0])
 
 
 def branch_through(task: Task, u: float, q: Array) -> ChebyshevCurve:

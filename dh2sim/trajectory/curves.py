@@ -135,6 +135,8 @@ _OPEN: Final = 50.0
 """Times as large terms are rounding where values at an end are extrapolated."""
 _SPLIT: Final = 0.4871
 """Where pieces are divided: an odd number, as singularities like to be halfway."""
+_ROUNDING: Final = 1e-14
+"""Of a value that does not change: what is left of it has derivatives of some size."""
 NODES: Final = read_only(-np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE))
 """Extreme points of Chebyshev's polynomial of that degree, from -1 to 1."""
 
@@ -260,4 +262,8 @@ def fit(
                 raise NotSmoothError(0.5 * (a + b))
     done.sort(key=lambda piece: piece[0])
     ends = np.array([*(a for a, _, _ in done), breaks[-1]])
-    return ChebyshevCurve.of(ends, np.stack([series for *_, series in done]))
+    series = np.stack([each for *_, each in done])
+    off = np.abs(series - np.eye(1, DEGREE + 1).T * series[0, 0]).max(axis=(0, 1))
+    rests = off <= _ROUNDING * np.maximum(units, np.abs(series[0, 0]))
+    series[:, :, rests] = np.where(np.arange(DEGREE + 1)[:, None] == 0, series[0, 0], 0.0)[:, rests]
+    return ChebyshevCurve.of(ends, series)

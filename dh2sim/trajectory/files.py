@@ -10,8 +10,9 @@ import os
 import zipfile
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Final, Self
+from typing import BinaryIO, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,7 @@ from dh2sim.errors import OutputError, SettingsError, TrajectoryError
 from dh2sim.files import atomic_file
 from dh2sim.input_files import read_input
 from dh2sim.messages import listed, shown
+from dh2sim.progress import Advance, Stage, silent
 from dh2sim.trajectory.curves import ORDERS, PiecewisePolynomial, cubic_spline, quintic_hermite
 from dh2sim.typing import Array, read_only
 
@@ -27,9 +29,11 @@ SUFFIXES: Final = (".csv", ".npz")
 MOST_BYTES: Final = 2**30
 """Largest file that is read."""
 _MOST_REPORTED: Final = 5
+_ROWS: Final = 8192
+"""Of a .csv that are written at a time."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class SampledTrajectory:
     """Joint positions at instants; between them, a smooth curve through them."""
 
@@ -49,8 +53,6 @@ class SampledTrajectory:
     """Which joints turn; None where that is not known."""
     robot: str = ""
     """Name of the robot; '' where it is not known."""
-    curve: PiecewisePolynomial
-    """Through the samples: of fifth degree where velocities and accelerations are known, else a cubic spline."""
     digest: str = ""
     """SHA-256 of the file that it was read from."""
 
@@ -69,26 +71,27 @@ class SampledTrajectory:
         digest: str = "",
     ) -> Self:
         """Make one of arrays as :class:`SampledTrajectory` describes them."""
-        t, positions = read_only(time), read_only(q)
         rates = [None if each is None else read_only(each) for each in (qd, qdd, qddd)]
-        if len(t) < 2:
-            curve = PiecewisePolynomial.of([0.0, 1.0], positions[None])
-        elif rates[0] is not None and rates[1] is not None:
-            curve = quintic_hermite(t, positions, rates[0], rates[1])
-        else:
-            curve = cubic_spline(t, positions)
         return cls(
             joints=tuple(joints),
-            time=t,
-            q=positions,
+            time=read_only(time),
+            q=read_only(q),
             qd=rates[0],
             qdd=rates[1],
             qddd=rates[2],
             turns=turns,
             robot=robot,
-            curve=curve,
             digest=digest,
         )
+
+    @cached_property
+    def curve(self) -> PiecewisePolynomial:
+        """Through the samples: of fifth degree where velocities and accelerations are known, else a cubic spline."""
+        if len(self.time) < 2:
+            return PiecewisePolynomial.of([0.0, 1.0], self.q[None])
+        if self.qd is not None and self.qdd is not None:
+            return quintic_hermite(self.time, self.q, self.qd, self.qdd)
+        return cubic_spline(self.time, self.q)
 
     @property
     def duration(self) -> float:
@@ -140,28 +143,42 @@ class SampledTrajectory:
             digest=self.digest,
         )
 
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False, stage: Stage = silent) -> None:
         """Write a .csv or .npz file, whole or not at all.
 
+        Args:
+            path: The file.
+            overwrite: Whether to replace a file.
+            stage: Shows the progress of what takes long.
+
         Raises:
-            OutputError: There is a file already, or it cannot be written.
+            OutputError: There is a file already, it cannot be written, or it would be too large to be read.
             SettingsError: The file has another ending.
         """
         file = Path(path)
         require_suffix(file)
         if file.exists() and not overwrite:
             raise OutputError(f"'{file}' exists already; choose another name, or pass overwrite=True")
-        content = self._csv() if file.suffix.lower() == ".csv" else self._npz()
-        with atomic_file(file) as draft:
-            draft.write_bytes(content)
+        with atomic_file(file) as draft, draft.open("wb") as stream:
+            if file.suffix.lower() == ".csv":
+                with stage("writing", "samples", len(self.time)) as advance:
+                    self._write_csv(stream, advance)
+            else:
+                self._write_npz(stream)
+            if stream.tell() > MOST_BYTES:
+                raise _too_large()
 
-    def _csv(self) -> bytes:
-        lines = [",".join(["time", *self.joints])]
-        for time, row in zip(self.time.tolist(), self.q.tolist(), strict=True):
-            lines.append(",".join(map(repr, [time, *row])))
-        return ("\n".join(lines) + "\n").encode()
+    def _write_csv(self, stream: BinaryIO, advance: Advance) -> None:
+        stream.write((",".join(["time", *self.joints]) + "\n").encode())
+        for start in range(0, len(self.time), _ROWS):
+            part = slice(start, start + _ROWS)
+            rows = zip(self.time[part].tolist(), self.q[part].tolist(), strict=True)
+            stream.write("".join(",".join(map(repr, [time, *row])) + "\n" for time, row in rows).encode())
+            if start == 0 and stream.tell() / _ROWS * len(self.time) > 1.1 * MOST_BYTES:
+                raise _too_large()
+            advance(len(self.time[part]))
 
-    def _npz(self) -> bytes:
+    def _write_npz(self, stream: BinaryIO) -> None:
         arrays: dict[str, object] = {"time": self.time, "q": self.q}
         rates = {"qd": self.qd, "qdd": self.qdd, "qddd": self.qddd}
         arrays |= {name: values for name, values in rates.items() if values is not None}
@@ -169,9 +186,11 @@ class SampledTrajectory:
         if self.turns is not None:
             arrays["units"] = np.array(["rad" if turns else "m" for turns in self.turns], dtype=np.str_)
         arrays["robot"] = np.array(self.robot, dtype=np.str_)
-        stream = io.BytesIO()
         np.savez(stream, **arrays)  # type: ignore[arg-type]
-        return stream.getvalue()
+
+
+def _too_large() -> OutputError:
+    return OutputError(f"the file would be larger than {MOST_BYTES // 2**20} MB: take fewer samples")
 
 
 def require_suffix(path: Path) -> None:

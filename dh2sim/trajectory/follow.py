@@ -28,6 +28,8 @@ _CLOSE: Final = 20.0 * NEAR_SINGULAR
 """The same, below which it passes one closely."""
 _AT_END: Final = 1e-3
 """Share of the path from an end within which it starts or ends in a singularity."""
+_SIDEWAYS: Final = 1e-6
+"""Share of the tool's motion that joints do not make, above which they cannot make it."""
 _MOST_BRANCHES: Final = 16
 _SAME: Final = 1e-7
 """rad or sizes of the arm, up to which configurations are the same."""
@@ -36,10 +38,10 @@ _SAME: Final = 1e-7
 class CannotFollowError(TrajectoryError):
     """The joints cannot follow the tool's path beyond a place; ``constrained`` if for want of joints."""
 
-    def __init__(self, text: str, *, constrained: bool = False) -> None:
-        """Keep whether fewer demands on the orientation would help."""
+    def __init__(self, text: str, *, constrained: bool = False, explained: bool = False) -> None:
+        """Keep whether fewer demands on the orientation would help, and whether the text says what to do instead."""
         super().__init__(text)
-        self.constrained = constrained
+        self.constrained, self.explained = constrained, explained
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,9 +55,11 @@ class Followed:
     near: str
     """Where it passes a singularity closely, at the tool's even pace; '' where it does not."""
     singular: tuple[bool, bool]
-    """Whether it starts, and ends, in a singularity."""
+    """Whether it starts, and ends, in a singularity that it has to be slow near."""
     rate: float
     """Greatest derivative of the path's parameter with respect to that of the curve."""
+    inside: bool = False
+    """Whether it is in a singularity all along."""
 
 
 def follow(
@@ -92,7 +96,14 @@ def follow(
         CannotFollowError: The path leaves the reach, or joints would jump.
         TrajectoryError: It crosses a singularity, or arrives in another configuration; the text says where.
     """
-    task, curve = _branch(spec, Task.of(chain, path, q0, q1, size=size, free=free), q1, solutions)
+    task, within = Task.of(chain, path, q0, q1, size=size, free=free), False
+    try:
+        task, curve = _branch(spec, task, q1, solutions)
+    except CannotFollowError as error:
+        inside = Task.of(chain, path, q0, q1, size=size, free=free, inside=True)
+        if inside.rank >= task.rank:
+            raise
+        task, curve, within = inside, _branch_inside(inside, error), True
     place, sigma = _least_sigma(task, curve)
     if sigma < NEAR_SINGULAR and not through:
         names = _moved_by(task, curve.derivatives(np.array([place]))[0, 0])
@@ -106,9 +117,12 @@ def follow(
         _require_same_end(spec, task, end, q1)
     if not through:
         near = task.place(place) if sigma < _CLOSE else ""
-        return Followed(curve=curve, end=end, near=near, singular=task.singular, rate=task.fastest)
+        if (even := _even(task, curve)) is not None:
+            return Followed(curve=even, end=end, near=near, singular=(False, False), rate=1.0)
+        return Followed(curve=curve, end=end, near=near, singular=task.singular, rate=task.fastest, inside=within)
     slowed, rate = _slowed(task, curve, limits.velocity)
-    return Followed(curve=slowed, end=end, near="", singular=task.singular, rate=rate * task.fastest)
+    rate *= task.fastest
+    return Followed(curve=slowed, end=end, near="", singular=task.singular, rate=rate, inside=within)
 
 
 def _branch(
@@ -142,6 +156,27 @@ def _branch(
             return task, curve
         even = task, curve
     raise AssertionError("unreachable")
+
+
+def _branch_inside(task: Task, otherwise: CannotFollowError) -> ChebyshevCurve:
+    """Return the joints along a path that is in a singularity all along.
+
+    Raises:
+        CannotFollowError: There is no such path; ``otherwise`` where nothing better can be said.
+    """
+    try:
+        return branch_through(task, 0.0, task.q0)
+    except StuckError:
+        pass
+    if not otherwise.explained and (off := task.unmoved()) > _SIDEWAYS:
+        how = "no joint moves the tool along it" if off > 0.999 else "the joints cannot move the tool along it"
+        names = _moved_by(replace(task, rank=task.rank + 1), task.q0)
+        raise CannotFollowError(
+            f"the {task.path.kind} starts in a singularity, {task.place(0.0)}, where {how}, while {names} without "
+            "moving it; move with kind 'joint'",
+            constrained=otherwise.constrained,
+        )
+    raise otherwise
 
 
 def _branch_from_singularity(
@@ -186,8 +221,25 @@ def _branch_from_singularity(
     ]
     raise CannotFollowError(
         f"the {task.path.kind} starts in a singularity, {task.place(0.0)}, which it can leave only with "
-        f"{listed(values)}: move there first"
+        f"{listed(values)}: move there first",
+        explained=True,
     )
+
+
+def _even(task: Task, curve: ChebyshevCurve) -> ChebyshevCurve | None:
+    """Return the joints over the path's own parameter; None where they go into a singularity as a square root."""
+    if not any(task.singular):
+        return None
+
+    def joints(x: Array) -> tuple[Array, NDArray[np.bool_]]:
+        u = task.parameter(x)
+        q, left = task.polished(curve.derivatives(u)[0], u)
+        return q, left <= REACHED
+
+    try:
+        return fit(joints, np.linspace(0.0, 1.0, 4), task.units, TAIL, task.singular)
+    except NotSmoothError:
+        return None
 
 
 def _apart(task: Task, q: Array, other: Array) -> float:
@@ -202,7 +254,8 @@ def _stopped(spec: RobotSpec, task: Task, error: StuckError) -> CannotFollowErro
     few = task.rank < 6 and task.free != "rotation"
     if short is not None:
         constrained = few or u <= 1e-6
-        return CannotFollowError(f"the path is not reached beyond {where}: {short.reason}", constrained=constrained)
+        text = f"the path is not reached beyond {where}: {short.reason}"
+        return CannotFollowError(text, constrained=constrained, explained=True)
     names = _moved_by(task, q)
     still = f"{names} there without moving the tool"
     if u < _AT_END or u > 1.0 - _AT_END:

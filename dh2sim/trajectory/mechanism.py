@@ -6,6 +6,7 @@ so that dead positions, and limits of passive joints, are found on the way and n
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -16,12 +17,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import SettingsError, SingularPositionError, TrajectoryError
-from dh2sim.kinematics.loop_motion import DrivenPath, actuated_joints, driven_path, mechanism_configuration
+from dh2sim.kinematics.driven_branch import DrivenBranch, DrivenPath
+from dh2sim.kinematics.loop_batch import LoopBatch
+from dh2sim.kinematics.loop_motion import LONGEST, actuated_joints, mechanism_configuration
 from dh2sim.messages import listed
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.progress import Stage, silent
 from dh2sim.trajectory.files import SampledTrajectory
 from dh2sim.trajectory.limits import INSIDE
+from dh2sim.trajectory.motion import peaks_of
 from dh2sim.trajectory.plan import TrajectoryKeywords, plan_trajectory
 from dh2sim.trajectory.profiles import Profile
 from dh2sim.trajectory.trajectory import Trajectory
@@ -31,7 +36,8 @@ from dh2sim.typing import Array, read_only
 RATE: Final = 100.0
 """Hz, of samples: closing loops takes longer than evaluating polynomials."""
 _KNOTS: Final = 40
-"""Places in each motion at which the loops are closed to see whether it is possible."""
+"""Least number of places in each motion at which passive joints are looked at."""
+_MOST_KNOTS: Final = 2_000_000
 _FINER: Final = 16
 """Parts that the times beside a greatest value are divided into, twice: it is then missed by some 1e-7 of it."""
 _RIVAL: Final = 0.02
@@ -40,7 +46,7 @@ _BRANCH: Final = 1e-6
 """rad or m: configurations nearer to each other are the same."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class MechanismTrajectory(Trajectory):
     """Positions of the driven joints over time within limits; ``sample`` has those of the passive ones, too."""
 
@@ -50,32 +56,68 @@ class MechanismTrajectory(Trajectory):
 
     @cached_property
     def knots(self) -> tuple[Array, DrivenPath]:
-        """Times, s, that show the motion, and the mechanism at them.
+        """Times, s, that show the motion, and the mechanism at them."""
+        times = self._times
+        path = self._followed(times)
+        for _ in range(2):
+            finer = np.setdiff1d(self._beside_peaks(times, path), times)
+            if len(finer):
+                found = self._followed(finer)
+                times = np.concatenate([times, finer])
+                order = np.argsort(times)
+                times = times[order]
+                path = DrivenPath(*(np.concatenate(parts)[order] for parts in zip(path, found, strict=True)))
+        return read_only(times), path
+
+    @cached_property
+    def _times(self) -> Array:
+        """Times, s, between which no driven joint moves by more than a step of continuation.
+
+        Raises:
+            TrajectoryError: There would be too many.
+        """
+        driven = list(actuated_joints(self.mechanism.spec))
+        scale = LoopBatch(self.mechanism.tree).scale[driven]
+        lengths = [motion.duration * float((peaks_of(motion).rates[0] / scale).max()) for motion in self.motions]
+        counts = [max(_KNOTS, math.ceil(length / LONGEST)) for length in lengths]
+        if sum(counts) > _MOST_KNOTS:
+            raise TrajectoryError(
+                f"the driven joints go too far: the loops would be closed at {sum(counts):,} places on the way, and "
+                f"at most {_MOST_KNOTS:,} can be"
+            )
+        inner = [
+            start + motion.duration * np.linspace(0.0, 1.0, count + 1)
+            for start, motion, count in zip(self.starts, self.motions, counts, strict=False)
+        ]
+        return np.unique(np.concatenate([*inner, [passage.time for passage in self.waypoints]]))
+
+    @cached_property
+    def _branch(self) -> DrivenBranch:
+        """The branch of motion that the mechanism is on.
 
         Raises:
             TrajectoryError: The driven joints come to a dead or singular position.
         """
-        inner = [
-            start + motion.duration * np.linspace(0.0, 1.0, _KNOTS + 1)
-            for start, motion in zip(self.starts, self.motions, strict=False)
-        ]
-        times = np.unique(np.concatenate([*inner, [passage.time for passage in self.waypoints]]))
-        path = self._followed(self.start, times)
-        for _ in range(2):
-            finer = self._beside_peaks(times, path)
-            if len(finer):
-                times = np.unique(np.concatenate([times, finer]))
-                path = self._followed(self.start, times)
-        return read_only(times), path
+        times = self._times
+        with self.stage("following loops", "steps", len(times)) as advance:
+            try:
+                return DrivenBranch(self.mechanism.spec, self.start, times, self.at(times)[0], advance)
+            except SingularPositionError as error:
+                raise TrajectoryError(str(error)) from None
+
+    def _followed(self, times: Array) -> DrivenPath:
+        with self.stage("closing loops", "configurations", len(times)) as advance:
+            try:
+                return self._branch.at(times, self.at(times)[0], advance)
+            except SingularPositionError as error:
+                raise TrajectoryError(str(error)) from None
 
     def _beside_peaks(self, times: Array, path: DrivenPath) -> Array:
-        """Return times, s, beside those at which passive joints come nearest to limits that their file gives."""
+        """Return times, s, beside those at which passive joints are farthest or fastest."""
         qd = np.abs(path.rates @ self.at(times)[1][:, :, None])[:, :, 0]
         finer = [np.zeros(0)]
         for k, joint in enumerate(self.mechanism.moving_joints):
-            limited = [] if joint.limits.position is None else [path.q[:, k], -path.q[:, k]]
-            limited += [] if "velocity" in joint.assumed else [qd[:, k]]
-            for values in [] if joint.name in self.joints else limited:
+            for values in [] if joint.name in self.joints else [path.q[:, k], -path.q[:, k], qd[:, k]]:
                 beside = np.concatenate([[-np.inf], values, [-np.inf]])
                 same = 1e-9 * np.abs(values).max()  # of what does not change, one place is enough
                 peaks = (values > beside[:-2] + same) & (values >= beside[2:] - same)
@@ -83,12 +125,6 @@ class MechanismTrajectory(Trajectory):
                     for low, up in zip(times[max(at - 1, 0) : at + 1], times[max(at, 1) : at + 2], strict=False):
                         finer.append(np.linspace(low, up, _FINER + 1))
         return np.concatenate(finer)
-
-    def _followed(self, q: Array, times: Array) -> DrivenPath:
-        try:
-            return driven_path(self.mechanism.spec, q, self.at(times)[0])
-        except SingularPositionError as error:
-            raise TrajectoryError(str(error)) from None
 
     def all_joints(self, t: ArrayLike) -> tuple[Array, Array]:
         """Return positions and velocities of all joints at times, with the loops closed.
@@ -100,17 +136,8 @@ class MechanismTrajectory(Trajectory):
             Shapes (N, n), in the order of the mechanism's joint vector.
         """
         times = np.clip(np.asarray(t, dtype=np.float64), 0.0, self.duration)
-        knots, path = self.knots
-        before = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, None)
-        q, qd, _, _ = self.at(times)
-        found, rates = np.empty((len(times), len(self.start))), np.empty((len(times), len(self.start)))
-        for k in np.unique(before).tolist():
-            here = np.flatnonzero(before == k)
-            order = here[np.argsort(times[here])]
-            followed = driven_path(self.mechanism.spec, path.q[k], q[order])
-            found[order] = followed.q
-            rates[order] = (followed.rates @ qd[order][:, :, None])[:, :, 0]
-        return found, rates
+        path = self._followed(times)
+        return path.q, (path.rates @ self.at(times)[1][:, :, None])[:, :, 0]
 
     def sample(self, rate: float | None = None, samples: int | None = None) -> SampledTrajectory:
         """Return all joints at evenly spaced times, the last of which is the end.
@@ -148,11 +175,9 @@ class MechanismTrajectory(Trajectory):
 
     def tool_path(self, count: int = 200) -> Array:
         """Return positions of tool0 in base_link at even times, m, shape (count, 3)."""
-        from dh2sim.kinematics.tree import body_poses, placed
-
-        tree = self.mechanism.tree
         q, _ = self.all_joints(np.linspace(0.0, self.duration, count))
-        return np.array([placed(body_poses(tree, each), tree.frame("tool0"))[:3, 3] for each in q])
+        loops, tool = LoopBatch(self.mechanism.tree), self.mechanism.tree.frame("tool0")
+        return np.array(loops.placed(loops.poses(q), tool, count)[:, :3, 3])
 
     @cached_property
     def passive(self) -> dict[str, tuple[float, float, float]]:
@@ -176,7 +201,7 @@ class MechanismTrajectory(Trajectory):
 
 
 def plan_mechanism_trajectory(
-    model: MechanismModel, waypoints: Iterable[Any], **options: Unpack[TrajectoryKeywords]
+    model: MechanismModel, waypoints: Iterable[Any], *, stage: Stage = silent, **options: Unpack[TrajectoryKeywords]
 ) -> MechanismTrajectory:
     """Return the trajectory of a mechanism through waypoints, from rest to rest.
 
@@ -185,6 +210,7 @@ def plan_mechanism_trajectory(
         waypoints: As for :func:`plan_trajectory`: names of configurations, or coordinates of the driven joints in the
             order of ``actuated``. The mechanism starts at the first, on the branch of motion of its assembly or of
             the configuration that is named.
+        stage: Shows the progress of what takes long.
         **options: As for :func:`plan_trajectory`: ``profile`` ('quintic', 'trapezoid' or 'jerk'), ``duration``, and
             ``limits`` of the driven joints. Where a passive joint would exceed the limit that its file gives, all
             is slowed down, or refused if it leaves its range.
@@ -205,7 +231,7 @@ def plan_mechanism_trajectory(
                 f"{listed(joint.name for joint in stand_in.moving_joints)}, or the name of a configuration"
             )
     start = _start(model, points[0]) if points else model.q
-    planned = _planned(model, stand_in, start, points, options)
+    planned = _planned(model, stand_in, start, points, stage, options)
     excess = _excess(planned)
     if excess > 1.0:
         if options.get("duration") is not None:
@@ -214,7 +240,7 @@ def plan_mechanism_trajectory(
                 "limit"
             )
         slower: TrajectoryKeywords = {**options, "duration": planned.duration * excess}
-        planned = _planned(model, stand_in, start, points, slower)
+        planned = _planned(model, stand_in, start, points, stage, slower)
         if (left := _excess(planned)) > 1.0 / INSIDE:
             raise TrajectoryError(f"a passive joint would need {left:.3g} times its velocity limit")
     _check_ranges(planned)
@@ -284,9 +310,10 @@ def _planned(
     stand_in: RobotModel,
     start: Array,
     points: tuple[Waypoint, ...],
+    stage: Stage,
     options: TrajectoryKeywords,
 ) -> MechanismTrajectory:
-    plan = plan_trajectory(stand_in, points, **options)
+    plan = plan_trajectory(stand_in, points, stage=stage, **options)
     given = {each.name: getattr(plan, each.name) for each in fields(Trajectory)}
     return MechanismTrajectory(**given, mechanism=model, start=start)
 

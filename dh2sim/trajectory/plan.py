@@ -17,6 +17,7 @@ from dh2sim.inverse.reach import amount_text
 from dh2sim.kinematics.forward import forward_kinematics
 from dh2sim.messages import did_you_mean, listed
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.progress import Advance, Stage, silent
 from dh2sim.trajectory.curves import Curve, PiecewisePolynomial, cubic_spline, straight
 from dh2sim.trajectory.follow import CannotFollowError, follow
 from dh2sim.trajectory.limits import INSIDE, LimitValue, MotionLimits, requested_limits, robot_limits
@@ -52,7 +53,9 @@ class TrajectoryKeywords(TypedDict, total=False):
     free: Free | None
 
 
-def plan_trajectory(model: RobotModel, waypoints: Iterable[Any], **options: Unpack[TrajectoryKeywords]) -> Trajectory:
+def plan_trajectory(
+    model: RobotModel, waypoints: Iterable[Any], *, stage: Stage = silent, **options: Unpack[TrajectoryKeywords]
+) -> Trajectory:
     """Return the trajectory through waypoints, from rest to rest.
 
     Every motion starts and stops at rest, but those to a waypoint with ``stop: False``: these pass it, at its exact
@@ -64,6 +67,7 @@ def plan_trajectory(model: RobotModel, waypoints: Iterable[Any], **options: Unpa
         waypoints: At least two, the first of which is where the motion starts: names of configurations, joint
             vectors (n,), poses of tool0 in base_link (4, 4), or mappings with the keys of a waypoint file, in rad
             and m.
+        stage: Shows the progress of what takes long.
         **options: ``kind``: 'joint' (default), 'line' or 'arc', of motions whose waypoints do not say; with 'arc',
             every second waypoint is the point that an arc goes through, unless one has ``via`` or ``centre``.
             ``profile``: 'quintic' (default), 'trapezoid', 'jerk' or 'optimal', which keeps limits of torque.
@@ -90,7 +94,7 @@ def plan_trajectory(model: RobotModel, waypoints: Iterable[Any], **options: Unpa
         )
     if chosen.profile is Profile.OPTIMAL and "acceleration" in limits.assumed:
         limits = replace(limits, acceleration=read_only(np.full(len(limits.joints), np.inf)))
-    return _Planner(model, limits, chosen).plan(points)
+    return _Planner(model, limits, chosen, stage).plan(points)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,8 +177,8 @@ class _Move:
 class _Planner:
     """Plans motion by motion, each from where the last one ends."""
 
-    def __init__(self, model: RobotModel, limits: MotionLimits, options: _Options) -> None:
-        self._model, self._limits, self._options = model, limits, options
+    def __init__(self, model: RobotModel, limits: MotionLimits, options: _Options, stage: Stage) -> None:
+        self._model, self._limits, self._options, self._stage = model, limits, options, stage
         self._notes: dict[str, None] = {}
         self._solver: InverseSolver | None = None
         self._moves: list[_Move] = []
@@ -187,13 +191,20 @@ class _Planner:
             q = start = self._start(first)
         if first.wait:
             self._append(_Move(motion=_rest(q, first.wait), fixed=True))
+        with self._stage("planning", "waypoints", len(points)) as advance:
+            self._move_through(others, q, advance)
+        return self._trajectory(first, start)
+
+    def _move_through(self, points: Sequence[Waypoint], q: Array, advance: Advance) -> None:
+        """Plan the motions to waypoints, the first of which has number 2."""
         group: list[tuple[Waypoint, Array]] = []
-        for number, point in enumerate(others, start=2):
+        for number, point in enumerate(points, start=2):
+            advance(1)
             with _at_waypoint(number, point):
                 kind = self._kind(point)
                 if kind is MoveKind.JOINT:
                     group.append((point, self._goal(point, group[-1][1] if group else q)))
-                    if not point.stop and number < len(points):
+                    if not point.stop and number <= len(points):
                         continue
                     self._append(self._joint_move(q, group) if len(group) == 1 else self._passing_move(q, group))
                     q, group = group[-1][1], []
@@ -207,7 +218,6 @@ class _Planner:
                     self._append(_Move(motion=motion, fixed=fixed, passed=((point, q, kind, 1.0),)))
                 if point.wait:
                     self._append(_Move(motion=_rest(q, point.wait), fixed=True))
-        return self._trajectory(first, start)
 
     def _append(self, move: _Move) -> None:
         self._moves.append(move)
@@ -360,6 +370,9 @@ class _Planner:
                 [word for word, yes in zip(("starts", "ends"), followed.singular, strict=True) if yes], " and "
             )
             self._notes[f"The {kind} {where} in a singularity: the tool is slow near it."] = None
+        if followed.inside:
+            note = f"The {kind} is in a singularity all along: of the motions that follow it the least is taken."
+            self._notes[note] = None
         if followed.near:
             note = (
                 f"A singularity is passed closely at {followed.near}, and the whole {kind} is as slow as that takes"
@@ -443,6 +456,7 @@ class _Planner:
             profile=self._options.profile,
             limits=self._limits,
             notes=tuple(self._notes),
+            stage=self._stage,
         )
 
 

@@ -157,14 +157,26 @@ def _parameterized(
     solver = toppra.algorithm.TOPPRA(constraints, Path(), gridpoints=grid, solver_wrapper="seidel")
     _, speed, _ = solver.compute_parameterization(0.0, 0.0)
     if speed is None or not np.isfinite(speed).all():
-        raise TrajectoryError("no motion along the path keeps the limits of torque")
+        raise _none_found(path)
     found = np.maximum(np.asarray(speed, dtype=np.float64), 0.0)
     for limit, moved in zip((limits.tool_speed, limits.tool_turn), tool, strict=True):
         if moved > 0.0 and math.isfinite(limit):
             found = np.minimum(found, limit * INSIDE / moved)
     if (found[:-1] + found[1:]).min() <= 0.0:
-        raise TrajectoryError("no motion along the path keeps the limits of torque")
+        raise _none_found(path)
     return found
+
+
+def _none_found(path: Curve) -> TrajectoryError:
+    """Return the error of a path without a motion: at a place where no joint moves torques tell nothing about it."""
+    rates = np.linalg.norm(path.derivatives(np.linspace(path.breaks[0], path.breaks[-1], 1001))[1], axis=1)
+    still = np.flatnonzero(rates <= 1e-6 * rates.max())
+    if not still.size:
+        return TrajectoryError("no motion along the path keeps the limits of torque")
+    return TrajectoryError(
+        f"at {still[0] / 10:.0f} % of the path, in a singularity, joints turn round and limits of torque do not tell "
+        "how fast the motion may be; take another profile"
+    )
 
 
 def torque_peaks(model: RobotModel, motions: Sequence[Motion]) -> Array:

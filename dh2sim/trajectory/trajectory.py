@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from dh2sim.errors import SettingsError
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.progress import Stage, silent
 from dh2sim.trajectory.curves import ORDERS
 from dh2sim.trajectory.limits import QUANTITIES, MotionLimits
 from dh2sim.trajectory.motion import Motion, Peaks, peaks_of, tool_rates
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 MOST_SAMPLES: Final = 10_000_000
 DEFAULT_RATE: Final = 1000.0
 """Hz."""
+_BLOCK: Final = 65536
+"""Times that are computed together."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,6 +57,8 @@ class Trajectory:
     limits: MotionLimits = field(repr=False)
     notes: tuple[str, ...] = ()
     """What was chosen, one sentence each."""
+    stage: Stage = field(default=silent, repr=False)
+    """Shows the progress of what takes long."""
 
     @cached_property
     def starts(self) -> Array:
@@ -84,12 +89,15 @@ class Trajectory:
         times = np.clip(given.ravel(), 0.0, self.duration)
         found = np.zeros((ORDERS, len(times), len(self.joints)))
         which = np.clip(np.searchsorted(self.starts, times, side="right") - 1, 0, max(len(self.motions) - 1, 0))
-        for number, motion in enumerate(self.motions):
-            here = which == number
-            if here.any():
-                found[:, here] = motion.at(times[here] - self.starts[number])
-        for waypoint in self.waypoints:
-            found[0, times == waypoint.time] = waypoint.q
+        order = np.argsort(which, kind="stable")
+        ends = np.searchsorted(which[order], np.arange(len(self.motions) + 1))
+        for number in np.unique(which).tolist() if self.motions else []:
+            mine = order[ends[number] : ends[number + 1]]
+            for here in (mine[k : k + _BLOCK] for k in range(0, len(mine), _BLOCK)):
+                found[:, here] = self.motions[number].at(times[here] - self.starts[number])
+        passed = {waypoint.time: waypoint.q for waypoint in self.waypoints}
+        for k in np.flatnonzero(np.isin(times, list(passed))).tolist():
+            found[0, k] = passed[float(times[k])]
         outside = (given.ravel() < 0.0) | (given.ravel() > self.duration)
         found[1:, outside] = 0.0
         q, qd, qdd, qddd = found.reshape(ORDERS, *given.shape, len(self.joints))
@@ -213,7 +221,7 @@ class Trajectory:
             OutputError: There is a file already, or it cannot be written.
             SettingsError: The file has another ending.
         """
-        self.sample(rate, samples).save(path, overwrite=overwrite)
+        self.sample(rate, samples).save(path, overwrite=overwrite, stage=self.stage)
 
     def to_json(self) -> dict[str, Any]:
         """Return what is to be said of the trajectory as JSON values, in s, rad and m."""

@@ -32,7 +32,7 @@ from dh2sim.robot.fields import (
 from dh2sim.robot.parts import Internal, Part, Parts, plain
 from dh2sim.robot.read import read_tree
 from dh2sim.robot.schema import NUMBER, schema_of
-from dh2sim.robot.spec import LENGTHS, RobotSpec, Row, Units
+from dh2sim.robot.spec import LENGTHS, AngleUnit, LengthUnit, RobotSpec, Row, Units
 from dh2sim.robot.yaml_tree import read_yaml_file
 from dh2sim.trajectory.limits import GIVEN, QUANTITIES, LimitValue
 from dh2sim.trajectory.profiles import Profile
@@ -182,13 +182,25 @@ class Waypoint:
 _WAYPOINT: Final = Part("", Waypoint, list_is="q", number_is="q")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WaypointUnits(Units):
+    """Units of the angles and lengths in this file."""
+
+    angle: Annotated[
+        AngleUnit, Choice("Unit of angles; default that of the robot file.", AngleUnit, inherited=True)
+    ] = AngleUnit.RAD
+    length: Annotated[
+        LengthUnit, Choice("Unit of lengths; default that of the robot file.", LengthUnit, inherited=True)
+    ] = LengthUnit.M
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WaypointFile:
     """A trajectory as a file requests it, in SI units."""
 
     robot: Annotated[str, Text("Name of the robot that it is for.")] = ""
-    units: Annotated[Units, Part("Units of this file; default those of the robot file.", Units)] = field(
-        default_factory=Units
+    units: Annotated[Units, Part("Units of this file; default those of the robot file.", WaypointUnits)] = field(
+        default_factory=WaypointUnits
     )
     parameters: Annotated[Mapping[str, float], Parameters("Named constants for expressions.")] = field(
         default_factory=lambda: MappingProxyType({})

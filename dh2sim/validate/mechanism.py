@@ -22,6 +22,7 @@ from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.kinematics.table_oracle import table_mechanism_frames
 from dh2sim.kinematics.transforms import pose_errors
 from dh2sim.kinematics.tree import tree_frames
+from dh2sim.messages import counted
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.typing import Array
 from dh2sim.validate.report import Check, Quantity, RobotReport, Worst, unread_check
@@ -153,7 +154,7 @@ def _loops(read: MujocoMechanism, model: MechanismModel, tolerance: float) -> li
     own = model.tree.n - int(np.linalg.matrix_rank(constraint_jacobian(model.tree, model.q), tol=1e-8))
     allowed = tolerance * max(1.0, model.size)
     moving = read.gap_in_motion() / model.size
-    rank = f"MuJoCo's constraints leave {freedoms} freedoms at home, ours {own}"
+    rank = f"MuJoCo's constraints leave {counted(freedoms, 'freedom')} at home, ours {own}"
     return [
         _finding(Quantity.CLOSED, gap, allowed, ""),
         _finding(Quantity.FREEDOMS, float(abs(freedoms - own)), 0.0, rank),

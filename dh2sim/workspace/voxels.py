@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Final, TypeAlias, TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from dh2sim.errors import SettingsError
 from dh2sim.kinematics.forward import geometric_jacobian
 from dh2sim.kinematics.sampling import random_configurations, scattered_configurations
+from dh2sim.progress import Advance
 from dh2sim.typing import Array, read_only
 from dh2sim.workspace.point import Coordinates, Flags, InBasis, PointMap, motion_rank
 from dh2sim.workspace.reaching import reach
@@ -25,7 +26,6 @@ BATCH: Final = 4096
 _STEPS: Final = 8
 """Of a search from a voxel to the next."""
 
-Advance: TypeAlias = Callable[[int], None]
 In = TypeVar("In")
 Out = TypeVar("Out")
 

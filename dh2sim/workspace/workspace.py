@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final, TypeAlias, TypedDict
+from typing import Final, TypedDict
 
 import numpy as np
 
@@ -16,12 +15,13 @@ from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.progress import Stage, silent
 from dh2sim.typing import Array, read_only
 from dh2sim.workspace.dexterity import Dexterity, Turn, dexterity_at
 from dh2sim.workspace.extremes import Extreme, distance_from, extreme_of, greatest, height_along, least
 from dh2sim.workspace.point import InBasis, PointMap, motion_rank
 from dh2sim.workspace.section import Section, around_first_axis, planar_section, turned_section
-from dh2sim.workspace.voxels import Advance, Measure, draw_voxels, grid_around, grow_voxels, spanned
+from dh2sim.workspace.voxels import Measure, draw_voxels, grid_around, grow_voxels, spanned
 
 USUAL: Final = 100_000
 """Voxels of the box around the workspace, at most, where no size is given: configurations fill most of them."""
@@ -41,9 +41,6 @@ FINER: Final = 4
 """Nodes of a section are so many times as close as voxels."""
 _SPREAD: Final = 4096
 """Random configurations that searches of extremes start from."""
-
-Stage: TypeAlias = Callable[[str, str, int], AbstractContextManager[Advance]]
-"""Shows progress: what is done, what is counted, how many there are at most."""
 
 
 class WorkspaceKeywords(TypedDict, total=False):
@@ -133,7 +130,7 @@ def compute_workspace(
     section: bool = False,
     dexterity: bool = False,
     orientations: int = ORIENTATIONS,
-    stage: Stage | None = None,
+    stage: Stage = silent,
 ) -> Workspace:
     """Return what the origin of a frame reaches inside the limits.
 
@@ -165,7 +162,6 @@ def compute_workspace(
     if dexterity and frame != "tool0":
         raise SettingsError([("dexterity", f"is that of tool0, not of {frame}")])
     workers = threads or os.cpu_count() or 1
-    show: Stage = stage or (lambda *_: nullcontext(lambda _: None))
     point = PointMap(chain, frame, [joint.travel for joint in model.moving_joints], model.home, model.extent)
     if len(point.joints) > MOST_JOINTS:
         moving = len(point.joints)
@@ -192,9 +188,9 @@ def compute_workspace(
     if section:
         _require_nodes(low, high, size)
     measure = Measure(point, along_axes)
-    with show("sampling", "configurations", samples) as advance:
+    with stage("sampling", "configurations", samples) as advance:
         voxels = draw_voxels(point, measure, grid, samples, seed, workers, advance)
-    with show("completing", shape, math.prod(grid.shape) - len(voxels)) as advance:
+    with stage("completing", shape, math.prod(grid.shape) - len(voxels)) as advance:
         voxels = grow_voxels(voxels, measure, along_axes, workers, advance)
     places = grid.centers(voxels.numbers)
     centers = np.repeat(origin[None], len(voxels), axis=0)
@@ -203,12 +199,12 @@ def compute_workspace(
     found_section = None
     if section:
         fine = size / FINER
-        with show("section", "nodes", int(np.prod((high - low) / fine + 2.0))) as advance:
+        with stage("section", "nodes", int(np.prod((high - low) / fine + 2.0))) as advance:
             if len(axes) == 3:
                 found_section = turned_section(point, names, fine, seed, advance)
             else:
                 found_section = planar_section(point, axes, origin, fine, seed, advance)
-    shares = _dexterity(model, point, centers, size, orientations, show) if dexterity else None
+    shares = _dexterity(model, point, centers, size, orientations, stage) if dexterity else None
     return Workspace(
         robot=spec.name,
         frame=frame,
@@ -337,7 +333,7 @@ def _notes(model: RobotModel, point: PointMap) -> tuple[str, ...]:
 
 
 def _dexterity(
-    model: RobotModel, point: PointMap, centers: Array, size: float, orientations: int, show: Stage
+    model: RobotModel, point: PointMap, centers: Array, size: float, orientations: int, stage: Stage
 ) -> Dexterity:
     turn, positions = None, centers
     if point.first_turns and point.joints[0] == 0:
@@ -361,7 +357,7 @@ def _dexterity(
         raise SettingsError(
             [("dexterity", f"would solve {poses:,} poses, more than {MOST_POSES:,}; make voxels larger")]
         )
-    with show("dexterity", "poses", poses) as advance:
+    with stage("dexterity", "poses", poses) as advance:
         return dexterity_at(model.spec, positions, orientations, travel=model.travel, turn=turn, advance=advance)
 
 

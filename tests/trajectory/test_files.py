@@ -9,7 +9,9 @@ from ruamel.yaml import YAML
 
 from dh2sim import plan_trajectory, read_trajectory
 from dh2sim.errors import OutputError, SettingsError, TrajectoryError
+from dh2sim.trajectory.files import SUFFIXES
 from dh2sim.trajectory.waypoints import waypoint_schema
+from tests.refusals import refusal
 from tests.sample_robots import NAMES, model
 
 
@@ -103,6 +105,14 @@ def test_an_archive_that_is_no_trajectory_is_refused(tmp_path: Path, arrays: dic
         read_trajectory(file)
 
 
+def test_a_file_that_could_not_be_read_again_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    planned = plan_trajectory(model("scara"), ["home", "zero"])
+    monkeypatch.setattr("dh2sim.trajectory.files.MOST_BYTES", 1000)
+    for suffix in SUFFIXES:
+        assert "larger than 0 MB: take fewer samples" in refusal(OutputError, planned.save, tmp_path / f"a{suffix}")
+    assert not list(tmp_path.iterdir())
+
+
 def test_samples_end_where_the_trajectory_does() -> None:
     planned = plan_trajectory(model("scara"), ["home", "zero"], duration=1.0)
     assert len(planned.sample(rate=10.0).time) == 11
@@ -120,6 +130,7 @@ def test_the_schema_of_waypoint_files_takes_what_the_reader_takes() -> None:
     page = YAML(typ="safe", pure=True).load(Path("docs/waypoints.yaml").read_text(encoding="utf-8"))
     assert valid(page)
     assert schema["properties"]["profile"]["$ref"] == "#/$defs/Profile"
+    assert "default" not in schema["$defs"]["WaypointUnitsEntry"]["properties"]["angle"]
     for point in ("home", [1, 2], {"q": "home", "stop": False}, {"xyz": [1, "2 * lift", 3], "rpy": [0, 0, 0]}):
         assert valid({"waypoints": [point, "zero"], "limits": {"jerk": {"joint_1": "50%"}, "tool_speed": 2}})
     for wrong in (

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +64,45 @@ def test_passive_joints_are_where_the_circles_of_coupler_and_rocker_meet(profile
     assert rates == pytest.approx((ahead - behind) / (2.0 * h), abs=1e-4)
     tool = np.array([table_mechanism_frames(model.spec, each)["tool0"][:3, 3] for each in motion.q[[0, -1]]])
     assert planned.tool_path(2) == pytest.approx(tool, abs=1e-12)
+
+
+def test_many_turns_of_a_crank_are_those_of_the_first_one() -> None:
+    """Also backwards, from a motion back and forth; progress is shown, and the passive joints are on the circles."""
+    model = build_mechanism(load_robot("four_bar"))
+    seen: dict[str, tuple[int, int]] = {}
+
+    @contextmanager
+    def stage(doing: str, _what: str, total: int) -> Iterator[Callable[[int], None]]:
+        seen[doing] = (0, total)
+
+        def advance(done: int) -> None:
+            seen[doing] = (seen[doing][0] + done, total)
+
+        yield advance
+
+    planned = plan_mechanism_trajectory(model, ["home", [-60.0], [3.0]], stage=stage)
+    assert set(seen) == {"planning", "following loops", "closing loops"}
+    assert all(0 < done <= total for done, total in seen.values())
+    times = np.linspace(0.0, planned.duration, 301)
+    q, _ = planned.all_joints(times)
+    C = _pin(q[:, 0])
+    pin = CRANK * np.exp(1j * q[:, 0]) + COUPLER * np.exp(1j * (q[:, 0] + q[:, 1]))
+    assert np.abs(pin - C @ [1, 1j]).max() < 1e-12
+    assert np.abs(np.diff(q[:, 1] + q[:, 0])).max() < 1.0  # the coupler swings, and joint_2 turns back all the way
+    assert q[:, 1].max() > 60.0 - 7.0
+
+
+def test_two_cranks_that_turn_often_have_their_pin_where_their_circles_meet() -> None:
+    text = Path("robots/mechanisms/five_bar.yaml").read_text(encoding="utf-8").replace("crank: 0.8", "crank: 0.2")
+    model = build_mechanism(parse_robot(text.replace("revolute, a: crank, limits: [0, 180]", "continuous, a: crank")))
+    planned = plan_mechanism_trajectory(model, ["home", [12.0, -9.0]])
+    q, _ = planned.all_joints(np.linspace(0.0, planned.duration, 101))
+    A, B = 0.2 * np.exp(1j * q[:, 0]), 1.0 + 0.2 * np.exp(1j * q[:, 2])
+    E = 0.5 * (A + B) + 1j * (B - A) / np.abs(B - A) * np.sqrt(1.44 - 0.25 * np.abs(B - A) ** 2)
+    assert np.abs(A + 1.2 * np.exp(1j * (q[:, 0] + q[:, 1])) - E).max() < 1e-12
+    assert np.abs(B + 1.2 * np.exp(1j * (q[:, 2] + q[:, 3])) - E).max() < 1e-12
+    far = refusal(TrajectoryError, plan_mechanism_trajectory, model, ["home", [1e7, 0.0]])
+    assert far.startswith("the driven joints go too far: the loops would be closed at ")
 
 
 def test_a_dead_position_on_the_way_refuses_the_motion() -> None:

@@ -327,6 +327,48 @@ def test_lines_end_where_wrist_axes_coincide_and_leave_there_only_the_way_they_m
     np.testing.assert_allclose(back.at(0.3 * back.duration)[0], planned.at(0.7 * planned.duration)[0], atol=1e-6)
 
 
+@pytest.mark.slow
+def test_a_line_that_is_singular_all_along_is_followed_where_the_joints_can() -> None:
+    """A UR5e stretched out and with its wrist straight moves its tool up, and no joint moves it outwards."""
+    zero = np.zeros(6)
+    T = table_tool_pose(robot("ur5e"), zero[None])[0]
+    up = T.copy()
+    up[2, 3] += 0.1
+    planned = plan_trajectory(model("ur5e"), [zero, up], kind="line", profile="jerk")
+    assert planned.notes[0] == (
+        "The line is in a singularity all along: of the motions that follow it the least is taken."
+    )
+    assert_limits_are_kept(planned)
+    assert_straight(robot("ur5e"), planned)
+    q, poses = tool_poses(robot("ur5e"), planned)
+    np.testing.assert_allclose(poses[:, :3, :3], np.broadcast_to(T[:3, :3], (len(q), 3, 3)), atol=1e-9)
+    aside = T @ np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.1], [0, 0, 0, 1]])
+    for goal in (aside, aside @ aside):
+        with pytest.raises(TrajectoryError, match=r"the line starts in a singularity, 0 m of"):
+            plan_trajectory(model("ur5e"), [zero, goal], kind="line", free=None)
+
+
+@pytest.mark.slow
+def test_joints_that_go_smoothly_into_a_singularity_are_not_slow_there() -> None:
+    """The wrist of a PUMA straightens while joints 4 and 6 rest: also as fast as torques allow."""
+    q0, q1 = np.radians([10, -60, -20, 0, 40, 0]), np.radians([20, -50, -30, 0, 0, 0])
+    goal = table_tool_pose(robot("puma560"), q1[None])[0]
+    planned = plan_trajectory(model("puma560"), [q0, goal], kind="line")
+    assert not planned.notes
+    assert_limits_are_kept(planned)
+    assert_straight(robot("puma560"), planned)
+    pytest.importorskip("toppra")
+    fastest = plan_trajectory(model("puma560"), [q0, goal], kind="line", profile="optimal")
+    assert_limits_are_kept(fastest, jerk=False)
+    assert fastest.duration < planned.duration
+
+
+def test_a_joint_that_rests_on_a_line_has_no_rates() -> None:
+    goal = np.array([math.radians(30), math.radians(60), 0.1, 0.0])
+    planned = plan_trajectory(model("scara"), ["home", goal], kind="line")
+    assert planned.peaks.rates[:, 2].tolist() == [0.0, 0.0, 0.0]
+
+
 def test_a_line_to_a_pose_in_another_branch_says_which_joints_differ() -> None:
     home = np.array(model("puma560").home)
     solutions = Robot.from_spec(robot("puma560")).ik(table_tool_pose(robot("puma560"), home[None] + 0.1)[0], q0=home)
