@@ -6,6 +6,7 @@ import pytest
 
 from dh2sim.errors import EngineError
 from dh2sim.model.build import build_model
+from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import ActuatorType, Convention, Limits, RobotSpec, Row
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.plant import Plant, compile_plant
@@ -129,3 +130,25 @@ def test_a_model_that_mujoco_refuses_is_an_error_in_one_line() -> None:
     assert str(caught.value).startswith("MuJoCo refuses the robot as it would be simulated: ")
     assert "slid" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def contacts(of: mujoco.MjModel, q: np.ndarray) -> list[bytes]:
+    """Every contact of a configuration to the last bit, in MuJoCo's order."""
+    data = mujoco.MjData(of)
+    data.qpos[of.nq - len(q) :] = q
+    mujoco.mj_forward(of, data)
+    fields = ("geom", "dist", "pos", "frame", "friction", "solref", "solimp", "includemargin", "dim")
+    return [getattr(data.contact, field).tobytes() for field in fields]
+
+
+@pytest.mark.parametrize(("name", "floating"), [("ur5e", True), ("so101", False), ("franka_panda", False)])
+def test_links_touch_as_in_the_model_that_is_recorded(name: str, floating: bool) -> None:
+    robot = build_model(load_robot(name))
+    job = prepare(robot, RolloutOptions(rollouts=1, steps=1, floating_base=floating))
+    text, simulated = mujoco.MjModel.from_xml_string(job.mjcf), job.plant.model
+    assert job.plant.may_touch
+    assert (simulated.npair > 0) == (name != "franka_panda")  # which has too many pairs to name
+    poses = np.random.default_rng(7).uniform(-2.5, 2.5, (40, job.plant.n))
+    found = [contacts(simulated, q) for q in poses]
+    assert found == [contacts(text, q) for q in poses]
+    assert sum(bool(each[0]) for each in found) > 10

@@ -229,11 +229,10 @@ def _reachable(batch: RolloutBatch, targets: Array, center: Array, reach: Array,
         reach: Half of its width, shape (n,) or (batch, n).
         most: Greatest distance between neighbouring waypoints, shape (n,) or (batch, n).
     """
-    model = batch.plant.model
     reached: _Reached
     if batch.plant.loops is not None:
         reached = _closes_loops(batch)
-    elif model.geom_contype.any() and model.geom_conaffinity.any():
+    elif batch.plant.may_touch:
         reached = _clear_of_links(batch)
     else:
         return follow(batch.q0, targets, most)
