@@ -87,7 +87,7 @@ def make_folds(measured: Measurements, seed: int) -> list[tuple[tuple[str, ...],
     return found
 
 
-def held_out_errors(measured: Measurements, refit: Refit, *, seed: int = 0) -> HeldOut | None:
+def held_out_errors(measured: Measurements, refit: Refit, *, seed: int) -> HeldOut | None:
     """Fit to all but one fold after the other, and look at the one left out; None where there is only one group.
 
     Raises:

@@ -24,7 +24,7 @@ _NUMBERS: Final = ("a", "alpha", "beta", "d", "theta")
 _KEYS: Final = ("convention", *_NUMBERS)
 
 
-def calibrated_text(calibration: Calibration, *, header: Sequence[str] = (), folder: Path | None = None) -> str:
+def calibrated_text(calibration: Calibration, *, header: Sequence[str], folder: Path | None) -> str:
     """Return the text of the calibrated robot's file.
 
     Where only numbers change, and rows become Hayati's, comments, parameters and the order of keys are those of the

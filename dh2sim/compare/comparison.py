@@ -48,7 +48,7 @@ class JointCorrespondence:
     zero: float
     """The coordinate of B at which A is at zero, rad or m."""
 
-    def formula(self, smallest: float = 0.0) -> str:
+    def formula(self, smallest: float) -> str:
         """Return the coordinate of B in terms of q, that of A; zeros up to ``smallest`` are left out."""
         if abs(self.zero) <= smallest:
             return "-q" if self.sense < 0 else "q"

@@ -32,7 +32,7 @@ class AxisGeometry:
     """Between the common normals along this axis, m; None where there are not two, or the joint slides."""
 
 
-def axis_geometry(axes: ScrewAxes, parallel: float = 1e-6) -> tuple[AxisGeometry, ...]:
+def axis_geometry(axes: ScrewAxes, parallel: float) -> tuple[AxisGeometry, ...]:
     """Return the numbers of each axis; axes are parallel up to this sine."""
     found = []
     place: Array | None = None
@@ -93,7 +93,7 @@ class Difference:
 
 
 def first_difference(
-    a: ScrewAxes, b: ScrewAxes, obstacle: Obstacle, tolerance: float, labels: tuple[str, str] = LABELS
+    a: ScrewAxes, b: ScrewAxes, obstacle: Obstacle, tolerance: float, labels: tuple[str, str]
 ) -> Difference:
     """Return the numbers and the words for where matching failed; ``labels`` are what A and B are called there."""
     i, k = obstacle.first, obstacle.last

@@ -40,7 +40,7 @@ def told_apart(write: Callable[[float, int], str], x: float, y: float) -> tuple[
     return texts
 
 
-def rotation_text(R: Array, smallest: float = _NOTHING) -> str:
+def rotation_text(R: Array, smallest: float) -> str:
     """Return a rotation as ``Rz(45°)``, or as a product about fixed axes; empty for none.
 
     Args:
@@ -54,7 +54,7 @@ def rotation_text(R: Array, smallest: float = _NOTHING) -> str:
     return " ".join(named)
 
 
-def pose_text(T: Array, smallest: float = _NOTHING) -> str:
+def pose_text(T: Array, smallest: float) -> str:
     """Return a pose as ``Rz(45°), 0 0 100 mm``; empty for the identity."""
     parts = []
     rotation = rotation_text(T, smallest)

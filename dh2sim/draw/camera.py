@@ -134,7 +134,7 @@ def follows_base(choice: CameraChoice, motion: Motion) -> bool:
     return choice.name is None and furthest > FOLLOWED * motion.model.stat.extent
 
 
-def extreme_points(motion: Motion, *, follows: bool = False) -> Array:
+def extreme_points(motion: Motion, *, follows: bool) -> Array:
     """Return corners of boxes around all parts of the robot in all its positions, shape (count, 3), m.
 
     Args:

@@ -71,7 +71,7 @@ def write_trajectory_plot(
     title: str,
     *,
     size: tuple[int, int] | None = None,
-    dpi: float = 150.0,
+    dpi: float,
 ) -> None:
     """Write a plot of a trajectory, whole or not at all; the same bytes every time.
 

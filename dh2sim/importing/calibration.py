@@ -23,7 +23,7 @@ from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.compaction import compact_rows
 from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.forward import reference_joint_poses
-from dh2sim.kinematics.frame_assignment.recover import SEED, TOLERANCE, Residual
+from dh2sim.kinematics.frame_assignment.recover import SEED, Residual
 from dh2sim.kinematics.frame_assignment.result import Tolerances
 from dh2sim.kinematics.frame_assignment.rounding import simple_vector
 from dh2sim.kinematics.sampling import random_configurations
@@ -66,12 +66,12 @@ def import_calibration(
     data: bytes,
     *,
     file: str,
-    nominal: RobotSpec | None = None,
-    convention: Convention | None = None,
-    tolerance: float = TOLERANCE,
-    name: str | None = None,
-    folder: Path | None = None,
-    origin: str = "",
+    nominal: RobotSpec | None,
+    convention: Convention | None,
+    tolerance: float,
+    name: str | None,
+    folder: Path | None,
+    origin: str,
 ) -> Imported:
     """Make a robot file of a maker's calibration file.
 

@@ -17,7 +17,6 @@ from dh2sim.importing.result import Imported
 from dh2sim.importing.source_errors import MADE
 from dh2sim.kinematics.frame_assignment.recover import (
     CONFIGURATIONS,
-    TOLERANCE,
     Recovery,
     Residual,
     measure_residual,
@@ -294,9 +293,9 @@ def _mesh(mesh: SerialMesh | None, T_dh_link: Array, tolerances: Tolerances) -> 
 def import_serial(
     robot: SerialRobot,
     *,
-    convention: Convention = Convention.STANDARD,
-    tolerance: float = TOLERANCE,
-    folder: Path | None = None,
+    convention: Convention,
+    tolerance: float,
+    folder: Path | None,
     name: str | None = None,
     header: Sequence[str] = (),
     source: str = "",

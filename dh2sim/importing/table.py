@@ -22,7 +22,7 @@ def import_table(
     data: bytes,
     *,
     file: str,
-    convention: Convention | str | None = None,
+    convention: Convention | str | None,
     angle: AngleUnit | str | None = None,
     length: LengthUnit | str | None = None,
     table: int | None = None,

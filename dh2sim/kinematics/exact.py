@@ -114,7 +114,7 @@ def exact_cross(a: Vector, b: Vector) -> Vector:
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-def exact_sum(a: Vector, b: Vector, factor: Decimal = ONE) -> Vector:
+def exact_sum(a: Vector, b: Vector, factor: Decimal) -> Vector:
     """Return a + factor b."""
     return (a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2])
 

@@ -23,7 +23,7 @@ TOLERANCE: Final = 1e-13
 """Of entries without a unit; times the reach for lengths."""
 
 
-def scattered(count: int, dimensions: int, seed: int = 0) -> Array:
+def scattered(count: int, dimensions: int, seed: int) -> Array:
     """Return points of the unit cube that no hyperplane through few of them explains, shape (count, dimensions).
 
     Multiples of the square roots of primes, less their whole parts (H. Weyl, 1916): numpy.random takes longer to

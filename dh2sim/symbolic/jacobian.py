@@ -36,9 +36,7 @@ _TRIED: Final = 2
 """Frames and points in which a determinant is computed: the most promising ones."""
 
 
-def geometric_jacobian_matrix(
-    table: SymbolicTable, source: str = "base_link", target: str = "tool0", *, fold: Fold = Fold.PARALLEL
-) -> Matrix:
+def geometric_jacobian_matrix(table: SymbolicTable, source: str, target: str, *, fold: Fold) -> Matrix:
     """Return the Jacobian of a frame: 6 rows, a column for each coordinate.
 
     Args:

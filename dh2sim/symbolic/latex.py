@@ -30,7 +30,7 @@ class LatexNotation:
 
     times = r"\,"
 
-    def __init__(self, table: SymbolicTable, joint_names: str = "theta") -> None:
+    def __init__(self, table: SymbolicTable, joint_names: str) -> None:
         """``joint_names`` is 'theta', with sliding coordinates d_i, or 'q'."""
         self._joint = joint_names
         self._turns = [row.type.turns for row in table.spec.rows]

@@ -141,7 +141,7 @@ class SymbolicTable:
                 "written out; ask for a shorter part of the arm"
             ) from None
 
-    def outermost(self, source: str, target: str, *, from_tool: bool = False) -> list[list[Atom]]:
+    def outermost(self, source: str, target: str, *, from_tool: bool) -> list[list[Atom]]:
         """Return cosines and sines of constant angles before the first coordinate between two frames, angle by angle.
 
         Nested outermost, they leave the entries of the matrix behind them whole, which rows then share.

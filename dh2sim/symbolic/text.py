@@ -28,7 +28,7 @@ class TextNotation:
     _in_full = False
     """Whether long sums of coordinates are written without dots."""
 
-    def __init__(self, table: SymbolicTable, joint_names: str = "theta") -> None:
+    def __init__(self, table: SymbolicTable, joint_names: str) -> None:
         """``joint_names`` is 'theta', with sliding coordinates d_i, or 'q'."""
         self._joint = joint_names
         self._turns = [row.type.turns for row in table.spec.rows]

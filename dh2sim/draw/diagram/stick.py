@@ -50,7 +50,7 @@ def tick_step(length: float) -> float:
     return next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= 0.999 * raw)
 
 
-def draw_stick(arm: Arm, workspace: Box | None = None, reach: float | None = None) -> Sheet:
+def draw_stick(arm: Arm, workspace: Box | None, reach: float | None) -> Sheet:
     """Draw an arm in the box of its workspace.
 
     Args:

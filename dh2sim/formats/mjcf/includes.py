@@ -104,7 +104,7 @@ class MjcfFiles:
         return Problem(file=place.file, line=place.line, column=place.column, path=path, message=message)
 
 
-def scan_files(path: Path, *, file: str, root: Path | None = None) -> MjcfFiles:
+def scan_files(path: Path, *, file: str, root: Path | None) -> MjcfFiles:
     """Read an MJCF and the files that it includes or attaches, without MuJoCo.
 
     Args:

@@ -54,7 +54,7 @@ def add_sensors(mujoco: ET.Element, model: Written) -> None:
     child(sensors, "framequat", name="tool0_quat", objtype="site", objname="tool0")
 
 
-def add_keyframes(mujoco: ET.Element, model: RobotModel, *, floating_base: bool = False) -> None:
+def add_keyframes(mujoco: ET.Element, model: RobotModel, *, floating_base: bool) -> None:
     """Add a keyframe for every named configuration, with the controls that hold the robot still in it.
 
     A base that floats starts at the origin.

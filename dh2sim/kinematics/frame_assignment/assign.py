@@ -24,9 +24,7 @@ from dh2sim.kinematics.transforms import joint_part, link_part, second_twist
 from dh2sim.typing import Array, read_only
 
 
-def assign_frames(
-    chain: SerialChain, tolerances: Tolerances, *, first_link: bool = False, last_link: bool = True
-) -> Assignment:
+def assign_frames(chain: SerialChain, tolerances: Tolerances, *, first_link: bool, last_link: bool) -> Assignment:
     """Assign a Denavit-Hartenberg frame to every link of a chain.
 
     Every step looks at one link only, in the link's own frame, so that errors do not add up along the chain. The z
