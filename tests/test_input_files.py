@@ -1,10 +1,17 @@
-import os
-from pathlib import Path
+from __future__ import annotations
 
+import io
+import os
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
 import pytest
 
 from dh2sim.errors import Dh2simError
-from dh2sim.input_files import read_input
+from dh2sim.input_files import csv_lines, json_content, npy_array, npz_arrays, read_input
 from dh2sim.robot.read import load_robot
 from dh2sim.simulate.run import rollout
 
@@ -44,3 +51,104 @@ def test_a_rollout_does_not_wait_for_a_pipe_with_a_name(tmp_path: Path, option: 
     value = str(pipe) if option == "start" else f"replay:{pipe}"
     with pytest.raises(Dh2simError, match="is a named pipe, not a file"):
         rollout("planar_2r", rollouts=1, steps=1, **{option: value})  # type: ignore[arg-type]
+
+
+MOST = 10_000
+
+
+def npz(**arrays: Any) -> bytes:
+    stream = io.BytesIO()
+    np.savez(stream, **arrays)
+    return stream.getvalue()
+
+
+def zipped(name: str, data: bytes) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(name, data)
+    return stream.getvalue()
+
+
+def changed(data: bytes, local: int, central: int, value: int) -> bytes:
+    """Change a byte of the first entry of an archive, in both of its headers."""
+    made = bytearray(data)
+    made[local] = made[made.index(b"PK\x01\x02") + central] = value
+    return bytes(made)
+
+
+GOOD = npz(a=np.arange(6.0).reshape(2, 3), b=np.array(["x"]), c=np.zeros((0, 2)))
+
+
+def test_arrays_come_back_from_files(tmp_path: Path) -> None:
+    arrays = npz_arrays(GOOD, MOST)
+    assert {name: array.tolist() for name, array in arrays.items()} == {
+        "a": [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]],
+        "b": ["x"],
+        "c": [],
+    }
+    for array in (
+        np.arange(6.0).reshape(2, 3),
+        np.asfortranarray(np.ones((3, 2))),
+        np.zeros((0, 2)),
+        np.float64(3.0),
+    ):
+        np.save(tmp_path / "a.npy", array)
+        np.testing.assert_array_equal(npy_array(tmp_path / "a.npy"), array)
+
+
+def header(text: bytes) -> bytes:
+    return b"\x93NUMPY\x01\x00v\x00" + text.ljust(117) + b"\n"
+
+
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        (b"", "it does not begin as one"),
+        (header(b"(" * 117), "it does not begin as one"),
+        (header(b"{'descr': '<f8', 'fortran_order': False, 'shape': (" + b"9" * 40 + b",)}"), "it is shorter than"),
+        (header(b"{'descr': '<f8', 'fortran_order': False, 'shape': (-1, 6)}"), "it is shorter than it says"),
+        (header(b"{'descr': '|O', 'fortran_order': False, 'shape': (1,)}"), "it contains Python objects"),
+    ],
+    ids=["empty", "endless", "huge", "negative", "objects"],
+)
+def test_a_file_that_is_no_array_is_refused(data: bytes, problem: str, tmp_path: Path) -> None:
+    (tmp_path / "a.npy").write_bytes(data)
+    with pytest.raises(ValueError, match=f"^is not a NumPy array: {problem}"):
+        npy_array(tmp_path / "a.npy")
+    with pytest.raises(ValueError, match=f"^is not a NumPy archive: 'a.npy' is not a NumPy array: {problem}"):
+        npz_arrays(zipped("a.npy", data), MOST)
+
+
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        (b"", "is not a NumPy archive, or damaged"),
+        (GOOD[:-30], "is not a NumPy archive, or damaged"),
+        (changed(GOOD, 6, 8, 1), "is not a NumPy archive, or damaged"),
+        (changed(GOOD, 8, 10, 99), "is not a NumPy archive, or damaged"),
+        (zipped("a.npy", bytes(2**24)), "holds more than 1 MB"),
+    ],
+    ids=["empty", "cut off", "encrypted", "unknown method", "bomb"],
+)
+def test_a_damaged_archive_is_refused(data: bytes, problem: str) -> None:
+    with pytest.raises(ValueError, match=f"^{problem}$"):
+        npz_arrays(data, 2**20)
+
+
+@pytest.mark.parametrize(
+    ("read", "data", "problem"),
+    [
+        (csv_lines, b"a,b\n1,\xff\n", "is not a CSV file: line 2 is not UTF-8: byte 0xff"),
+        (csv_lines, b"a\n" + b"1" * 200_000, "is not a CSV file: field larger than field limit"),
+        (csv_lines, b"a," * 30_000, "has 30001 columns; at most 2000 are allowed"),
+        (json_content, b"\xff\xfe{\0", "is not a JSON file: line 1 is not UTF-8: byte 0xff; it seems to be UTF-16"),
+    ],
+    ids=["bytes", "long cell", "wide", "UTF-16"],
+)
+def test_a_text_that_cannot_be_used_is_refused(read: Callable[[bytes], object], data: bytes, problem: str) -> None:
+    with pytest.raises(ValueError, match=f"^{problem}"):
+        read(data)
+
+
+def test_lines_of_csv_are_numbered_as_in_the_file() -> None:
+    assert csv_lines(b"\xef\xbb\xbfa,b\r\n\r\n1,2\r\n") == [(1, ["a", "b"]), (3, ["1", "2"])]

@@ -15,7 +15,7 @@ import numpy as np
 from dh2sim.calibrate.measurements import OTHER_KINDS, Kind, Measurements, grouped, problems_of
 from dh2sim.calibrate.parameters import rotation_of
 from dh2sim.errors import Dh2simError, MeasurementFileError, Problem
-from dh2sim.input_files import read_input
+from dh2sim.input_files import check_columns, read_input, utf16_hint
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import counted, did_you_mean, listed, member, shown
@@ -129,7 +129,7 @@ def read_measurements(
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        report(line, 1, "", "the file is not UTF-8 text")
+        report(line, 1, "", f"the file is not UTF-8 text{utf16_hint(data)}")
         report.raise_any()
     return _read(text, spec, report, wanted, groups)
 
@@ -154,6 +154,11 @@ def _read(text: str, spec: RobotSpec, report: _Report, kind: Kind | None, groups
     number, header = lines[0]
     separator = max(",;\t", key=header.count)
     cells = _split(header, separator)
+    try:
+        check_columns(len(cells))
+    except ValueError as error:
+        report(number, 1, "", f"the file {error}")
+        report.raise_any()
     columns = _columns(cells, number, spec, report, groups)
     kind = _kind(columns, kind, number, report)
     _require_columns(columns, kind, spec, number, report)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dh2sim.errors import Dh2simError, Problem
-from dh2sim.input_files import read_input
+from dh2sim.input_files import json_content, read_input
 from dh2sim.messages import shown
 from dh2sim.model.slips import SlipKind
 from dh2sim.validate.report import RobotReport
@@ -197,11 +197,9 @@ class Baseline:
         if len(data) > MAX_BYTES:
             raise Dh2simError(f"{path}: is larger than {MAX_BYTES // 10**6} MB, the most that is read of a baseline")
         try:
-            content = json.loads(data)
-        except RecursionError:
-            raise Dh2simError(f"{path}: is not a baseline: it is nested too deeply") from None
+            content = json_content(data)
         except ValueError as error:
-            raise Dh2simError(f"{path}: is not a baseline: {error}") from None
+            raise Dh2simError(f"{path}: {error}") from None
         if not isinstance(content, dict) or content.get("version") != _VERSION:
             raise Dh2simError(f"{path}: is not a baseline of version {_VERSION}; write it with --write-baseline")
         entries = content.get("accepted")

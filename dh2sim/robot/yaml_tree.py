@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple, NoReturn, TypeAlias
 
 from dh2sim.errors import Dh2simError, Problem, RobotFileError
-from dh2sim.input_files import read_input
+from dh2sim.input_files import read_input, utf16_hint
 from dh2sim.messages import Loc, path_of, shown
 
 
@@ -167,7 +167,8 @@ def decode(data: bytes, report: Report) -> str:
         text = data.decode().replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         before = data[: error.start].decode()
-        _fail_at(report, before, len(before), f"not UTF-8: byte 0x{data[error.start]:02x}")
+        message = f"not UTF-8: byte 0x{data[error.start]:02x}{utf16_hint(data)}"
+        _fail_at(report, before, len(before), message)
     if found := NOT_PRINTABLE.search(text):
         _fail_at(report, text, found.start(), f"control character U+{ord(found.group()):04X} is not allowed")
     for number, line in enumerate(text.split("\n"), start=1):

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.errors import DesignFileError, Problem, RobotError, SettingsError
-from dh2sim.input_files import read_input
+from dh2sim.input_files import read_input, utf16_hint
 from dh2sim.messages import shown
 from dh2sim.robot.expressions import NumberError, to_number
 from dh2sim.robot.spec import RobotSpec
@@ -214,7 +214,8 @@ def _read_csv(name: str) -> DesignTable:
         data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = data[: error.start]
-        wrong(before.count(b"\n") + 1, error.start - before.rfind(b"\n"), "is not UTF-8 text")
+        message = f"is not UTF-8 text{utf16_hint(data)}"
+        wrong(before.count(b"\n") + 1, error.start - before.rfind(b"\n"), message)
         raise DesignFileError(problems) from None
     text = io.TextIOWrapper(io.BytesIO(data), "utf-8-sig")
     rows = (
@@ -225,13 +226,14 @@ def _read_csv(name: str) -> DesignTable:
     first, names = next(rows, (1, ""))
     head = _cells(names)
     columns = [cell for _, cell in head]
+    if len(columns) > MOST_NAMES:
+        wrong(first, 1, f"found {len(columns)} columns; at most {MOST_NAMES} are allowed")
+        raise DesignFileError(problems)
     for index, (place, cell) in enumerate(head):
         if not cell:
             wrong(first, place, f"column {index + 1} has no name")
         elif cell in columns[:index]:
             wrong(first, place, f"duplicate column {shown(cell)}")
-    if len(columns) > MOST_NAMES:
-        wrong(first, 1, f"found {len(columns)} columns; at most {MOST_NAMES} are allowed")
     values, lines = array("d"), array("i", [first])
     for line, row in rows:
         if len(lines) > MOST_DESIGNS:

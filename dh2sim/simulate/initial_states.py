@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from mujoco.batch import Batch
 
 from dh2sim.errors import SettingsError
 from dh2sim.formats.mjcf.mechanism import joint_coordinates
-from dh2sim.input_files import refuse_named_pipe
+from dh2sim.input_files import csv_lines, npy_array, refuse_named_pipe, repeated
 from dh2sim.messages import did_you_mean, listed
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.simulate.closed_loops import ClosedLoops
@@ -211,12 +209,11 @@ def _read_file(path: Path, joints: tuple[str, ...], rollouts: int) -> Array:
 def _npy(path: Path, joints: tuple[str, ...]) -> Array:
     n = len(joints)
     try:
-        with path.open("rb") as stream:
-            found: Any = np.lib.format.read_array(stream, allow_pickle=False)
-    except (ValueError, EOFError, MemoryError) as error:
-        raise _refused(f"{path}: is not a NumPy array: {error}") from error
+        found = npy_array(path)
+    except ValueError as error:
+        raise _refused(f"{path}: {error}") from error
     if found.dtype.kind in "fiu":
-        numbers: Array = found.astype(np.float64)
+        numbers: Array = np.array(found, dtype=np.float64)
         if numbers.shape == (n,):
             numbers = numbers[None]
         if numbers.ndim == 2 and numbers.shape[1] == n:
@@ -231,18 +228,16 @@ def _npy(path: Path, joints: tuple[str, ...]) -> Array:
 
 def _csv(path: Path, joints: tuple[str, ...]) -> Array:
     try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.reader(stream)
-            lines = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise _refused(f"{path}: is not a CSV file: {error}") from error
+        lines = [line for line in csv_lines(path.read_bytes()) if any(cell.strip() for cell in line[1])]
+    except ValueError as error:
+        raise _refused(f"{path}: {error}") from error
     header = [cell.strip() for cell in lines[0][1]] if lines else []
     allowed = [*joints, *(f"{joint}_velocity" for joint in joints)]
     problems = [
         f"{path}:1: unknown column '{name}'.{did_you_mean(name, allowed)}" for name in header if name not in allowed
     ]
     problems += [f"{path}:1: missing column '{joint}'" for joint in joints if joint not in header]
-    problems += [f"{path}:1: duplicate column '{name}'" for name in sorted({*header}) if header.count(name) > 1]
+    problems += [f"{path}:1: duplicate column '{name}'" for name in repeated(header)]
     if problems:
         columns = f"Columns are joints, rad or m, and optionally {allowed[-1]} and so on"
         raise SettingsError([*(("start", problem) for problem in problems), ("", columns)])

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import math
 import os
-import zipfile
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from dh2sim.errors import OutputError, SettingsError, TrajectoryError
 from dh2sim.files import atomic_file
-from dh2sim.input_files import read_input
+from dh2sim.input_files import csv_lines, npz_arrays, read_input, repeated
 from dh2sim.messages import listed, shown
 from dh2sim.progress import Advance, Stage, silent
 from dh2sim.trajectory.curves import ORDERS, PiecewisePolynomial, cubic_spline, quintic_hermite
@@ -234,23 +231,20 @@ def read_trajectory(path: str | os.PathLike[str]) -> SampledTrajectory:
 
 def _from_csv(data: bytes, file: str, digest: str) -> SampledTrajectory:
     try:
-        rows = list(csv.reader(data.decode("utf-8-sig").splitlines()))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise TrajectoryError(f"{file} is not a CSV file: {error}") from None
-    header = [cell.strip() for cell in rows[0]] if rows else []
+        lines = csv_lines(data)
+    except ValueError as error:
+        raise TrajectoryError(f"{file} {error}") from None
+    header = [cell.strip() for cell in lines[0][1]] if lines else []
     joints = header[1:]
     if header[:1] != ["time"] or not joints or "" in joints:
         raise TrajectoryError(
             f"{file}: the first line must be 'time' and the names of joints, found {shown(','.join(header))}"
         )
-    twice = sorted({joint for joint in header if header.count(joint) > 1})
-    if twice:
+    if twice := repeated(header):
         raise TrajectoryError(f"{file}: the first line names {listed(twice)} more than once")
     problems: list[str] = []
     values: list[list[float]] = []
-    for number, row in enumerate(rows[1:], start=2):
-        if not row:
-            continue
+    for number, row in lines[1:]:
         if len(row) != len(header):
             problems.append(f"line {number} has {len(row)} values; the first line names {len(header)} columns")
             continue
@@ -291,10 +285,9 @@ def _times_problem(time: Array) -> list[str]:
 
 def _from_npz(data: bytes, file: str, digest: str) -> SampledTrajectory:
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except (ValueError, EOFError, OSError, zipfile.BadZipFile, KeyError) as error:
-        raise TrajectoryError(f"{file} is not a NumPy archive: {error}") from None
+        arrays = npz_arrays(data, MOST_BYTES)
+    except ValueError as error:
+        raise TrajectoryError(f"{file} {error}") from None
     missing = [name for name in ("time", "q", "joints") if name not in arrays]
     if missing:
         raise TrajectoryError(f"{file} lacks the arrays {listed(missing)}; it has {listed(arrays)}")

@@ -136,7 +136,11 @@ def test_a_baseline_comes_back_from_its_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{", "is not a baseline: "),
+        ("{", "is not a JSON file: line 1, column 2: expecting property name"),
+        ('{"version": ' + "1" * 5000 + "}", "is not a JSON file: it contains a number of 5000 digits"),
+        ("[" * 100_000, "is not a JSON file: it is nested too deeply"),
+        ('{"version": NaN}', "is not a JSON file: it contains NaN"),
+        ('{"version": 1, "version": 1}', "is not a JSON file: it contains the key 'version' twice in one object"),
         ("[]", "is not a baseline of version 1"),
         ('{"version": 1}', "accepted: must be a list"),
         ('{"version": 1, "accepted": [{}]}', r"accepted\[0\]: must have the texts rule, file, path, message"),

@@ -110,7 +110,7 @@ def test_text_that_is_not_a_robot_file_is_refused_with_its_place(text: str, mess
     [
         ("name: é\n".encode("latin-1"), "1:7: not UTF-8: byte 0xe9"),
         (b"a: 1\nb: \xc3\xa9 \xff\n", "2:6: not UTF-8: byte 0xff"),
-        ("name: r\n".encode("utf-16"), "1:1: not UTF-8: byte 0xff"),
+        ("name: r\n".encode("utf-16"), "1:1: not UTF-8: byte 0xff; it seems to be UTF-16: save it as UTF-8"),
     ],
 )
 def test_bytes_that_are_not_utf_8_are_reported_with_their_place(data: bytes, message: str) -> None:

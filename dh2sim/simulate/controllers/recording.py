@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import functools
 import hashlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -14,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from dh2sim.errors import ControllerError, RunError
-from dh2sim.input_files import refuse_named_pipe
-from dh2sim.messages import closest, listed
+from dh2sim.input_files import csv_lines, npy_array, refuse_named_pipe, repeated
+from dh2sim.messages import closest, listed, shown
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.controllers.reference import read_reference
 from dh2sim.simulate.dataset_layout import FORMAT
@@ -251,20 +250,19 @@ def actuator_type(column: str) -> ActuatorType | None:
 def _read_csv(path: Path, file: str, kind: str) -> Recording:
     raw = path.read_bytes()
     try:
-        rows = list(csv.reader(raw.decode("utf-8-sig").splitlines()))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ControllerError(f"'{file}' is not a CSV file: {error}") from error
-    header = [name.strip() for name in rows[0]] if rows else []
+        lines = csv_lines(raw)
+    except ValueError as error:
+        raise ControllerError(f"'{file}' {error}") from error
+    header = [name.strip() for name in lines[0][1]] if lines else []
     names = [name for name in header if name != "time"]
     if not names:
         raise ControllerError(
             f"'{file}' needs a first line that names joints, such as joint_1, or actuators, such as joint_1_motor"
         )
-    twice = sorted({name for name in header if header.count(name) > 1})
-    if twice:
+    if twice := repeated(header):
         raise ControllerError(f"'{file}' has more than one column {listed(map(repr, twice))}")
     positions, actuation = _meaning(file, names, kind)
-    table = _numbers(file, header, rows[1:])
+    table = _numbers(file, header, lines[1:])
     times = None
     if "time" in header:
         times = _times(file, table[:, header.index("time")])
@@ -302,11 +300,10 @@ def _meaning(file: str, names: Sequence[str], kind: str) -> tuple[bool, Actuator
     return False, found.pop() if len(found) == 1 else None
 
 
-def _numbers(file: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> Array:
-    table = np.empty((len(rows), len(header)))
+def _numbers(file: str, header: Sequence[str], lines: Sequence[tuple[int, Sequence[str]]]) -> Array:
+    table = np.empty((len(lines), len(header)))
     problems = []
-    filled = [(line, row) for line, row in enumerate(rows, start=2) if row]
-    for i, (line, row) in enumerate(filled):
+    for i, (line, row) in enumerate(lines):
         if len(row) != len(header):
             problems.append(f"line {line} has {len(row)} values; the first line names {len(header)} columns")
             continue
@@ -316,13 +313,13 @@ def _numbers(file: str, header: Sequence[str], rows: Sequence[Sequence[str]]) ->
             except ValueError:
                 table[i, j] = np.nan
             if not np.isfinite(table[i, j]):
-                problems.append(f"line {line}, column '{header[j]}': {text!r} is not a finite number")
-    if not filled:
+                problems.append(f"line {line}, column '{header[j]}': {shown(text)} is not a finite number")
+    if not lines:
         problems.append("there are no values below the first line")
     if problems:
         more = [f"and {len(problems) - _MOST_REPORTED} more"] if len(problems) > _MOST_REPORTED else []
         raise ControllerError("\n  ".join([f"'{file}' cannot be used:", *problems[:_MOST_REPORTED], *more]))
-    return table[: len(filled)]
+    return table
 
 
 def _times(file: str, times: Array) -> Array:
@@ -360,9 +357,9 @@ def _read_npy(path: Path, file: str, kind: str) -> Recording:
     if kind == "auto":
         raise ControllerError(f"'{file}' does not say what its numbers are: add as=ctrl or as=reference")
     try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError) as error:
-        raise ControllerError(f"'{file}' is not a NumPy file of numbers: {error}") from error
+        array = npy_array(path)
+    except ValueError as error:
+        raise ControllerError(f"'{file}' {error}") from error
     if array.dtype.kind not in "fiu" or array.ndim not in (2, 3) or 0 in array.shape:
         raise ControllerError(
             f"'{file}' must contain real numbers of shape (time steps, columns) or (rollouts, time steps, columns), "

@@ -72,8 +72,8 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.chdir(tmp_path)
     Path("table.csv").write_bytes(b"\xff\xfe\x00")
     assert refused("replay:file=table.csv") == (
-        "controller 'replay': 'table.csv' is not a CSV file: 'utf-8' codec can't decode byte 0xff in position 0: "
-        "invalid start byte"
+        "controller 'replay': 'table.csv' is not a CSV file: line 1 is not UTF-8: byte 0xff; it seems to be UTF-16: "
+        "save it as UTF-8"
     )
 
 
@@ -148,7 +148,7 @@ def test_a_numpy_file_of_objects_is_not_opened(tmp_path: Path, monkeypatch: pyte
     monkeypatch.chdir(tmp_path)
     np.save("a.npy", np.array([[{}]], dtype=object))
     assert refused("replay:file=a.npy,as=ctrl").startswith(
-        "controller 'replay': 'a.npy' is not a NumPy file of numbers: "
+        "controller 'replay': 'a.npy' is not a NumPy array: it contains Python objects"
     )
 
 
