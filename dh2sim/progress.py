@@ -12,6 +12,10 @@ Stage: TypeAlias = Callable[[str, str, int], AbstractContextManager[Advance]]
 """Shows progress: what is done, what is counted, how many there are at most."""
 
 
+def no_progress(_done: int) -> None:
+    """Show nothing."""
+
+
 def silent(_doing: str, _what: str, _total: int) -> AbstractContextManager[Advance]:
     """Show nothing."""
-    return nullcontext(lambda _: None)
+    return nullcontext(no_progress)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -17,6 +17,7 @@ from dh2sim.model.build import build_model
 from dh2sim.model.mechanism import MechanismModel, build_mechanism
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.slips import find_slips
+from dh2sim.progress import Advance
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.validate.report import Quantity, RobotReport, failure_text
@@ -36,7 +37,7 @@ def check_files(
     tolerance: float = 1e-12,
     baseline: Baseline | None = None,
     changed_since: str | None = None,
-    advance: Callable[[int], None] | None = None,
+    advance: Advance | None = None,
 ) -> CheckReport:
     """Check robot files, their exports, and the poses that all engines read from these.
 

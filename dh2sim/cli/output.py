@@ -7,7 +7,7 @@ import math
 import sys
 import textwrap
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 from dh2sim.errors import NotFiniteError, OutputError
 from dh2sim.files import require_folder
 from dh2sim.messages import printable
+from dh2sim.progress import Advance
 
 WIDTH: Final = 80
 """Columns of what is printed, unless the terminal is asked."""
@@ -104,9 +105,7 @@ def _not_finite(value: object, place: str) -> Iterator[tuple[str, float]]:
 
 
 @contextmanager
-def progress_bar(
-    doing: str, what: str, total: int, *, quiet: bool = False, after: float = 0.0
-) -> Iterator[Callable[[int], None]]:
+def progress_bar(doing: str, what: str, total: int, *, quiet: bool = False, after: float = 0.0) -> Iterator[Advance]:
     """Show a bar on standard error if that is a terminal; it vanishes in the end.
 
     Args:
@@ -123,7 +122,7 @@ def progress_bar(
         yield lambda _: None
         return
     begun = time.monotonic()
-    shown: list[Callable[[int], None]] = []
+    shown: list[Advance] = []
     done_before = 0
 
     with ExitStack() as stack:
@@ -142,7 +141,7 @@ def progress_bar(
 
 
 @contextmanager
-def _bar(doing: str, what: str, total: int) -> Iterator[Callable[[int], None]]:
+def _bar(doing: str, what: str, total: int) -> Iterator[Advance]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 

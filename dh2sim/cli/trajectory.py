@@ -14,9 +14,9 @@ from dh2sim.cli.common import ForceOption, JsonOption, RobotArgument, build_any,
 from dh2sim.cli.output import json_text, progress_bar, require_free, table_lines, wrapped
 from dh2sim.errors import ConfigurationError, SettingsError, TrajectoryError
 from dh2sim.messages import did_you_mean, listed, printable, shown
+from dh2sim.progress import Advance
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from contextlib import AbstractContextManager
 
     from dh2sim.model.robot_model import RobotModel
@@ -134,7 +134,7 @@ def trajectory(
         "free": free or (file and file.free),
     }
 
-    def stage(doing: str, what: str, total: int) -> AbstractContextManager[Callable[[int], None]]:
+    def stage(doing: str, what: str, total: int) -> AbstractContextManager[Advance]:
         return progress_bar(doing, what, total, after=_SOON)
 
     try:

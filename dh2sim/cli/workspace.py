@@ -12,9 +12,9 @@ from dh2sim.cli.output import json_text, progress_bar, table_lines, wrapped
 from dh2sim.errors import OutputError
 from dh2sim.files import require_folder
 from dh2sim.messages import printable, shown
+from dh2sim.progress import Advance
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from contextlib import AbstractContextManager
 
     from dh2sim.robot.spec import Units
@@ -85,7 +85,7 @@ def workspace(
 
     from dh2sim.workspace.workspace import ORIENTATIONS, compute_workspace
 
-    def stage(doing: str, what: str, total: int) -> AbstractContextManager[Callable[[int], None]]:
+    def stage(doing: str, what: str, total: int) -> AbstractContextManager[Advance]:
         return progress_bar(doing, what, total, quiet=quiet)
 
     found = compute_workspace(

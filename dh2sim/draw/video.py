@@ -12,7 +12,7 @@ import os
 import signal
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -26,6 +26,7 @@ from dh2sim.errors import PictureError
 from dh2sim.extras import require_extra
 from dh2sim.files import atomic_file
 from dh2sim.messages import shown
+from dh2sim.progress import Advance, no_progress
 
 Picture = NDArray[np.uint8]
 """Red, green, blue, shape (height, width, 3)."""
@@ -214,7 +215,7 @@ def write_video(
     motion: Motion,
     options: PictureOptions,
     speed: VideoSpeed,
-    advance: Callable[[int], None] = lambda _: None,
+    advance: Advance = no_progress,
 ) -> int:
     """Write a video of a motion, whole or not at all.
 
@@ -267,7 +268,7 @@ def write_image(out: Path, motion: Motion, options: PictureOptions, number: int)
         Image.fromarray(renderer.picture(number)).save(draft, format="PNG", optimize=True)
 
 
-def _pictures(renderer: MotionRenderer, positions: list[int], advance: Callable[[int], None]) -> Iterator[Picture]:
+def _pictures(renderer: MotionRenderer, positions: list[int], advance: Advance) -> Iterator[Picture]:
     for number in positions:
         yield renderer.picture(number)
         advance(1)

@@ -19,6 +19,7 @@ from dh2sim.kinematics.loop_batch import LoopBatch, blocks
 from dh2sim.kinematics.loop_closure import assembly
 from dh2sim.kinematics.loop_motion import LONGEST, Continuation, actuated_joints
 from dh2sim.kinematics.tree import joint_values
+from dh2sim.progress import Advance, no_progress
 from dh2sim.typing import Array, read_only
 
 _TURN: Final = 2.0 * math.pi
@@ -46,7 +47,7 @@ class DrivenBranch:
         q: ArrayLike,
         places: ArrayLike,
         values: ArrayLike,
-        advance: Callable[[int], None] = lambda _: None,
+        advance: Advance = no_progress,
     ) -> None:
         """Follow the mechanism along the path.
 
@@ -85,9 +86,7 @@ class DrivenBranch:
         self._places, self._q = (np.array(each) for each in zip(*ordered, strict=True))
         self._slopes = self._rates(self._q)
 
-    def _along(
-        self, q: Array, places: Array, values: Array, advance: Callable[[int], None]
-    ) -> Iterator[tuple[float, Array]]:
+    def _along(self, q: Array, places: Array, values: Array, advance: Advance) -> Iterator[tuple[float, Array]]:
         """Yield anchors along the path."""
         yield float(places[0]), q
         here, scale = 0, self._loops.scale[self._driven]
@@ -102,7 +101,7 @@ class DrivenBranch:
             advance(there - here)
             here = there
 
-    def _by_turns(self, q: Array, values: Array, advance: Callable[[int], None]) -> Iterator[tuple[float, Array]]:
+    def _by_turns(self, q: Array, values: Array, advance: Advance) -> Iterator[tuple[float, Array]]:
         """Yield anchors over the coordinate of the joint that moves alone, of one turn if all are the same."""
         start, span = float(values[0]), float(np.ptp(values))
         yield start, q
@@ -131,7 +130,7 @@ class DrivenBranch:
         off = np.where(self._turns, np.remainder(q - other + math.pi, _TURN) - math.pi, q - other)
         return bool(np.abs(off / self._loops.scale).max() <= _SAME)
 
-    def at(self, places: ArrayLike, values: ArrayLike, advance: Callable[[int], None] = lambda _: None) -> DrivenPath:
+    def at(self, places: ArrayLike, values: ArrayLike, advance: Advance = no_progress) -> DrivenPath:
         """Return the mechanism at points of the path.
 
         Args:

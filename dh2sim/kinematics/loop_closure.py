@@ -111,24 +111,6 @@ def constraint_jacobian(tree: KinematicTree, q: ArrayLike) -> Array:
     return read_only(rows).reshape(len(rows), tree.n)
 
 
-def closure_residual(tree: KinematicTree, q: ArrayLike) -> tuple[Array, list[bool]]:
-    """Return how far the constraints are from being met, m and rad, and which of them are lengths.
-
-    Args:
-        tree: The mechanism.
-        q: Joint vector, rad and m, shape (n,).
-
-    Raises:
-        ConfigurationError: ``q`` has the wrong shape or is not finite.
-    """
-    residual: list[float] = []
-    lengths: list[bool] = []
-    for rows in _closure_rows(tree, q):
-        residual += rows.positions + rows.rotations
-        lengths += [True] * len(rows.positions) + [False] * len(rows.rotations)
-    return read_only(residual), lengths
-
-
 def _closure_rows(tree: KinematicTree, q: ArrayLike) -> Iterator[_Rows]:
     poses = body_poses(tree, q)
     for closure in tree.closures:

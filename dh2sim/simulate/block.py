@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dh2sim.errors import ControllerError, EngineError
 from dh2sim.messages import listed
 from dh2sim.processors import available_processors
+from dh2sim.progress import Advance
 from dh2sim.robot.variation import CELLS
 from dh2sim.simulate.batch import BatchObservation, GravityForces, MonitoredBatch
 from dh2sim.simulate.controllers.position import holding_controls
@@ -65,9 +66,7 @@ class Job:
     """Where rollouts have designs of their own; ``plant`` is that of the robot file then."""
 
 
-def simulate_block(
-    job: Job, rollouts: range, *, threads: int = 0, advance: Callable[[int], None] | None = None
-) -> Block:
+def simulate_block(job: Job, rollouts: range, *, threads: int = 0, advance: Advance | None = None) -> Block:
     """Simulate some rollouts of a run.
 
     Args:

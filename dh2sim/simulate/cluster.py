@@ -25,6 +25,7 @@ import numpy as np
 from dh2sim.errors import Dh2simError, ExecutorError, RunDiffersError, RunError, SettingsError
 from dh2sim.extras import require_extra
 from dh2sim.processors import available_processors
+from dh2sim.progress import Advance
 from dh2sim.simulate.block import BATCH_SIZE, Block, Job, simulate_block
 from dh2sim.simulate.initial_states import InitialStates
 from dh2sim.simulate.store.places import open_store
@@ -114,7 +115,7 @@ def fill_on(
     *,
     blocks: Sequence[int],
     threads: int,
-    done: Callable[[int], None],
+    done: Advance,
     stopping: Callable[[], bool],
 ) -> bool:
     """Have the blocks of a stored run simulated and committed; return whether all were, or it was asked to stop.
@@ -144,7 +145,7 @@ def fill_on(
     return _all_done(submit, blocks, lambda block, _: done(block), stopping)
 
 
-def simulate_on(executor: Executor, job: Job, *, threads: int, done: Callable[[int], None]) -> Block:
+def simulate_on(executor: Executor, job: Job, *, threads: int, done: Advance) -> Block:
     """Return the whole run, simulated by the workers of an executor.
 
     Args:

@@ -19,6 +19,7 @@ from dh2sim.kinematics.loop_motion import named_configuration
 from dh2sim.messages import listed
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.progress import Advance, no_progress
 from dh2sim.simulate.block import Job, rehearse
 from dh2sim.simulate.controllers.registry import ControllerChoice, choose
 from dh2sim.simulate.dataset_layout import FORMAT, TAKEN, design_variables, rollout_bytes, run_layout
@@ -54,7 +55,7 @@ def prepare(
     options: RolloutOptions,
     *,
     command: str = "",
-    checked: Callable[[int], None] = lambda _: None,
+    checked: Advance = no_progress,
 ) -> Job:
     """Make a robot ready to be simulated.
 
@@ -130,7 +131,7 @@ def prepare(
     return job
 
 
-def _designs(model: RobotModel | MechanismModel, options: RolloutOptions, checked: Callable[[int], None]) -> Designs:
+def _designs(model: RobotModel | MechanismModel, options: RolloutOptions, checked: Advance) -> Designs:
     """Return the designs of a run, each of which there is a robot of.
 
     Raises:

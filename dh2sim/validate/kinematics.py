@@ -10,7 +10,7 @@ import math
 import os
 import time
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Protocol
@@ -22,6 +22,7 @@ from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import forward_kinematics, frame_poses, geometric_jacobian
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
+from dh2sim.progress import Advance
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from dh2sim.validate.report import Check, Quantity, Worst
@@ -94,7 +95,7 @@ def check_poses(
     extent: float,
     *,
     threads: int = 1,
-    advance: Callable[[int], None] | None = None,
+    advance: Advance | None = None,
 ) -> Check:
     """Compare an engine's frames with the table's.
 

@@ -25,6 +25,7 @@ from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.slips import find_slips
 from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
+from dh2sim.progress import Advance
 from dh2sim.robot.read import load_robot
 from dh2sim.typing import Array
 from dh2sim.validate.dynamics import check_dynamics, check_inertias
@@ -51,7 +52,6 @@ SLOWEST_SAMPLES = 200
 JACOBIAN_SAMPLES = 200
 DYNAMICS_SAMPLES = 20
 
-Advance = Callable[[int], None]
 Mover = MujocoEngine | PinocchioEngine | PybulletEngine
 """An engine with Jacobians and dynamics."""
 Engine = TypeVar("Engine", bound=Mover | YourdfpyEngine)

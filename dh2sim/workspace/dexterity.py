@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal, TypeAlias
 
@@ -16,6 +15,7 @@ from dh2sim.inverse.solver import InverseSolver
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian
 from dh2sim.kinematics.sampling import scattered_configurations
+from dh2sim.progress import Advance, no_progress
 from dh2sim.robot.spec import JointType, Limits, RobotSpec
 from dh2sim.typing import Array, read_only
 from dh2sim.workspace.point import STILL
@@ -63,7 +63,7 @@ def dexterity_at(
     *,
     travel: tuple[Array, Array],
     turn: Turn | None = None,
-    advance: Callable[[int], None] = lambda _: None,
+    advance: Advance = no_progress,
 ) -> Dexterity:
     """Return in which share of orientations tool0 reaches positions inside the limits.
 

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from dh2sim.progress import Advance, no_progress
 from dh2sim.typing import Array, read_only
 from dh2sim.workspace.point import Coordinates, Flags
 from dh2sim.workspace.reaching import reach
@@ -75,7 +76,7 @@ def find_region(
     *,
     scale: float,
     half_plane: bool = False,
-    advance: Callable[[int], None] = lambda _: None,
+    advance: Advance = no_progress,
 ) -> Region:
     """Find the region that two coordinates of a point reach.
 
@@ -117,7 +118,7 @@ class _Search:
         size: float,
         scale: float,
         half_plane: bool,
-        advance: Callable[[int], None],
+        advance: Advance,
     ) -> None:
         self.coordinates, self.size, self.scale, self.half_plane = coordinates, size, scale, half_plane
         self._advance = advance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.kinematics.sampling import random_configurations
+from dh2sim.progress import Advance
 from dh2sim.typing import Array, read_only
 from dh2sim.workspace.point import AroundAxis, InBasis, PointMap, motion_rank
 from dh2sim.workspace.region import Curve, Region, find_region
@@ -69,9 +70,7 @@ def around_first_axis(point: PointMap) -> AroundAxis:
     return AroundAxis(point.without_first(), np.where(np.abs(foot) < 1e-12, 0.0, foot), direction)
 
 
-def turned_section(
-    point: PointMap, names: Sequence[str], size: float, seed: int, advance: Callable[[int], None]
-) -> Section:
+def turned_section(point: PointMap, names: Sequence[str], size: float, seed: int, advance: Advance) -> Section:
     """Return the section of an arm whose first joint turns.
 
     Args:
@@ -91,9 +90,7 @@ def turned_section(
     return replace(section, turns_about=names[first], full_turn_volume=full, volume=full * share)
 
 
-def planar_section(
-    point: PointMap, axes: Array, origin: Array, size: float, seed: int, advance: Callable[[int], None]
-) -> Section:
+def planar_section(point: PointMap, axes: Array, origin: Array, size: float, seed: int, advance: Advance) -> Section:
     """Return what a planar arm reaches in its plane: axes, shape (2, 3), and a point of it, shape (3,)."""
     plane = InBasis(point, axes, origin)
     return _section(plane, point, axis_labels(axes), axes, size, seed, advance)[0]
@@ -112,7 +109,7 @@ def _section(
     directions: Array,
     size: float,
     seed: int,
-    advance: Callable[[int], None],
+    advance: Advance,
 ) -> tuple[Section, Region, Array]:
     """Return the section in two coordinates of a point, its region, and the configurations searched from."""
     q = random_configurations(point.sample_low, point.sample_high, SAMPLES, [seed, 1])

@@ -84,10 +84,6 @@ def plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def no_progress(_rollouts: int) -> None:
-    """Ignore progress."""
-
-
 @contextmanager
 def output_files(paths: Sequence[Path], *, run: Place, overwrite: bool) -> Iterator[list[Path]]:
     """Yield temporary files to write to; when the block ends well they become ``paths``, all or none.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,8 @@ import numpy as np
 
 from dh2sim.extras import require_extra
 from dh2sim.files import signals_deferred
-from dh2sim.simulate.convert.blocks import RunBlocks, attribute_text, no_progress, open_blocks, output_files, plain
+from dh2sim.progress import Advance, no_progress
+from dh2sim.simulate.convert.blocks import RunBlocks, attribute_text, open_blocks, output_files, plain
 from dh2sim.simulate.store.storage import Place
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def to_hdf5(
     out: Path,
     *,
     overwrite: bool = False,
-    advance: Callable[[int], None] = no_progress,
+    advance: Advance = no_progress,
 ) -> tuple[Path, ...]:
     """Write a run as an HDF5 file.
 

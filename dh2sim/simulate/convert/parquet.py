@@ -8,15 +8,15 @@ recorded is null: the last step of interval variables, all that follows an early
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dh2sim.extras import require_extra
+from dh2sim.progress import Advance, no_progress
 from dh2sim.simulate.convert.blocks import (
     attribute_text,
-    no_progress,
     open_blocks,
     output_files,
     plain,
@@ -50,7 +50,7 @@ def to_parquet(
     out: Path,
     *,
     overwrite: bool = False,
-    advance: Callable[[int], None] = no_progress,
+    advance: Advance = no_progress,
 ) -> tuple[Path, ...]:
     """Write a run as Parquet tables.
 
