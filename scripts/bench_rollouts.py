@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -15,12 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dh2sim.processors import available_processors
 from scripts.bench_timing import Ratios, Row, Usage, measure, run_python
 
 if TYPE_CHECKING:
     from dh2sim.simulate.block import Job
 
 ROLLOUTS, STEPS = 1024, 2000
+TOGETHER = 256
+"""Rollouts of a closed loop of one's own, and of MuJoCo's calls alone."""
 RECORD = ("qpos", "qvel", "ctrl")
 
 
@@ -35,30 +37,77 @@ def rollouts() -> Iterator[Row]:
     model = mujoco.MjModel.from_xml_string(mjcf)  # as exported
     lean = mujoco.MjModel.from_xml_string(mjcf)
     lean.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_SENSOR)  # as simulated: no sensor is recorded
-    ceiling, lowest, stock, closed = Ratios(), Ratios(), Ratios(), Ratios()
+    ceiling, lowest, stock, closed, least, own_loop = (Ratios() for _ in range(6))
     runs: list[Usage] = []
+    calls_alone = _calls_alone()
     with TemporaryDirectory() as folder:
-        _run(folder, "hold", 64)  # so that nothing is imported while the clock runs
-        _run(folder, "computed-torque", 64)
+        for controller in ("hold", "computed-torque", Spring):  # so that nothing is imported while the clock runs
+            _run(folder, controller, 64)
         for _ in range(7):
             with quiet_engine():
-                floor = measure(lambda: _bare_steps(model, q0, ctrl))
-                least = measure(lambda: _bare_steps(lean, q0, ctrl))
+                bare = measure(lambda: _bare_steps(model, q0, ctrl))
+                without_sensors = measure(lambda: _bare_steps(lean, q0, ctrl))
             own = measure(lambda: _run(folder, "hold", ROLLOUTS))
             runs.append(own)
-            ceiling.add(floor, own)
-            lowest.add(least, own)
+            ceiling.add(bare, own)
+            lowest.add(without_sensors, own)
             stock.add(measure(lambda: _stock_rollout(model, q0, ctrl)), own)
-            closed.add(own, measure(lambda: _run(folder, "computed-torque", ROLLOUTS)))
-    threads = os.cpu_count() or 1
+            closed.add(measure(lambda: _run(folder, "computed-torque", ROLLOUTS)), own)
+            some = measure(lambda: _run(folder, "hold", TOGETHER))
+            own_loop.add(measure(lambda: _run(folder, Spring, TOGETHER)), some)
+            with quiet_engine():
+                least.add(measure(calls_alone), some)
+    threads = available_processors()
     rate = threads * ROLLOUTS * STEPS / statistics.median(usage.cpu for usage in runs)
     by_wall = ROLLOUTS * STEPS / statistics.median(usage.wall for usage in runs)
     figure = f"{rate:,.0f}, by wall time {by_wall:,.0f}"
     yield f"steps/s end to end into Zarr, {threads} idle processors", figure, "", None
-    yield ceiling.row("mj_step in C, nothing recorded / the same steps into Zarr", least=0.9)
+    yield ceiling.row("mj_step in C, nothing recorded / the same steps into Zarr", least=0.95)
     yield lowest.row("mj_step in C without sensors / the same steps into Zarr")
-    yield stock.row("mujoco.rollout, left in memory / the same steps into Zarr", least=1.2)
-    yield closed.row("hold into Zarr / computed-torque into Zarr", least=0.4)
+    yield stock.row("mujoco.rollout, left in memory / the same steps into Zarr", least=1.25)
+    yield closed.row("computed-torque / hold, both into Zarr", most=1.3)
+    yield least.row(f"MuJoCo's calls alone, step by step / hold, {TOGETHER} rollouts")
+    yield own_loop.row(f"spring and damper in Python / hold, {TOGETHER} rollouts into Zarr", most=1.5)
+
+
+class Spring:
+    """A closed loop of one's own: a spring and damper to the start, with gravity and other forces balanced."""
+
+    actuation = "motor"
+
+    def __init__(self, batch: Any) -> None:
+        """Remember the start."""
+        self._start = batch.q0
+
+    def control(self, observation: Any) -> NDArray[np.float64]:
+        """Return torques and forces, shape (batch, n)."""
+        torque = observation.bias + 5.0 * (self._start - observation.q) - 0.5 * observation.v
+        return np.asarray(torque)
+
+
+def _calls_alone() -> Callable[[], None]:
+    """Return what drives arms by the torques of computed torque, one step at a time, without computing them anew."""
+    from mujoco.batch import Batch
+
+    from dh2sim.simulate.block import simulate_block
+    from dh2sim.simulate.mujoco_runtime import VELOCITY_STAGE
+
+    job = _job("computed-torque", TOGETHER)
+    block = simulate_block(job, range(TOGETHER))
+    torques = np.ascontiguousarray(block["ctrl"].swapaxes(0, 1))
+
+    def step_by_step() -> None:
+        batch = Batch(job.plant.model, TOGETHER, available_processors(), persistent=True)
+        batch.bind("qpos")[:] = block["qpos"][:, 0]
+        for field in ("M", "qfrc_bias", "qfrc_passive", "ncon"):
+            batch.bind(field)
+        controls = batch.bind("ctrl")
+        batch.forward(stage=VELOCITY_STAGE)
+        for torque in torques:
+            controls[:] = torque
+            batch.step(stage=VELOCITY_STAGE)
+
+    return step_by_step
 
 
 def memory() -> Iterator[Row]:
@@ -139,7 +188,7 @@ class _Paces:
         return statistics.median(paces)
 
 
-def _job(controller: str, count: int) -> Job:
+def _job(controller: str | type, count: int) -> Job:
     from dh2sim import build_model, load_robot
     from dh2sim.simulate.options import RolloutOptions
     from dh2sim.simulate.prepare import prepare
@@ -158,7 +207,7 @@ def _held_arms() -> tuple[str, NDArray[np.float64], NDArray[np.float64]]:
     return to_mjcf(build_model(load_robot("stanford"))), block["qpos"][:, 0], block["ctrl"][:, 0]
 
 
-def _run(folder: str, controller: str, count: int) -> None:
+def _run(folder: str, controller: str | type, count: int) -> None:
     """Simulate into Zarr, from the robot file's name to the last file that is safe on disk."""
     from dh2sim.simulate import rollout
 
@@ -178,7 +227,7 @@ def _bare_steps(model: Any, q0: NDArray[np.float64], ctrl: NDArray[np.float64]) 
     """Step the same arms in C on all processors; nothing is recorded."""
     import mujoco
 
-    threads = os.cpu_count() or 1
+    threads = available_processors()
 
     def work(thread: int) -> None:
         data = mujoco.MjData(model)
@@ -196,7 +245,7 @@ def _stock_rollout(model: Any, q0: NDArray[np.float64], ctrl: NDArray[np.float64
     import mujoco
     import mujoco.rollout
 
-    threads = os.cpu_count() or 1
+    threads = available_processors()
     size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)
     initial = np.zeros((len(q0), size))
     initial[:, 1 : 1 + q0.shape[1]] = q0
