@@ -70,6 +70,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in text)
 
 
+def bug_text(error: Exception) -> str:
+    """Return what to say of an error that is no fault of the user's."""
+    return f"This is a bug in dh2sim, please report it: {type(error).__name__}: {error}"
+
+
 def counted(count: int, noun: str) -> str:
     """Return a number with a noun whose plural ends in s, as in '1 row' and '1,200 rows'."""
     return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import re
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dh2sim.cli.common import RobotArgument, StrictOption, load_one, report_slips, words_of
 from dh2sim.cli.output import require_free
+from dh2sim.errors import Dh2simError
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from dh2sim.model.mechanism import MechanismModel
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.robot.spec import RobotSpec
     from dh2sim.trajectory.files import SampledTrajectory
-    from dh2sim.view.server import PageServer
     from dh2sim.view.state import ViewState
 
 DEFAULT_PORT = 8080
@@ -86,6 +85,7 @@ def view(
     if export is not None and export.suffix.lower() not in (".html", ".htm"):
         raise typer.BadParameter(f"must be a file that ends in .html, got {str(export)!r}", param_hint="--export")
     require_free(export, force=force)
+    _require_robot(robot, run)
     spec = load_one(robot)
     if spec.is_mechanism:
         names = _host_names(allow_host)
@@ -104,6 +104,34 @@ def view(
         _serve(state, run, host=host, allow_hosts=_host_names(allow_host), port=port, browser=browser)
     else:
         _export(state, run, rollout, export, motion)
+
+
+def _require_robot(robot: str, run: Path | None) -> None:
+    """Refuse a run or a trajectory file in the place of its robot, and say how it is played."""
+    from dh2sim.trajectory.files import is_trajectory_file
+
+    path, owner = Path(robot), "ROBOT" if run is None else str(run)
+    if (path / "zarr.json").is_file():
+        from dh2sim.robot.catalog import builtin_path
+        from dh2sim.simulate.description import describe
+
+        what = "run"
+        with contextlib.suppress(Dh2simError):
+            recorded = describe(path).robot
+            if run is None and builtin_path(recorded) is not None:
+                owner = recorded
+    elif path.is_file() and is_trajectory_file(path) and (path.suffix.lower() != ".csv" or _begins_with_time(path)):
+        what = "trajectory file"
+    else:
+        return
+    raise Dh2simError(f"{robot}: is a {what}, not a robot; 'dh2sim view {owner} {robot}' plays it")
+
+
+def _begins_with_time(path: Path) -> bool:
+    """Return whether a table is one of a motion, not of Denavit-Hartenberg parameters."""
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        return re.match(rb'(\xef\xbb\xbf)?\s*"?time\b', file.read(64)) is not None
+    return False
 
 
 def _host_names(texts: list[str] | None) -> list[str]:
@@ -134,12 +162,7 @@ def _view_mechanism(
     model = build_mechanism(spec)
     motion = _motion(run, rollout, model)
     if export is None:
-        from dh2sim.view.mechanism.server import MechanismViewer
-
-        def serve(chosen: int) -> MechanismViewer:
-            return MechanismViewer(model, host=host, port=chosen, run=run, allow_hosts=allow_hosts)
-
-        _serve_pages(spec.name, serve, host=host, port=port, browser=browser)
+        _serve(model, run, host=host, allow_hosts=allow_hosts, port=port, browser=browser)
         return
     from dh2sim.draw.rollout_data import open_rollout
     from dh2sim.view.mechanism.scene import export_mechanism_page
@@ -150,33 +173,29 @@ def _view_mechanism(
 
 
 def _serve(
-    state: ViewState, run: Path | None, *, host: str, allow_hosts: list[str], port: int, browser: bool
+    shown: ViewState | MechanismModel,
+    run: Path | None,
+    *,
+    host: str,
+    allow_hosts: list[str],
+    port: int,
+    browser: bool,
 ) -> None:
     """Serve pages until the program is interrupted."""
-    from dh2sim.view.server import Viewer
-
-    def serve(chosen: int) -> Viewer:
-        return Viewer(state, host=host, port=chosen, run=run, allow_hosts=allow_hosts)
-
-    _serve_pages(state.spec.name, serve, host=host, port=port, browser=browser)
-
-
-def _serve_pages(name: str, serve: Callable[[int], PageServer[Any]], *, host: str, port: int, browser: bool) -> None:
     from dh2sim.view.access import ANY_ADDRESS, is_address
-    from dh2sim.view.server import free_port
+    from dh2sim.view.start import serve
 
     _use_one_arena()
-    chosen = free_port(host, port)
-    if chosen != port:
-        print(f"dh2sim: port {port} is taken; using {chosen}", file=sys.stderr)
-    viewer = serve(chosen)
+    viewer = serve(shown, host=host, port=port, run=run, allow_hosts=allow_hosts)
     try:
+        if viewer.port != port:
+            print(f"dh2sim: port {port} is taken; using {viewer.port}", file=sys.stderr)
         if not viewer.access.only_here:
             address = "any of its addresses" if host in ANY_ADDRESS else host
             print(f"dh2sim: anyone who can reach this machine at {address} can open the page", file=sys.stderr)
             names = ", ".join(each for each in viewer.access.names if not is_address(each))
             print(f"dh2sim: by an IP address or as {names}; --allow-host adds a name", file=sys.stderr)
-        print(f"{name}: {viewer.url}  (stop with Ctrl-C)", flush=True)
+        print(f"{shown.spec.name}: {viewer.url}  (stop with Ctrl-C)", flush=True)
         if browser:
             viewer.open_browser()
         viewer.wait()

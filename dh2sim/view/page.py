@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, TypeAlias
 
 from dh2sim.errors import Dh2simError
-from dh2sim.messages import printable
+from dh2sim.messages import bug_text, printable
 from dh2sim.view.events import Event, Notify
 from dh2sim.view.motion.dragging import LinkGrabs, ToolHandle
 from dh2sim.view.motion.motion_source import MotionControl
@@ -39,10 +39,6 @@ Task: TypeAlias = "Event | Callable[[], None]"
 def is_disconnect(error: Exception) -> bool:
     """Return whether an error only means that the browser was closed or the server stopped."""
     return any(words in str(error) for words in DISCONNECTED)
-
-
-def _bug(error: Exception) -> str:
-    return f"This is a bug in dh2sim, please report it: {type(error).__name__}: {error}"
 
 
 class Page:
@@ -110,7 +106,7 @@ class Page:
             self._work()
         except Exception as error:
             if not is_disconnect(error):
-                _log.error("dh2sim: a page was closed. %s", printable(_bug(error)))
+                _log.error("dh2sim: a page was closed. %s", printable(bug_text(error)))
                 self._disconnect()
 
     def _work(self) -> None:
@@ -161,7 +157,7 @@ class Page:
         except Dh2simError as error:
             self.apply(Notify(notice=str(error)))
         except Exception as error:  # the page goes on
-            self.apply(Notify(notice=_bug(error)))
+            self.apply(Notify(notice=bug_text(error)))
 
     def apply(self, event: Event) -> None:
         """Apply an event at once; on the page's own thread alone."""

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import Final
 
 from dh2sim.errors import ConfigurationError, Dh2simError
+from dh2sim.messages import bug_text
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.view.events import Event, FoundWorkspace, SearchWorkspace
 from dh2sim.view.state import Part, ViewState
@@ -63,6 +64,8 @@ class ReachSearch:
             return
         except Dh2simError as error:
             event = FoundWorkspace(model=model, workspace=None, note=f"The workspace cannot be computed: {error}")
+        except Exception as error:  # the page goes on
+            event = FoundWorkspace(model=model, workspace=None, note=bug_text(error))
         if not stop.is_set():
             self._send(event)
 

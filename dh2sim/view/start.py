@@ -1,15 +1,44 @@
-"""Starts the viewer of a robot, from code."""
+"""Starts the viewer of a robot or a mechanism, for code and for the command line."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
-from dh2sim.model.mechanism import build_mechanism
+from dh2sim.model.mechanism import MechanismModel, build_mechanism
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.view.initial_state import folder_of, open_state
 from dh2sim.view.mechanism.server import MechanismViewer
 from dh2sim.view.server import PageServer, Viewer, free_port
+from dh2sim.view.state import ViewState
+
+
+def serve(
+    shown: ViewState | MechanismModel,
+    *,
+    host: str,
+    port: int,
+    run: Path | None = None,
+    allow_hosts: Iterable[str] = (),
+) -> PageServer[Any]:
+    """Serve pages of a robot, in its initial state, or of a mechanism.
+
+    Args:
+        shown: The robot's state, or the mechanism.
+        host: Address to listen at.
+        port: Port to listen at, or the next that is free.
+        run: A run of the same robot that pages can play.
+        allow_hosts: Names of this machine that browsers may use, besides those that it knows of itself.
+
+    Raises:
+        RunError: The run cannot be read, or is of a robot with other joints.
+        Dh2simError: Nobody can listen at this address.
+    """
+    free = free_port(host, port)
+    if isinstance(shown, MechanismModel):
+        return MechanismViewer(shown, host=host, port=free, run=run, allow_hosts=allow_hosts)
+    return Viewer(shown, host=host, port=free, run=run, allow_hosts=allow_hosts)
 
 
 def start_viewer(
@@ -21,14 +50,12 @@ def start_viewer(
     allow_hosts: Iterable[str] = (),
 ) -> PageServer[Any]:
     """Show a robot or a mechanism in the browser, and return at once: see ``Robot.view``."""
-    free = free_port(host, port)
-    viewer: PageServer[Any]
+    shown: ViewState | MechanismModel
     if spec.is_mechanism:
-        viewer = MechanismViewer(build_mechanism(spec), host=host, port=free, allow_hosts=allow_hosts)
+        shown = build_mechanism(spec)
     else:
-        file = spec.source_file
-        state = open_state(spec, None if file is None else folder_of(file.path))
-        viewer = Viewer(state, host=host, port=free, allow_hosts=allow_hosts)
+        shown = open_state(spec, None if spec.source_file is None else folder_of(spec.source_file.path))
+    viewer = serve(shown, host=host, port=port, allow_hosts=allow_hosts)
     if browser:
         viewer.open_browser()
     return viewer

@@ -339,6 +339,25 @@ def test_pages_are_never_shared_over_the_internet(word: str) -> None:
     assert done.err.endswith(f"--share must be 'never', got {word!r}; pages are never shared over the internet\n")
 
 
+def test_a_run_in_the_place_of_its_robot_is_refused_with_how_to_play_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert (
+        dh2sim("rollout", "stanford", "--rollouts", "1", "--steps", "1", "--out", "run.zarr", "--quiet").status == 0
+    )
+    Path("motion.csv").write_text("time,joint_1\n0,0\n1,1\n", encoding="utf-8")
+    Path("table.csv").write_text("theta,d,a,alpha\nq1,0,1,0\n", encoding="utf-8")
+    for arguments, refusal in (
+        (["run.zarr"], "run.zarr: is a run, not a robot; 'dh2sim view stanford run.zarr' plays it"),
+        (["run.zarr", "scara"], "run.zarr: is a run, not a robot; 'dh2sim view scara run.zarr' plays it"),
+        (["motion.csv"], "motion.csv: is a trajectory file, not a robot; 'dh2sim view ROBOT motion.csv' plays it"),
+    ):
+        done = dh2sim("view", *arguments, "--no-browser")
+        assert (done.status, done.out, done.err) == (2, "", f"dh2sim: {refusal}\n")
+    assert "trajectory" not in dh2sim("view", "table.csv", "--no-browser").err
+
+
 @pytest.mark.slow
 def test_a_missing_run_is_refused_before_anything_is_served(tmp_path: Path) -> None:
     done = dh2sim_process("view", "stanford", "run.zarr", "--no-browser", cwd=tmp_path)

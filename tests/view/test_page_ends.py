@@ -12,10 +12,15 @@ import websockets
 
 from dh2sim.errors import Dh2simError
 from dh2sim.robot.read import load_robot
+from dh2sim.view.events import Event, FoundWorkspace, Show
 from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import is_disconnect
+from dh2sim.view.reach_search import ReachSearch
 from dh2sim.view.server import Viewer, free_port
-from tests.view.on_page import wait_until
+from dh2sim.view.state import Part
+from dh2sim.workspace import workspace
+from tests.view.on_page import DEADLINE, wait_until
+from tests.view.states import STANFORD, after
 from tests.view.without_browser import speaking
 
 
@@ -66,6 +71,19 @@ def test_a_page_that_is_closed_leaves_what_is_queued() -> None:
             assert not done.is_set()
     finally:
         viewer.stop()
+
+
+def test_a_search_that_fails_is_reported_on_its_page_and_not_in_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_arguments: object, **_options: object) -> None:
+        raise ValueError("a bug")
+
+    monkeypatch.setattr(workspace, "compute_workspace", fail)
+    sent: list[Event] = []
+    search = ReachSearch(sent.append)
+    search.show(after(STANFORD, Show(part=Part.WORKSPACE, on=True)))
+    search.join(DEADLINE)
+    assert isinstance(sent[-1], FoundWorkspace)
+    assert sent[-1].note == "This is a bug in dh2sim, please report it: ValueError: a bug"
 
 
 def test_no_page_is_served_if_requests_cannot_be_checked(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.loop_motion import named_configuration
 from dh2sim.kinematics.transforms import rpy_from_rotation
 from dh2sim.kinematics.tree import body_poses, placed
-from dh2sim.messages import listed, printable
+from dh2sim.messages import bug_text, listed, printable
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.view.mechanism.motion import MechanismMotion
 from dh2sim.view.mechanism.scene import PATH, frame_path, mechanism_page_html, mechanism_scene
@@ -107,7 +107,7 @@ class MechanismPage:
                 self._show()
         except Exception as error:
             if not is_disconnect(error):
-                _log.error("dh2sim: a page was closed. %s", printable(f"{type(error).__name__}: {error}"))
+                _log.error("dh2sim: a page was closed. %s", printable(bug_text(error)))
                 self._disconnect()
 
     def _take(self) -> bool:
@@ -135,6 +135,8 @@ class MechanismPage:
             task()
         except Dh2simError as error:
             self._notice = str(error)
+        except Exception as error:  # the page goes on
+            self._notice = bug_text(error)
 
     def _build(self) -> None:
         """Add the widgets."""
