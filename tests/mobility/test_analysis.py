@@ -241,7 +241,7 @@ def _area(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
     return abs(float(np.linalg.det([b - a, c - a])))
 
 
-@settings(max_examples=25)
+@settings(max_examples=max(25, settings().max_examples // 5))
 @given(st.lists(POINT, min_size=4, max_size=4, unique=True))
 def test_every_four_bar_that_is_not_in_a_line_moves_with_one_freedom(points: list[tuple[float, float]]) -> None:
     corners = np.array(points)
@@ -249,7 +249,7 @@ def test_every_four_bar_that_is_not_in_a_line_moves_with_one_freedom(points: lis
     assert numbers(planar_loop(*points)) == (3, 1, 1, 1)
 
 
-@settings(max_examples=10)
+@settings(max_examples=max(10, settings().max_examples // 5))
 @given(st.integers(5, 8), st.integers(0, 10_000))
 def test_planar_and_spherical_loops_have_three_freedoms_less_than_joints(count: int, seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -257,14 +257,14 @@ def test_planar_and_spherical_loops_have_three_freedoms_less_than_joints(count: 
     assert numbers(spherical_loop(*random.normal(size=(count, 3)))) == (3, count - 3, count - 3, count - 3)
 
 
-@settings(max_examples=10)
+@settings(max_examples=max(10, settings().max_examples // 5))
 @given(st.integers(4, 9), st.integers(0, 10_000))
 def test_spatial_loops_have_six_freedoms_less_than_joints(count: int, seed: int) -> None:
     expected = max(0, count - 6)
     assert numbers(random_loop(count, seed)) == (6, count - 6, expected, expected)
 
 
-@settings(max_examples=10)
+@settings(max_examples=max(10, settings().max_examples // 5))
 @given(st.floats(0.3, 1.2), st.floats(0.4, 0.95), st.floats(0.4, 2.0), st.floats(0.05, 0.5), st.integers(0, 3))
 def test_bennett_moves_with_its_ratio_and_is_rigid_without(
     alpha: float, ratio: float, theta: float, turned: float, joint: int
@@ -279,7 +279,7 @@ def test_bennett_moves_with_its_ratio_and_is_rigid_without(
     assert mobility_of(violated).finite == 0
 
 
-@settings(max_examples=8)
+@settings(max_examples=max(8, settings().max_examples // 5))
 @given(st.floats(0.5, 3), st.floats(0.5, 3), st.floats(0.3, 2.8))
 def test_folded_parallelograms_branch_and_others_do_not(ground: float, crank: float, angle: float) -> None:
     assume(abs(ground - crank) > 0.05)

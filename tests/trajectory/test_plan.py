@@ -127,7 +127,7 @@ def test_velocity_acceleration_and_jerk_are_the_derivatives(profile: str, kind: 
             np.testing.assert_allclose(differences / scale, planned.at(t)[order] / scale, atol=1e-3)
 
 
-@settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=max(15, settings().max_examples // 5), suppress_health_check=[HealthCheck.too_slow])
 @given(spec=robot_specs(max_rows=6), data=st.data())
 def test_random_robots_of_any_convention_keep_their_limits(spec: RobotSpec, data: st.DataObject) -> None:
     built = build_model(spec)
@@ -141,7 +141,9 @@ def test_random_robots_of_any_convention_keep_their_limits(spec: RobotSpec, data
 
 
 @pytest.mark.slow
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(
+    max_examples=max(6, settings().max_examples // 20), deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
 @given(spec=robot_specs(max_rows=7), seed=st.integers(0, 10**6))
 def test_lines_of_random_robots_are_straight_or_refused(spec: RobotSpec, seed: int) -> None:
     built = build_model(spec)
