@@ -28,6 +28,7 @@ from tests.view.on_page import (
     wait_for_text,
     wait_for_value,
     wait_for_whole_text,
+    wait_for_work,
     wait_until,
 )
 from tests.view.without_browser import speaking
@@ -159,7 +160,7 @@ def speaker(viewer: Viewer) -> Iterator[tuple[ServedPage, Callable[..., None]]]:
     with speaking(viewer.url) as say:
         wait_until(lambda: len(viewer.pages) == 1, "the page")
         (served,) = viewer.pages
-        wait_until(lambda: {OPEN, COMPARE} <= set(buttons(served).values()), "its buttons")
+        wait_for_work(served)  # whose turn comes once all is shown
         yield served, say
 
 

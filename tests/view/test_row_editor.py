@@ -13,7 +13,7 @@ from dh2sim.view.initial_state import open_state
 from dh2sim.view.page import Page as ServedPage
 from dh2sim.view.server import Viewer
 from dh2sim.view.state import ViewState
-from tests.view.on_page import DEADLINE, wait_until
+from tests.view.on_page import wait_for_work, wait_until
 from tests.view.states import STANFORD
 from tests.view.without_browser import speaking
 
@@ -34,9 +34,7 @@ def speaker(request: pytest.FixtureRequest) -> Iterator[Speaker]:
         with speaking(viewer.url) as say:
             wait_until(lambda: len(viewer.pages) == 1, "the page")
             (served,) = viewer.pages
-            shown = threading.Event()
-            served.send(shown.set)  # its turn comes once all is shown
-            assert shown.wait(DEADLINE), "all of its panel"
+            wait_for_work(served)  # whose turn comes once all is shown
             yield served, say
     finally:
         viewer.stop()
