@@ -61,6 +61,10 @@ class DesignFileError(RobotFileError):
     """A file of designs is wrong, or a robot that it describes."""
 
 
+class ArgumentError(Dh2simError, TypeError):
+    """An argument is of a kind that the function does not take."""
+
+
 class UnknownRobotError(Dh2simError):
     """Neither a file nor a robot that comes with dh2sim has this name."""
 

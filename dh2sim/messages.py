@@ -124,7 +124,7 @@ def member(kind: type[Choice], value: Choice | str, what: str, error: type[Dh2si
         Dh2simError: There is none; of the class ``error``.
     """
     for choice in kind:
-        if choice == value:
+        if isinstance(value, str) and choice == value:
             return choice
     raise error(f"unknown {what} {value!r}.{did_you_mean(str(value), kind)} Allowed: {listed(kind)}")
 

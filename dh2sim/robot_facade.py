@@ -10,14 +10,14 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Self, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.errors import Dh2simError
+from dh2sim.arguments import file_path, names
+from dh2sim.errors import ArgumentError, Dh2simError
 from dh2sim.kinematics.transforms import PoseLike, pose_of
 from dh2sim.messages import member
 from dh2sim.robot.spec import AngleUnit, BaseSpec, Convention, LengthUnit, PayloadSpec, RobotSpec, Row, ToolSpec
@@ -147,7 +147,9 @@ class Robot:
     @classmethod
     def of_model(cls, model: RobotModel) -> Self:
         """Return the robot of a model."""
-        return cls.from_spec(model.spec)
+        from dh2sim.kinematics.chain import spec_of
+
+        return cls.from_spec(spec_of(model))
 
     @classmethod
     def load(cls, path_or_name: FilePath) -> Self:
@@ -158,7 +160,7 @@ class Robot:
         """
         from dh2sim.robot.read import load_robot
 
-        reader = _READERS.get(Path(path_or_name).suffix.lower())
+        reader = _READERS.get(file_path("path_or_name", path_or_name).suffix.lower())
         if reader is not None:
             raise Dh2simError(f"{os.fspath(path_or_name)}: not a robot file; read it with Robot.{reader}")
         return cls.from_spec(load_robot(path_or_name))
@@ -507,7 +509,7 @@ class Robot:
         """
         from dh2sim.robot.write import save_robot
 
-        save_robot(self.spec, path, notes=self.notes, overwrite=overwrite)
+        save_robot(self.spec, file_path("path", path), notes=self.notes, overwrite=overwrite)
 
     def symbolic(self, what: What | str = "pose", **options: Unpack[SymbolicKeywords]) -> SymbolicForm:
         """Return the robot's kinematics or dynamics in symbols, compared with numbers; ``print`` shows it.
@@ -522,7 +524,7 @@ class Robot:
         """
         from dh2sim.symbolic.request import symbolic_form
 
-        in_numbers = what == "dynamics" and not options.get("letters")
+        in_numbers = isinstance(what, str) and what == "dynamics" and not options.get("letters")
         return symbolic_form(self.spec, what, bodies=self.model.bodies if in_numbers else None, **options)
 
     def code(
@@ -597,8 +599,11 @@ class Robot:
         """
         from dh2sim.export import Format, export_robot
 
-        wanted = list(dict.fromkeys(member(Format, format_, "format") for format_ in formats))
-        return export_robot(self._written, Path(out), formats=wanted, dh_frames=dh_frames, verified=verify)
+        chosen = [member(Format, format_, "format") for format_ in names("formats", formats)]
+        wanted = list(dict.fromkeys(chosen))
+        return export_robot(
+            self._written, file_path("out", out), formats=wanted, dh_frames=dh_frames, verified=verify
+        )
 
     def slips(self) -> tuple[Slip, ...]:
         """Return numbers that are allowed but rarely meant, such as degrees in a file of radians."""
@@ -780,9 +785,12 @@ class Robot:
         """
         from dh2sim.calibrate.calibration import calibrate
         from dh2sim.calibrate.data_file import read_measurements
+        from dh2sim.calibrate.measurements import Measurements
 
         if isinstance(data, str | os.PathLike):
             data = read_measurements(data, self, kind=kind, groups=groups)
+        if not isinstance(data, Measurements):
+            raise ArgumentError(f"data must be measurements or the path of a file, got {type(data).__name__}")
         return calibrate(self, data, **options)
 
     def plan_measurements(self, count: int, *, kind: str = "position", seed: int = 0) -> Plan:

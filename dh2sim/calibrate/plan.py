@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from dh2sim.arguments import whole_number
 from dh2sim.calibrate.calibration import random_vectors
 from dh2sim.calibrate.hayati_rows import fit_rows
 from dh2sim.calibrate.identify import find_basis
@@ -108,8 +109,7 @@ def plan_measurements(
         raise CalibrationError(
             "configurations for sockets cannot be chosen freely: the ball has to be in one; plan poses or positions"
         )
-    if count < 1:
-        raise CalibrationError(f"the number of configurations must be at least 1, got {count}")
+    count, seed = whole_number("count", count, least=1), whole_number("seed", seed)
     if count > MOST:
         raise CalibrationError(f"the number of configurations must be at most {MOST}, got {count}")
     length, angle = noise if isinstance(noise, tuple) else (noise, noise)

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from dh2sim.arguments import names
 from dh2sim.codegen.base_parameters import base_parameters
 from dh2sim.codegen.check import force_error, jacobian_error, pose_error
 from dh2sim.codegen.forward import joint_turns, tool_jacobian, tool_pose
@@ -66,7 +67,7 @@ def generate_code(
 def _asked_for(
     robot: ModelLike, what: What | str | Iterable[What | str], name: str | None
 ) -> tuple[Program, RobotSpec, RobotModel | None]:
-    wanted = {member(What, each, "code") for each in ([what] if isinstance(what, str) else what)}
+    wanted = {member(What, each, "code") for each in names("what", what)}
     if not wanted:
         raise Dh2simError(f"choose at least one of {', '.join(What)}")
     model = model_of(robot) if What.INVERSE_DYNAMICS in wanted else None

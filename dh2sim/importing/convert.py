@@ -85,7 +85,7 @@ def convert_robot(spec: SpecLike, to: TableFormLike, *, folder: Path | None = No
         MismatchError: The poses differ by more than rounding.
     """
     spec = spec_of(spec)
-    if to == Convention.HAYATI:
+    if isinstance(to, str) and to == Convention.HAYATI:
         raise Dh2simError("a table can be converted to standard, modified or compact, not to hayati")
     form = member(TableForm, str(to), "form of a table")
     compact = form is TableForm.COMPACT

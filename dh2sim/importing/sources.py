@@ -12,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from dh2sim.arguments import file_path
 from dh2sim.errors import Dh2simError
 from dh2sim.formats.calibration import is_calibration
 from dh2sim.formats.serial_robot import SerialRobot
@@ -115,7 +116,7 @@ def import_robot(
     """
     if not isinstance(options, ImportOptions):
         raise Dh2simError(f"options must be ImportOptions, got {options!r}")
-    file = os.fspath(path)
+    file = os.fspath(file_path("path", path))
     return import_data(read_file(Path(file)), file, options, folder=folder)
 
 

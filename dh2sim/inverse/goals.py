@@ -7,7 +7,8 @@ from typing import Final, Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.errors import ConfigurationError
+from dh2sim.arguments import real_array
+from dh2sim.errors import ArgumentError, ConfigurationError
 from dh2sim.messages import listed
 from dh2sim.typing import Array
 
@@ -32,8 +33,8 @@ def read_goals(T: ArrayLike) -> Array:
         ConfigurationError: They are no poses of finite numbers.
     """
     try:
-        poses = np.array(T, dtype=np.float64)
-    except (TypeError, ValueError):
+        poses = real_array("T", T)
+    except ArgumentError:
         raise ConfigurationError("the goal must be an array of real numbers") from None
     if poses.ndim not in (2, 3) or poses.shape[-2:] != (4, 4):
         shapes = "a pose of shape (4, 4), or poses of shape (N, 4, 4)"
@@ -69,5 +70,5 @@ def require_free(free: object) -> None:
     Raises:
         ConfigurationError: It is none of None, 'rotation' and 'roll'.
     """
-    if free is not None and free not in get_args(Free):
+    if free is not None and not (isinstance(free, str) and free in get_args(Free)):
         raise ConfigurationError(f"free must be None or one of {listed(map(repr, get_args(Free)))}, got {free!r}")

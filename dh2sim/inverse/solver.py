@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dh2sim.arguments import mapping, real_array
 from dh2sim.errors import ConfigurationError
 from dh2sim.inverse.branches import branch_names
 from dh2sim.inverse.elimination import Found, Method
@@ -139,7 +140,7 @@ class InverseSolver:
         goals = read_goals(T)
         poses = goals.reshape(-1, 4, 4)
         near = self._home if q0 is None else joint_vector(self._chain, q0)
-        locked = self._locked(lock or {}, len(poses))
+        locked = self._locked({} if lock is None else mapping("lock", lock), len(poses))
         require_free(free)
         count = len(self.names) - len(locked)
         if not numeric and count > MOST_JOINTS:
@@ -466,7 +467,7 @@ class InverseSolver:
             if name not in self.names:
                 hint = did_you_mean(name, self.names)
                 raise ConfigurationError(f"unknown joint {shown(name)} to lock.{hint} Joints: {listed(self.names)}")
-            value = np.atleast_1d(np.asarray(given, dtype=np.float64))
+            value = np.atleast_1d(real_array(f"lock[{name!r}]", given))
             if value.shape not in ((1,), (poses,)) or not np.isfinite(value).all():
                 raise ConfigurationError(
                     f"the value of {name}, which is locked, must be a finite number, or one for each pose"

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dh2sim.arguments import real_array
 from dh2sim.errors import ConfigurationError
 from dh2sim.inverse.branches import names_of_form
 from dh2sim.inverse.textbook_axes import EXACT, arm_axes, wrapped
@@ -136,7 +137,7 @@ def explain_inverse_kinematics(robot: SpecLike, T: ArrayLike) -> Explanation:
         ConfigurationError: ``T`` is not a pose.
     """
     spec = spec_of(robot)
-    goal = np.asarray(T, dtype=np.float64)
+    goal = real_array("T", T)
     if goal.shape != (4, 4) or not np.isfinite(goal).all():
         raise ConfigurationError(f"a pose must be an array of finite numbers of shape (4, 4), got shape {goal.shape}")
     chain = build_chain(spec)

@@ -213,7 +213,7 @@ def require_frame(chain: KinematicChain, frame: str) -> None:
         UnknownFrameError: It has not; the text lists the names.
     """
     names = frame_names(chain)
-    if frame not in names:
+    if not isinstance(frame, str) or frame not in names:
         n = len(chain.joints)
         found, hint = (shown(frame), did_you_mean(frame, names)) if isinstance(frame, str) else (repr(frame), "")
         raise UnknownFrameError(
@@ -239,7 +239,7 @@ def frame_pose(chain: ChainLike, frame: str, q: ArrayLike, **options: Unpack[Bat
     """
     robot = chain if chain.__class__ is KinematicChain else chain_of(chain)
     if not options:
-        evaluate = robot.code.pose.get(frame)
+        evaluate = robot.code.pose.get(frame) if isinstance(frame, str) else None
         if evaluate is not None:
             pose = evaluate(q)
             if pose is not None:
@@ -285,7 +285,7 @@ def geometric_jacobian(
     """
     robot = chain if chain.__class__ is KinematicChain else chain_of(chain)
     if not options:
-        evaluate = robot.code.jacobian.get(frame)
+        evaluate = robot.code.jacobian.get(frame) if isinstance(frame, str) else None
         if evaluate is not None:
             jacobian = evaluate(q)
             if jacobian is not None:

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dh2sim.arguments import real_array
 from dh2sim.errors import AssemblyError, ConfigurationError, SingularPositionError
 from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.loop_batch import LoopBatch
@@ -59,7 +60,7 @@ def mechanism_configuration(robot: SpecLike, q: ArrayLike) -> Array:
     spec = spec_of(robot)
     tree, q0 = assembly(spec)
     driven = actuated_joints(spec)
-    values = np.asarray(q, dtype=np.float64)
+    values = real_array("q", q)
     if values.shape == (tree.n,):
         return read_only(joint_values(tree, values))
     names = listed(tree.moving_joints[k].name for k in driven)

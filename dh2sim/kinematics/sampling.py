@@ -35,7 +35,11 @@ def random_configurations(lower: ArrayLike, upper: ArrayLike, count: int, seed: 
     for i, (least, greatest) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
         if not (np.isfinite(least) and np.isfinite(greatest) and least <= greatest):
             raise ConfigurationError(f"no coordinate {i} can lie between {least!r} and {greatest!r}")
-    return np.random.default_rng(seed).uniform(low, high, (count, len(low)))
+    try:
+        generator = np.random.default_rng(seed)
+    except (TypeError, ValueError):
+        raise ConfigurationError(f"seed must be a whole number of at least 0, or several, got {seed!r}") from None
+    return generator.uniform(low, high, (int(count), len(low)))
 
 
 def scattered_configurations(lower: ArrayLike, upper: ArrayLike, count: int) -> Array:

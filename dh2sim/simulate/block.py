@@ -10,6 +10,7 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
+from dh2sim.arguments import whole_number
 from dh2sim.errors import ControllerError, EngineError
 from dh2sim.messages import listed
 from dh2sim.processors import available_processors
@@ -83,7 +84,7 @@ def simulate_block(job: Job, rollouts: range, *, threads: int = 0, advance: Adva
     """
     arrays = _empty(job, rollouts)
     made: dict[int, DesignPlant] = {}
-    threads = threads or available_processors()
+    threads = whole_number("threads", threads) or available_processors()
     with quiet_engine():
         size = len(rollouts) if job.options.engine == WARP else BATCH_SIZE  # a device is to be filled
         for first in range(rollouts.start, rollouts.stop, size):

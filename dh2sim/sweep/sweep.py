@@ -17,6 +17,7 @@ from typing import Any, Final, SupportsIndex, TypedDict
 
 import numpy as np
 
+from dh2sim import arguments
 from dh2sim.errors import Dh2simError, MeasureError, Problem, RobotError, SettingsError
 from dh2sim.messages import counted, listed
 from dh2sim.model.build import ModelLike, build_model, model_of
@@ -180,7 +181,7 @@ def sweep(
     model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
     task = prepare_task(
         model,
-        vary=vary or {},
+        vary={} if vary is None else arguments.mapping("vary", vary),
         designs=designs,
         count=count,
         names=measure,
@@ -269,7 +270,7 @@ def prepare_task(
         DesignFileError: Designs of a file are wrong.
         MeasureError: A measure is not known.
     """
-    chosen = tuple(name for name in (names.split(",") if isinstance(names, str) else names) if name.strip())
+    chosen = tuple(name for given in arguments.names("measure", names) for name in given.split(",") if name.strip())
     chosen = tuple(name.strip() for name in chosen)
     check_measures(chosen)
     draws, table = read_draws(vary), None if designs is None else read_design_table(designs)
@@ -280,7 +281,7 @@ def prepare_task(
     if table is not None and (twice := [name for name in draws if name in table.columns]):
         raise SettingsError([("vary", f"must not contain {', '.join(twice)}, which designs has too")])
     number = DEFAULT_COUNT if count is None else _whole("count", count, 1, MOST_DESIGNS)
-    edge = _usual_voxel(model) if voxel is None else float(voxel)
+    edge = _usual_voxel(model) if voxel is None else arguments.number("voxel", voxel)
     if not (math.isfinite(edge) and edge > 0.0):
         raise SettingsError([("voxel", f"must be above 0 m, got {edge}")])
     task = Task(
@@ -297,7 +298,7 @@ def prepare_task(
 def _whole(name: str, value: SupportsIndex, least: int, most: int | None) -> int:
     try:
         number = value.__index__()
-    except AttributeError:
+    except (AttributeError, TypeError):
         raise SettingsError([(name, f"must be a whole number, got {value!r}")]) from None
     if number < least or (most is not None and number > most):
         allowed = f"at least {least}" if most is None or number < least else f"at most {most:,}"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, TypedDict
 
+from dh2sim.arguments import text
 from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
 from dh2sim.messages import member
@@ -135,6 +136,8 @@ def symbolic_form(
         Dh2simError: An argument has a value that is not allowed.
     """
     wanted = member(What, what, "form")
+    text("source", source)
+    text("target", target)
     if wanted is What.DYNAMICS:
         numbers = not letters
         if numbers and bodies is None:

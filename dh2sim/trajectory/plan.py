@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack, get_args
 
 import numpy as np
 
+from dh2sim.arguments import mapping
 from dh2sim.errors import SettingsError, TrajectoryError
 from dh2sim.inverse.goals import Free
 from dh2sim.inverse.reach import amount_text
@@ -141,7 +142,7 @@ class _Options:
 
 def _limits(model: RobotModel, request: Mapping[str, LimitValue]) -> MotionLimits:
     own = robot_limits(model)
-    return requested_limits(own, request) if request else own
+    return requested_limits(own, mapping("limits", request)) if request is not None else own
 
 
 def _paired(model: RobotModel, points: Sequence[Waypoint]) -> tuple[Waypoint, ...]:

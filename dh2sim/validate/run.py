@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from dh2sim.arguments import number, whole_number
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.engines.pybullet_engine import PybulletEngine
@@ -102,6 +103,8 @@ def validate_robot(
     """
     if not isinstance(samples, int | np.integer) or samples < 1:
         raise Dh2simError(f"samples must be a whole number of at least 1, got {samples!r}")
+    number("tolerance", tolerance)
+    seed = whole_number("seed", seed)
     if isinstance(robot, MechanismModel):
         if source is not None:
             raise Dh2simError(f"{robot.name}: a mechanism has no source to be compared with")

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from dh2sim.arguments import text, whole_number
 from dh2sim.model.mechanism import MechanismModel, build_mechanism
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.view.initial_state import folder_of, open_state
@@ -50,6 +51,8 @@ def start_viewer(
     allow_hosts: Iterable[str] = (),
 ) -> PageServer[Any]:
     """Show a robot or a mechanism in the browser, and return at once: see ``Robot.view``."""
+    text("host", host)
+    whole_number("port", port)
     shown: ViewState | MechanismModel
     if spec.is_mechanism:
         shown = build_mechanism(spec)

@@ -11,6 +11,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from dh2sim.arguments import number, real_array
 from dh2sim.draw.diagram.arm import place_arm
 from dh2sim.draw.diagram.kinematic import draw_kinematic
 from dh2sim.draw.diagram.linkage import place_mechanism
@@ -140,7 +141,7 @@ def draw_robot(
         arm = place_arm(spec, joint_vector(build_chain(spec), named))
     if kind is not DrawingStyle.STICK:
         return RobotDrawing(sheet=draw_kinematic(arm, symbols=kind is DrawingStyle.KINEMATIC))
-    if reach is not None and not (math.isfinite(reach) and reach > 0.0):
+    if reach is not None and not (math.isfinite(number("reach", reach)) and reach > 0.0):
         raise PictureError(f"reach must be a length above 0, got {reach!r}")
     return RobotDrawing(sheet=draw_stick(arm, None if workspace is None else _box(workspace), reach))
 
@@ -158,7 +159,7 @@ def format_of(path: Path) -> DrawingFormat:
 
 
 def _box(numbers: Sequence[float]) -> tuple[float, float, float, float, float, float]:
-    values = [float(number) for number in numbers]
+    values = real_array("workspace", numbers).ravel().tolist()
     if len(values) != 6 or not all(map(math.isfinite, values)):
         raise PictureError(f"workspace must be six finite numbers, least and greatest x, y and z, got {values}")
     if not all(values[k] < values[k + 1] for k in (0, 2, 4)):

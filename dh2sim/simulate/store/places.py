@@ -7,6 +7,7 @@ from os import fspath
 from pathlib import Path, PurePath
 from typing import Final
 
+from dh2sim.arguments import file_path
 from dh2sim.errors import RunError
 from dh2sim.simulate.store.local import LocalStore
 from dh2sim.simulate.store.objects import ObjectStore
@@ -23,6 +24,7 @@ def open_store(place: Place) -> LocalStore | ObjectStore:
         RunError: The place is of a kind that is not known.
         MissingExtraError: It is an object store, and the library for those is not installed.
     """
+    file_path("the place of a run", place)
     text = fspath(place)
     if isinstance(place, PurePath):  # which makes one slash of two, and on Windows a backslash
         text = _LOST_SLASH.sub(r"\1//", place.as_posix())

@@ -1,0 +1,132 @@
+"""Whatever a method of Robot is given, what is wrong is said in the package's own words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dh2sim import Robot
+from dh2sim.arguments import file_path, mapping, names, number, real_array, text, whole_number
+from dh2sim.errors import ArgumentError, Dh2simError
+from tests.refusals import refusal
+
+ARM, LOOP = Robot.load("rpr"), Robot.load("four_bar")
+Q = (0.1, 0.2, 0.3)
+T = ARM.fk(Q)
+WRONG: dict[str, Any] = {
+    "object": object(),
+    "array of NaN": np.full(3, np.nan),
+    "array of objects": np.array([object()] * 3, object),
+    "complex array": np.array([1j, 2.0, 3.0]),
+    "texts": [["a"] * 3],
+    "negative": -1.5,
+}
+CALLS: dict[str, Callable[[Any], object]] = {
+    "fk(q)": ARM.fk,
+    "fk(frame)": lambda x: ARM.fk(Q, frame=x),
+    "jacobian(q)": ARM.jacobian,
+    "jacobian(frame)": lambda x: ARM.jacobian(Q, frame=x),
+    "manipulability(q)": ARM.manipulability,
+    "singular_values(q)": ARM.singular_values,
+    "fk(q) of a mechanism": LOOP.fk,
+    "jacobian(q) of a mechanism": LOOP.jacobian,
+    "ik(T)": ARM.ik,
+    "ik(q0)": lambda x: ARM.ik(T, q0=x),
+    "ik(free)": lambda x: ARM.ik(T, free=x),
+    "ik(lock)": lambda x: ARM.ik(T, lock=x),
+    "explain_ik(T)": ARM.explain_ik,
+    "random_configurations(count)": ARM.random_configurations,
+    "random_configurations(seed)": lambda x: ARM.random_configurations(2, seed=x),
+    "workspace(frame)": lambda x: ARM.workspace(frame=x),
+    "workspace(samples)": lambda x: ARM.workspace(samples=x),
+    "workspace(size)": lambda x: ARM.workspace(size=x),
+    "workspace(seed)": lambda x: ARM.workspace(seed=x),
+    "symbolic(what)": ARM.symbolic,
+    "symbolic(style)": lambda x: ARM.symbolic(style=x),
+    "symbolic(source)": lambda x: ARM.symbolic(source=x),
+    "code(language)": ARM.code,
+    "code(what)": lambda x: ARM.code("c", what=x),
+    "trajectory(waypoints)": ARM.trajectory,
+    "trajectory(kind)": lambda x: ARM.trajectory([Q, (0, 0, 0)], kind=x),
+    "trajectory(duration)": lambda x: ARM.trajectory([Q, (0, 0, 0)], duration=x),
+    "trajectory(limits)": lambda x: ARM.trajectory([Q, (0, 0, 0)], limits=x),
+    "plan_measurements(count)": ARM.plan_measurements,
+    "plan_measurements(kind)": lambda x: ARM.plan_measurements(10, kind=x),
+    "plan_measurements(seed)": lambda x: ARM.plan_measurements(10, seed=x),
+    "calibrate(data)": ARM.calibrate,
+    "draw(q)": ARM.draw,
+    "draw(style)": lambda x: ARM.draw(style=x),
+    "draw(workspace)": lambda x: ARM.draw(style="stick", workspace=x),
+    "draw(reach)": lambda x: ARM.draw(style="stick", reach=x),
+    "convert(to)": ARM.convert,
+    "export(out)": ARM.export,
+    "export(formats)": lambda x: ARM.export("build", formats=x),
+    "validate(samples)": lambda x: ARM.validate(samples=x),
+    "sweep(vary)": lambda x: ARM.sweep(vary=x),
+    "sweep(count)": lambda x: ARM.sweep(vary={"L2": 0.1}, count=x),
+    "sweep(measure)": lambda x: ARM.sweep(vary={"L2": 0.1}, measure=x),
+    "sweep(voxel)": lambda x: ARM.sweep(vary={"L2": 0.1}, voxel=x),
+    "rollout(rollouts)": lambda x: ARM.rollout(x, steps=2),
+    "rollout(steps)": lambda x: ARM.rollout(1, steps=x),
+    "rollout(controller)": lambda x: ARM.rollout(1, steps=2, controller=x),
+    "rollout(record)": lambda x: ARM.rollout(1, steps=2, record=x),
+    "rollout(threads)": lambda x: ARM.rollout(1, steps=2, threads=x),
+    "rollout(out)": lambda x: ARM.rollout(1, steps=2, out=x),
+    "load": Robot.load,
+    "from_urdf": Robot.from_urdf,
+    "from_table": Robot.from_table,
+    "save(path)": ARM.save,
+    "view(port)": lambda x: ARM.view(port=x, browser=False),
+}
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_a_wrong_argument_is_reported_in_the_packages_own_words(
+    call: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for kind, value in WRONG.items():
+        try:
+            CALLS[call](value)
+        except Dh2simError as error:
+            assert str(error), kind
+        except Exception as error:
+            pytest.fail(f"{call} of {kind}: {type(error).__name__}: {error}")
+        else:
+            pytest.fail(f"{call} takes {kind}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_checks_take_what_is_right() -> None:
+    assert whole_number("n", np.int64(3), least=3) == 3
+    assert number("x", np.float32(0.5)) == 0.5
+    assert real_array("q", [[1, 2]]).tolist() == [[1.0, 2.0]]
+    assert mapping("lock", {"a": 1}) == {"a": 1}
+    assert names("what", "pose") == ["pose"]
+    assert names("what", ("pose", "jacobian")) == ["pose", "jacobian"]
+    assert text("frame", "tool0") == "tool0"
+    assert file_path("out", "a") == file_path("out", Path("a")) == Path("a")
+
+
+@pytest.mark.parametrize(
+    ("check", "value", "message"),
+    [
+        (whole_number, 2.5, "n must be a whole number of at least 0, got 2.5"),
+        (whole_number, -1, "n must be a whole number of at least 0, got -1"),
+        (number, "1", "n must be a number, got '1'"),
+        (real_array, [[1], [2, 3]], "n must be real numbers, got [[1], [2, 3]]"),
+        (real_array, np.array([1j]), "n must be real numbers, got an array of complex128 of shape (1,)"),
+        (mapping, [1], "n must be a mapping of names to values, got [1]"),
+        (names, [1], "n must be a name or several, got [1]"),
+        (text, None, "n must be a string, got None"),
+        (file_path, ["x" * 99], "n must be a path, got a value of type list"),
+    ],
+)
+def test_the_checks_name_the_argument_and_what_it_must_be(
+    check: Callable[[str, object], object], value: object, message: str
+) -> None:
+    assert refusal(ArgumentError, check, "n", value) == message
