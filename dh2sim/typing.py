@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 """An array of doubles; the docstring of whatever carries it gives its shape."""
+ComplexArray: TypeAlias = NDArray[np.complex128]
+"""An array of complex doubles."""
 
 
 Point: TypeAlias = tuple[float, float, float]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
+from dh2sim.inverse.continuation import Continuation, build_continuation
 from dh2sim.inverse.loop import (
     Arm,
     Candidates,
@@ -21,7 +22,6 @@ from dh2sim.inverse.loop import (
 )
 from dh2sim.inverse.nearly_singular import near_solutions
 from dh2sim.inverse.polish import polish, refine
-from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.typing import Array
 
 CONVERGED = 1e-12
@@ -44,18 +44,12 @@ NEARLY_SINGULAR = 1e-6
 """Least singular value below which that is so."""
 _VIRTUAL = 0.05
 """How far virtual joints of a candidate may be from zero."""
-_NEAR_BY = 4
-"""Poses near a nearly singular one whose solutions are counted, too,"""
-_APART = 1e-3
-"""and how far from it they are, in lengths of the arm and rad."""
 _GATE = 0.3
 """Error of a candidate, in lengths of the arm and rad, above which it is none."""
 _DOUBTFUL = 1e-5
 """Least singular value of a solution below which others may be missing."""
 _ILL = 1e6
 """Condition above which solutions may be missing."""
-_STARTS = 48
-"""Of a search where all eliminations are singular."""
 _BLOCK = 128
 """Poses solved at a time, so that their matrices stay in the processor's cache."""
 _SEED = 2026
@@ -125,7 +119,7 @@ class Found:
         return replace(self, pose=poses[self.pose], unsure=poses[self.unsure])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Method:
     """How an arm's poses are solved, with some of its joints locked."""
 
@@ -186,51 +180,45 @@ class Method:
                 found = self._joined_with(found, again, replace(more, unsure=more.unsure[:0]))
         again = np.flatnonzero(self.doubtful(found, len(T)) | blurred)
         again = self._ill(again, blurred, found, T, locked, last=True) if len(again) else again
-        for search in (self._in_valleys, self._from_near_by, self._scattered):
-            if not len(again):
-                break
-            more = search(T[again], _values_at(locked, again))
-            found = self._sharp(self._joined_with(found, again, more))
-            found = replace(found, unsure=self._unsure(again, blurred, found, T, locked))
-            if not self.virtual:
-                odd = np.bincount(found.pose, minlength=len(T))[again] % 2 == 1
-                again = np.union1d(found.unsure, again[odd])
-        return found
+        if not len(again):
+            return found
+        more, lost, elsewhere = self._continued(T[again], _values_at(locked, again))
+        found = self._sharp(self._joined_with(found, again, more))
+        lost[np.unique(more.pose[_are_blunt(more.error, more.sigma)])] = True
+        if lost.any() and not self.virtual:
+            stuck = again[lost]
+            more = self._in_valleys(T[stuck], _values_at(locked, stuck))
+            found = self._sharp(self._joined_with(found, stuck, more))
+            met = np.where(found.sigma < _MET, 2, 1)  # where solutions have met, one stands for two
+            counts = np.bincount(found.pose, weights=met, minlength=len(T))[again]
+            lost &= counts + elsewhere != self.continuation.count
+        too_many = np.bincount(found.pose[found.sigma > _MET], minlength=len(T))[again] > self.continuation.count
+        return replace(found, unsure=again[lost | too_many])
 
     def _joined_with(self, found: Found, poses: Indices, more: Found) -> Found:
         """Return solutions of N poses, and more of some of these."""
         return self.distinct(joined([found, more.among(poses)], self.arm.n))
 
-    def _unsure(self, poses: Indices, blurred: Flags, found: Found, T: Array, locked: Mapping[int, Array]) -> Indices:
-        """Return of some poses those that may have more solutions: fewer were found than near by poses have."""
-        doubtful = self.doubtful(found, len(T))
-        poses = poses[(doubtful if self.virtual else doubtful | blurred)[poses]]
-        if not len(poses) or not self.eliminations:
-            return poses
-        poses = poses[self._condition(poses, T, locked, all_of_them=True) >= _ILL]
-        if not len(poses):
-            return poses
-        # where solutions have met, one stands for two
-        met = np.where(found.sigma < _MET, 2, 1)
-        counts = np.bincount(found.pose, weights=met, minlength=len(T))[poses]
-        near_by = self.solve_by(self.eliminations[0], *self._near_by(T[poses], _values_at(locked, poses)))
-        most = np.bincount(near_by.pose, minlength=len(poses) * _NEAR_BY).reshape(-1, _NEAR_BY).max(axis=1)
-        unsure: Indices = poses[(counts == 0) | (counts % 2 == 1) | (most > counts)]
-        return unsure
+    @cached_property
+    def continuation(self) -> Continuation:
+        """The paths that solutions of the ring follow from general poses to others; found when first needed."""
+        arm, moving = self.arm, self.moving
+        if self.virtual:
+            extra = len(self.virtual) - 1
+            links = (*arm.links[:-1], arm.links[-1] @ self.virtual[0], *self.virtual[1:])
+            arm = replace(arm, turns=(*arm.turns, *[True] * extra), links=links)
+            moving = np.append(moving, [True] * extra)
+        return build_continuation(arm, moving)
 
-    @staticmethod
-    def _near_by(T: Array, locked: Mapping[int, Array]) -> tuple[Array, Mapping[int, Array]]:
-        """Return some poses near each of N, where eliminations are regular, and locked coordinates, in order."""
-        motions = small_motions(np.random.default_rng(_SEED), _NEAR_BY, _APART)
-        near = (T[:, None] @ motions).reshape(-1, 4, 4)
-        return near, _values_at(locked, np.repeat(np.arange(len(T)), _NEAR_BY))
-
-    def _from_near_by(self, T: Array, locked: Mapping[int, Array]) -> Found:
-        """Return what is found from where the first elimination leads for poses near by."""
-        if not self.eliminations:
-            return joined([], self.arm.n)
-        near = self._candidates(self.eliminations[0], *self._near_by(T, locked))
-        return self.polished(near.pose // _NEAR_BY, near.q, T)
+    def _continued(self, T: Array, locked: Mapping[int, Array]) -> tuple[Found, Flags, Indices]:
+        """Return what continuation finds of N poses, whether paths were lost, and how many ends are no solutions."""
+        ends = self.continuation.ends(T, locked)
+        own = (np.abs(_wrapped(ends.q[:, self.arm.n :])) < _VIRTUAL).all(axis=1)
+        pose, q, rough = ends.pose[own], ends.q[own, : self.arm.n], ends.rough[own]
+        lost = ends.lost > 0
+        _, error, _ = polish(self.arm, q[rough], T[pose[rough]], self.moving, gate=_GATE)
+        lost[pose[rough][error > REACHED]] = True
+        return self.polished(pose, q, T), lost, ends.elsewhere
 
     @staticmethod
     def _sharp(found: Found) -> Found:
@@ -239,7 +227,7 @@ class Method:
         How far a configuration is from the solution nearby is what is left of the pose over the singular value. Where
         that is much for all singular solutions of a pose, the pose itself is rounded, and they are what there is.
         """
-        blunt = (found.error > SAME * found.sigma) & (found.error > _ROUNDING)
+        blunt = _are_blunt(found.error, found.sigma)
         sharp = np.unique(found.pose[~blunt & (found.sigma < NEARLY_SINGULAR)])
         return found.of(~(blunt & np.isin(found.pose, sharp)))
 
@@ -268,11 +256,12 @@ class Method:
         """Return doubtful poses, without those that are well-conditioned and have no solution: out of reach.
 
         Nor are those searched at the last that have singular solutions where an elimination is well-conditioned:
-        these are among its eigenvalues.
+        these are among its eigenvalues. Nearly singular ones may be as well, but merged by rounding.
         """
         counts = np.bincount(found.pose, minlength=len(T))[again]
         none = (counts == 0) & ~blurred[again]
-        asked = again[none | ((counts > 0) & (counts % 2 == 0))] if last else again[none]
+        close = np.isin(again, found.pose[(found.sigma > _MET) & (found.sigma < _DOUBTFUL)])
+        asked = again[none | ((counts > 0) & (counts % 2 == 0) & ~close)] if last else again[none]
         if not len(asked) or not self.eliminations:
             return again
         return np.setdiff1d(again, asked[self._condition(asked, T, locked, all_of_them=last) < _ILL])
@@ -285,15 +274,6 @@ class Method:
             if not isinstance(other, Nudged):  # which is regular where the arm itself is singular
                 condition = np.minimum(condition, other.condition(loop))
         return condition
-
-    def _scattered(self, T: Array, locked: Mapping[int, Array]) -> Found:
-        """Return what Levenberg-Marquardt's steps from scattered starts find: the last resort."""
-        starts = scattered_configurations(self.ranges[:, 0], self.ranges[:, 1], _STARTS)
-        pose = np.repeat(np.arange(len(T)), _STARTS)
-        q = np.tile(starts, (len(T), 1))
-        for joint, value in locked.items():
-            q[:, joint] = value[0] if len(value) == 1 else value[pose]
-        return self.polished(pose, q, T, gate=math.inf)
 
     def _in_valleys(self, T: Array, locked: Mapping[int, Array]) -> Found:
         """Return what is found in the valleys that lead through what eliminations leave."""
@@ -337,13 +317,14 @@ class Method:
     def polished(self, pose: Indices, q: Array, T: Array, gate: float = _GATE) -> Found:
         """Return the distinct solutions that configurations lead to, if their errors are below the gate."""
         q, error, J = polish(self.arm, q, T[pose], self.moving, gate=gate)
-        stuck = np.flatnonzero((error > CONVERGED) & (error < _STUCK))
+        sigma = np.asarray(np.linalg.svd(J[:, :, self.moving], compute_uv=False)[:, -1], dtype=np.float64)
+        stuck = np.flatnonzero((error < _STUCK) & ((error > CONVERGED) | _are_blunt(error, sigma)))
         if len(stuck):
             q[stuck], error[stuck], J[stuck] = refine(self.arm, q[stuck], T[pose[stuck]], self.moving)
+            sigma[stuck] = np.linalg.svd(J[stuck][:, :, self.moving], compute_uv=False)[:, -1]
         extent = _extents(q, np.array(self.arm.turns))  # rounding grows with it
         reached = error < extent * REACHED
-        J, error, extent = J[reached], error[reached], extent[reached]
-        sigma = np.asarray(np.linalg.svd(J[:, :, self.moving], compute_uv=False)[:, -1], dtype=np.float64)
+        J, sigma, error, extent = J[reached], sigma[reached], error[reached], extent[reached]
         found = Found(pose=pose[reached], q=q[reached], sigma=sigma, error=error, J=J)
         if not self.virtual:
             found = found.of((error < extent * CONVERGED) | (sigma < _BLUNT))
@@ -392,6 +373,11 @@ def small_motions(rng: np.random.Generator, count: int, size: float) -> Array:
     motions[:, :3, :3] = left @ right
     motions[:, :3, 3], motions[:, 3, 3] = shifts, 1.0
     return motions
+
+
+def _are_blunt(error: Array, sigma: Array) -> Flags:
+    """Return which configurations may be farther from a solution than from others that are the same."""
+    return np.asarray((error > SAME * sigma) & (error > _ROUNDING))
 
 
 def _values_at(locked: Mapping[int, Array], poses: Indices) -> Mapping[int, Array]:

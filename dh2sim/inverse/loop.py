@@ -11,16 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.kinematics.chain import KinematicChain
-from dh2sim.typing import Array, read_only
+from dh2sim.typing import Array, ComplexArray, read_only
 
 Indices: TypeAlias = NDArray[np.intp]
 Flags: TypeAlias = NDArray[np.bool_]
+Numbers = TypeVar("Numbers", Array, ComplexArray)
 
 _ROUNDS: Final = 8
 """Of moving each frame between its neighbours: enough where axes are at an angle; nearly parallel ones stay."""
@@ -162,7 +163,7 @@ def inverse_poses(T: Array) -> Array:
     return inverse
 
 
-def pose_and_jacobian(arm: Arm, q: Array) -> tuple[Array, Array]:
+def pose_and_jacobian(arm: Arm, q: Numbers) -> tuple[Numbers, Numbers]:
     """Return K_0 J_1 ... K_n and its geometric Jacobian.
 
     Args:
@@ -173,12 +174,12 @@ def pose_and_jacobian(arm: Arm, q: Array) -> tuple[Array, Array]:
         Poses, shape (M, 3, 4), and Jacobians, rows 0-2 linear, shape (M, 6, n).
     """
     count = len(q)
-    frame = np.broadcast_to(arm.links[0][:3], (count, 3, 4))
-    axes, points = np.empty((count, 3, arm.n)), np.empty((count, 3, arm.n))
+    frame: Any = np.broadcast_to(arm.links[0][:3], (count, 3, 4))
+    axes, points = np.empty((2, count, 3, arm.n), dtype=q.dtype)
     c, s = np.cos(q), np.sin(q)
     for i, turns in enumerate(arm.turns):
         axes[:, :, i], points[:, :, i] = frame[:, :, 2], frame[:, :, 3]
-        moved = np.array(frame)
+        moved = np.array(frame, dtype=q.dtype)
         if turns:
             ci, si = c[:, i, None], s[:, i, None]
             moved[:, :, 0] = frame[:, :, 0] * ci + frame[:, :, 1] * si
@@ -187,7 +188,7 @@ def pose_and_jacobian(arm: Arm, q: Array) -> tuple[Array, Array]:
             moved[:, :, 3] += frame[:, :, 2] * q[:, i, None]
         frame = (moved.reshape(-1, 4) @ arm.links[i + 1]).reshape(count, 3, 4)
     turning = np.array(arm.turns)
-    J = np.zeros((count, 6, arm.n))
+    J: Any = np.zeros((count, 6, arm.n), dtype=q.dtype)
     arms = frame[:, :, 3, None] - points
     linear = J[:, :3]
     linear[:, 0] = axes[:, 1] * arms[:, 2] - axes[:, 2] * arms[:, 1]

@@ -41,7 +41,7 @@ from dh2sim.typing import Array, read_only
 
 VERIFIED: Final = 1e-10
 """Residual up to which a configuration is a solution."""
-UNSURE: Final = "No elimination is well-conditioned at the pose: solutions may be missing."
+UNSURE: Final = "The pose is nearly singular, and not every solution is accounted for: some may be missing."
 ROUNDED: Final = (
     "But for rounding of the table the joints move tool0 in one direction less, as with an alpha of 3.141593 where "
     "pi is meant: every pose is nearly singular, and solutions may be missing."

@@ -11,6 +11,7 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
 from tests.inverse.arms import CRX, JACO, ORTHOGONAL, arm
 from tests.inverse.campaign import is_found
+from tests.inverse.right_angles import Tally, compare, random_arms
 from tests.sample_robots import robot
 
 RIGHT = 0.5 * np.pi
@@ -40,6 +41,7 @@ def test_regular_configurations_with_joints_at_right_angles_are_found(spec: Robo
 @pytest.mark.parametrize(
     ("spec", "q", "count"),
     [
+        pytest.param(CRX, (RIGHT, np.pi, np.pi, 0.03804475, np.pi, RIGHT), 12, id="solutions are close together"),
         pytest.param(ORTHOGONAL, (RIGHT, 0.0, 0.0, RIGHT, RIGHT, -RIGHT), 6, id="solutions share an angle"),
         pytest.param(JACO, (-RIGHT, 0.0, np.pi, RIGHT, np.pi, -RIGHT), 8, id="solutions of a skew wrist share one"),
         pytest.param(CRX, (0.526857, np.pi, np.pi, 0.878053, np.pi, -RIGHT), 12, id="all pencils are singular"),
@@ -62,3 +64,18 @@ def test_a_pose_at_which_a_pencil_is_singular_but_for_rounding_has_all_eight() -
     found = InverseSolver(ur10e).solve(table_tool_pose(ur10e, q), limits=False)
     assert len(found) == 8
     assert is_found(ur10e, q, found.q)
+
+
+def test_solving_in_other_ways_finds_nothing_that_a_complete_answer_lacks() -> None:
+    tally = compare(CRX, 20, 12)
+    assert tally.solved > 20
+    assert (tally.falsely_complete, tally.odd, tally.missed) == (0, 0, 0)
+
+
+@pytest.mark.slow
+def test_complete_answers_lack_nothing_that_solving_in_other_ways_finds() -> None:
+    total = Tally()
+    for spec in (robot("puma560"), robot("stanford"), robot("ur5e"), JACO, CRX, ORTHOGONAL, *random_arms(0, 6)):
+        total.add(compare(spec, 60, 1))
+    assert total.solved > 1000
+    assert (total.falsely_complete, total.odd) == (0, 0), total.examples
