@@ -12,7 +12,7 @@ from mujoco.batch import Batch
 
 from dh2sim.errors import SettingsError
 from dh2sim.formats.mjcf.mechanism import joint_coordinates
-from dh2sim.input_files import csv_lines, npy_array, refuse_named_pipe, repeated
+from dh2sim.input_files import csv_lines, npy_array, read_input, refuse_named_pipe, repeated
 from dh2sim.messages import did_you_mean, listed
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.simulate.closed_loops import ClosedLoops
@@ -227,8 +227,11 @@ def _npy(path: Path, joints: tuple[str, ...]) -> Array:
 
 
 def _csv(path: Path, joints: tuple[str, ...]) -> Array:
+    data = read_input(path, MOST_FILE_BYTES)
+    if len(data) > MOST_FILE_BYTES:  # a device
+        raise _refused(f"{path}: is larger than {MOST_FILE_BYTES / 2**30:g} GB")
     try:
-        lines = [line for line in csv_lines(path.read_bytes()) if any(cell.strip() for cell in line[1])]
+        lines = [line for line in csv_lines(data) if any(cell.strip() for cell in line[1])]
     except ValueError as error:
         raise _refused(f"{path}: {error}") from error
     header = [cell.strip() for cell in lines[0][1]] if lines else []

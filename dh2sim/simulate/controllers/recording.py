@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dh2sim.errors import ControllerError, RunError
-from dh2sim.input_files import csv_lines, npy_array, refuse_named_pipe, repeated
+from dh2sim.input_files import csv_lines, npy_array, read_input, refuse_named_pipe, repeated
 from dh2sim.messages import closest, listed, shown
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.controllers.reference import read_reference
@@ -206,6 +206,8 @@ def _digest(path: Path, arrays: tuple[str, ...]) -> str:
     return digest.hexdigest()
 
 
+_MOST_BYTES = 2**30
+"""Of a CSV file."""
 _MOST_REPORTED = 5
 
 
@@ -248,7 +250,9 @@ def actuator_type(column: str) -> ActuatorType | None:
 
 
 def _read_csv(path: Path, file: str, kind: str) -> Recording:
-    raw = path.read_bytes()
+    raw = read_input(path, _MOST_BYTES)
+    if len(raw) > _MOST_BYTES:
+        raise ControllerError(f"'{file}' is larger than {_MOST_BYTES // 2**20} MB")
     try:
         lines = csv_lines(raw)
     except ValueError as error:
