@@ -3,7 +3,7 @@
 
     scripts/install_sizes.py               core, every extra and all (minutes, and GB of temporary files)
     scripts/install_sizes.py view plot     only these, and core
-    scripts/install_sizes.py --write       write the table into docs/dependencies.md
+    scripts/install_sizes.py --write       write the table into docs/dependencies.md; of some extras, their rows
 
 Each is installed in a fresh virtual environment. Counted are the files of the installed distributions, as their
 wheels unpack; compiled bytecode, pip and the environment itself come on top.
@@ -23,9 +23,13 @@ from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "dependencies.md"
-TABLE = re.compile(r"(<!-- sizes: begin -->\n).*(<!-- sizes: end -->)", flags=re.DOTALL)
+TABLE = re.compile(r"(<!-- sizes: begin -->\n)(.*)(<!-- sizes: end -->)", flags=re.DOTALL)
+HEAD = """\
+| installed | packages | MB unpacked | beyond the core | MB of the environment | largest packages, MB |
+|---|---:|---:|---:|---:|---|
+"""
 CORE = ""
-EXTRAS = ("view", "plot", "video", "data", "engines", "xacro", "all")
+EXTRAS = ("view", "plot", "video", "data", "engines", "toppra", "xacro", "s3", "cluster", "fast", "warp", "all")
 LARGEST = 5
 """Packages that are named for each row."""
 
@@ -65,8 +69,13 @@ def row(installed: Installed, core: Installed) -> str:
     size = sum(installed.packages.values())
     beyond = "" if installed is core else f"+{size - sum(core.packages.values()):.0f}"
     named = ", ".join(f"{name} {own[name]:.0f}" for name in largest if own[name] >= 0.5)
-    title = f"`dh2sim[{installed.extra}]`" if installed.extra else "`dh2sim`"
-    return f"| {title} | {len(installed.packages)} | {size:.0f} | {beyond} | {installed.environment:.0f} | {named} |"
+    numbers = f"{len(installed.packages)} | {size:.0f} | {beyond} | {installed.environment:.0f}"
+    return f"| {title(installed.extra)} | {numbers} | {named} |"
+
+
+def title(extra: str) -> str:
+    """Return what the row of an extra begins with."""
+    return f"`dh2sim[{extra}]`" if extra else "`dh2sim`"
 
 
 def main() -> int:
@@ -78,24 +87,25 @@ def main() -> int:
     unknown = set(arguments.extras) - set(EXTRAS)
     if unknown:
         parser.error(f"unknown extra {', '.join(sorted(unknown))}; allowed: {', '.join(EXTRAS)}")
-    lines = [
-        "| installed | packages | MB unpacked | beyond the core | MB of the environment | largest packages, MB |",
-        "|---|---:|---:|---:|---:|---|",
-    ]
+    rows: dict[str, str] = {}
     core: Installed | None = None
     for extra in (CORE, *(arguments.extras or EXTRAS)):
         with TemporaryDirectory() as folder:
             print(f"installing {extra or 'core'} …", file=sys.stderr)
             installed = install(extra, Path(folder) / "venv")
         core = core or installed
-        lines.append(row(installed, core))
-        print(lines[-1], file=sys.stderr)
-    table = "".join(f"{line}\n" for line in lines)
-    print(table, end="")
+        rows[title(extra)] = row(installed, core)
+        print(rows[title(extra)], file=sys.stderr)
+    page = PAGE.read_text(encoding="utf-8")
+    found = TABLE.search(page)
+    if found is None:
+        parser.error(f"{PAGE} does not contain the two marks of the table")
+    written = {line.split(" | ")[0].removeprefix("| "): line for line in found[2].splitlines()[2:]}
+    known = {**written, **rows} if arguments.write else rows
+    table = "".join(f"{known[name]}\n" for name in map(title, (CORE, *EXTRAS)) if name in known)
+    print(HEAD + table, end="")
     if arguments.write:
-        page, count = TABLE.subn(lambda found: found[1] + table + found[2], PAGE.read_text(encoding="utf-8"))
-        if count != 1:
-            parser.error(f"{PAGE} does not contain the two marks of the table")
+        page = page[: found.start()] + found[1] + HEAD + table + found[3] + page[found.end() :]
         PAGE.write_text(page, encoding="utf-8")
     return 0
 

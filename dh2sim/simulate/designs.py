@@ -69,7 +69,9 @@ class Draw:
         if len(numbers) != _COUNTS[kind] or not all(map(math.isfinite, numbers)):
             raise ValueError(f"must be {_FORMS}, got {shown(given)}")
         if kind == "share" and not 0.0 <= numbers[0] < 1.0:
-            raise ValueError(f"must be a share of at least 0 and below 1, got {numbers[0]:g}; to set it, use designs")
+            raise ValueError(
+                f"must be a share of at least 0 and below 1, got {numbers[0]:g}; a list of designs sets numbers"
+            )
         if kind == "normal" and numbers[0] < 0.0:
             raise ValueError(f"must have a standard deviation of at least 0, got {numbers[0]:g}")
         if kind in ("uniform", "loguniform") and numbers[0] > numbers[1]:
@@ -126,6 +128,23 @@ def read_draws(given: object) -> Mapping[str, Draw]:
     if problems:
         raise SettingsError(problems)
     return MappingProxyType(draws)
+
+
+def draws_of(spec: RobotSpec, given: Mapping[str, Any]) -> Mapping[str, Draw]:
+    """Return what ``read_draws`` does; its error has the names that are not known as well.
+
+    Raises:
+        SettingsError: Something is wrong.
+    """
+    try:
+        return read_draws(given)
+    except SettingsError as error:
+        problems = [*error.problems]
+    try:
+        Variation(spec, [str(name) for name in given])
+    except RobotError as error:
+        problems += [("vary", str(each)) for each in error.problems]
+    raise SettingsError(problems)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

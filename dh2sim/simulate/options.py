@@ -265,7 +265,7 @@ class RolloutOptions:
             return {}
         twice = [name for name in self.vary if name in self.designs.columns]
         if twice:
-            return {"vary": [f"must not contain {listed(twice)}, which designs has too"]}
+            return {"vary": [f"must not contain {listed(twice)}, which the designs have too"]}
         count = len(self.designs)
         if "rollouts" in given:
             if "per_design" not in given:

@@ -138,8 +138,7 @@ def rollout(
 
 
 _ONE_PROCESS: Final = (
-    f"must not be given with the engine '{WARP}': its numbers differ in last bits from one time to the next, so that "
-    "one process must make them all"
+    "its numbers differ in last bits from one time to the next, so that one process must make them all"
 )
 
 
@@ -157,7 +156,7 @@ def workers_of(executor: Executor | Client | str | None, job: Job) -> AbstractCo
     if executor is None:
         return nullcontext()
     if job.options.engine == WARP:
-        raise SettingsError([("executor", _ONE_PROCESS)])
+        raise SettingsError([("engine", f"must not be '{WARP}' together with executor: {_ONE_PROCESS}")])
     from dh2sim.simulate.cluster import opened
 
     return opened(executor)
@@ -264,7 +263,7 @@ def open_run(
         problem = "must not be given with a part of the blocks: each part would remove what the others have written"
         raise SettingsError([("overwrite", problem)])
     if join and job.options.engine == WARP:
-        raise SettingsError([("share", _ONE_PROCESS)])
+        raise SettingsError([("engine", f"must not be '{WARP}' together with share or blocks: {_ONE_PROCESS}")])
     if join:
         return RunWriter.join(path, job.layout)
     if resume:

@@ -24,7 +24,7 @@ from dh2sim.model.build import ModelLike, build_model, model_of
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.write import robot_file_text
-from dh2sim.simulate.designs import Designs, read_design_table, read_draws
+from dh2sim.simulate.designs import Designs, draws_of, read_design_table
 from dh2sim.sweep.measures import MEASURES, UNITS, Sampled, check_measures, load_function, measure
 from dh2sim.sweep.table import Journal, require_table, write_table
 from dh2sim.typing import Array
@@ -273,13 +273,13 @@ def prepare_task(
     chosen = tuple(name for given in arguments.names("measure", names) for name in given.split(",") if name.strip())
     chosen = tuple(name.strip() for name in chosen)
     check_measures(chosen)
-    draws, table = read_draws(vary), None if designs is None else read_design_table(designs)
+    draws, table = draws_of(model.spec, vary), None if designs is None else read_design_table(designs)
     if table is None and not draws:
         raise SettingsError([("", "there is nothing to vary: give vary or designs")])
     if table is not None and count is not None:
         raise SettingsError([("count", "must not be given together with designs")])
     if table is not None and (twice := [name for name in draws if name in table.columns]):
-        raise SettingsError([("vary", f"must not contain {', '.join(twice)}, which designs has too")])
+        raise SettingsError([("vary", f"must not contain {', '.join(twice)}, which the designs have too")])
     number = DEFAULT_COUNT if count is None else _whole("count", count, 1, MOST_DESIGNS)
     edge = _usual_voxel(model) if voxel is None else arguments.number("voxel", voxel)
     if not (math.isfinite(edge) and edge > 0.0):

@@ -244,7 +244,7 @@ def test_cells_are_plain_numbers_or_expressions(tmp_path: Path) -> None:
         ),
         ({"per_design": 2}, "per_design must be given together with vary or designs"),
         ({"designs": {"a1": [1, 2]}, "rollouts": 3}, "rollouts must be a multiple of the 2 designs, got 3"),
-        ({"designs": {"a1": [1]}, "vary": {"a1": 0.1}}, "vary must not contain a1, which designs has too"),
+        ({"designs": {"a1": [1]}, "vary": {"a1": 0.1}}, "vary must not contain a1, which the designs have too"),
         ({"designs": {"a1": [1, 2], "a2": [1]}}, "all of one length"),
     ],
 )

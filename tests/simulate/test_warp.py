@@ -112,10 +112,10 @@ def test_what_needs_the_host_or_several_processes_is_refused(tmp_path: Path) -> 
     job = prepare(model("planar_2r"), RolloutOptions(engine="warp", rollouts=2, steps=4))
     once = "its numbers differ in last bits from one time to the next, so that one process must make them all"
     assert refusal(SettingsError, workers_of, "local", job) == (
-        f"executor must not be given with the engine 'warp': {once}"
+        f"engine must not be 'warp' together with executor: {once}"
     )
     assert refusal(SettingsError, open_run, job, tmp_path / "run.zarr", join=True) == (
-        f"share must not be given with the engine 'warp': {once}"
+        f"engine must not be 'warp' together with share or blocks: {once}"
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import socket
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -47,11 +48,16 @@ _CAUSES: Final = {
     (f"//{_METADATA}/",): _NO_CREDENTIALS,
     ("NoSuchBucket",): "there is no such bucket",
     ("error sending request",): "the server does not answer; see AWS_ENDPOINT_URL, AWS_REGION and the network",
+    ("RequestTimeTooSkewed",): "the clock of this machine is too far from the server's: set it",
+    ("ExpiredToken", "TokenRefreshRequired"): "the credentials have expired",
+    ("ETag Header missing",): "what answers is no object store; see AWS_ENDPOINT_URL",
     ("InvalidAccessKeyId", "SignatureDoesNotMatch", "AccessDenied", "403 Forbidden"): "access is denied; see "
     "AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, and what they may do",
     ("PermanentRedirect", "AuthorizationHeaderMalformed"): "the bucket is in another region; set AWS_REGION",
 }
 """What parts of obstore's messages mean for who has typed a place."""
+_TOLD: Final = re.compile(r"<Code>([^<]*)</Code>\s*<Message>([^<]*)</Message>")
+"""What a server says of an error."""
 _MANIFEST: Final = f"{BLOCKS}/{METADATA}"
 """The object of a new run that is written last."""
 
@@ -265,6 +271,8 @@ def _cause(error: BaseException) -> str:
     for parts, words in _CAUSES.items():
         if any(part in text for part in parts):
             return words
+    if told := _TOLD.search(text):
+        return f"the server reports {told[1]}: {told[2].rstrip(' .')}"
     return text.partition("\n")[0].rstrip(" .")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from os import PathLike
 from typing import Any, Final, Protocol, TypeVar
 
@@ -96,15 +96,17 @@ class Store(Protocol):
 def run_all(function: Callable[[_In], _Out], items: Iterable[_In], *, threads: int = MOST_THREADS) -> list[_Out]:
     """Call a function for each item in threads of its own and return the results.
 
-    An error is raised when all calls have ended.
+    After an error, what has not begun is left out, and the error is raised when all calls have ended.
     """
     with ThreadPoolExecutor(threads, thread_name_prefix="run-store") as pool:
         futures = [pool.submit(function, item) for item in items]
         try:
-            wait(futures)
-        except BaseException:  # a signal
+            wait(futures, return_when=FIRST_EXCEPTION)
+        finally:  # after a signal, too
             for future in futures:
                 future.cancel()
             wait(futures)
-            raise
+        for future in futures:
+            if not future.cancelled() and (error := future.exception()):
+                raise error
         return [future.result() for future in futures]
