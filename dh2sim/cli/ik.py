@@ -103,7 +103,9 @@ def ik(
       dh2sim ik franka_panda --at home --lock joint_7=0.5
       dh2sim fk stanford home --json | dh2sim ik stanford --pose - --json
     """
-    spec = load_one(robot)
+    from dh2sim.kinematics.chain import serial_spec_of
+
+    spec = serial_spec_of(load_one(robot))
     asked = _read(spec, _Options(pose, xyz, rpy, quaternion, at, frame, near, lock, free, no_limits))
     solutions = _solved(asked, limits=not no_limits, numeric=numeric)
     explanation = _explained(asked) if explain else None

@@ -34,7 +34,7 @@ from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.table import bare_table, shared_builds
 from dh2sim.inverse.trial import choose_method
 from dh2sim.inverse.turns import Turns
-from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, spec_of
+from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, serial_spec_of
 from dh2sim.messages import did_you_mean, listed, shown
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
@@ -70,11 +70,13 @@ class InverseSolver:
 
         Raises:
             TypeError: It is not a robot.
+            ModelError: It has branches or closed loops.
             ConfigurationError: None of its joints moves.
         """
-        if not spec_of(robot).moving_rows:
-            raise ConfigurationError(f"{spec_of(robot).name} has no joint that moves")
-        self._prepare(bare_table(spec_of(robot)))
+        spec = serial_spec_of(robot)
+        if not spec.moving_rows:
+            raise ConfigurationError(f"{spec.name} has no joint that moves")
+        self._prepare(bare_table(spec))
 
     def _prepare(self, spec: RobotSpec) -> None:
         self._spec = spec

@@ -21,7 +21,7 @@ from dh2sim.inverse.branches import names_of_form
 from dh2sim.inverse.textbook_axes import EXACT, arm_axes, wrapped
 from dh2sim.inverse.textbook_forms import textbook_form
 from dh2sim.inverse.textbook_steps import Line, Signs, Step, Worksheet
-from dh2sim.kinematics.chain import SpecLike, build_chain, spec_of
+from dh2sim.kinematics.chain import SpecLike, build_chain, serial_spec_of
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
 from dh2sim.typing import Array, read_only
@@ -134,9 +134,10 @@ def explain_inverse_kinematics(robot: SpecLike, T: ArrayLike) -> Explanation:
         The steps and branches; false, with the reason, where textbooks have no closed form for such an arm.
 
     Raises:
+        ModelError: The robot has branches or closed loops.
         ConfigurationError: ``T`` is not a pose.
     """
-    spec = spec_of(robot)
+    spec = serial_spec_of(robot)
     goal = real_array("T", T)
     if goal.shape != (4, 4) or not np.isfinite(goal).all():
         raise ConfigurationError(f"a pose must be an array of finite numbers of shape (4, 4), got shape {goal.shape}")

@@ -12,6 +12,7 @@ from tests.program import dh2sim
 
 REFUSED = (
     "ik four_bar --at 0.5 0.5 0",
+    "ik four_bar --xyz 0.5 0.5 0",
     "symbolic four_bar",
     "symbolic four_bar --what jacobian",
     "symbolic four_bar --what dynamics",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dh2sim
-from dh2sim.errors import ConfigurationError
+from dh2sim.errors import ConfigurationError, ModelError
 from dh2sim.inverse.polish import solved
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.solver import InverseSolver
@@ -103,6 +103,13 @@ def test_with_all_joints_locked_the_pose_is_reached_or_not() -> None:
 def test_a_robot_without_joints_is_refused() -> None:
     with pytest.raises(ConfigurationError, match="still has no joint that moves"):
         InverseSolver(RobotSpec(name="still", rows=(Row(type=JointType.FIXED, a=0.3),)))
+
+
+def test_a_mechanism_is_refused() -> None:
+    four_bar = dh2sim.Robot.load("four_bar")
+    for ask in (four_bar.ik, four_bar.explain_ik):
+        with pytest.raises(ModelError, match="four_bar: has closed loops: this works on serial robots"):
+            ask(four_bar.fk([0.3]))
 
 
 def test_all_solutions_of_an_arm_of_very_many_joints_are_refused_at_once() -> None:
