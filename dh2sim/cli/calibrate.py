@@ -160,7 +160,7 @@ def calibrate(
 
     sigma = _noise(noise)
     measured = _measured(spec, data, from_run, kind, groups, sigma, rows, seed)
-    names = words_of(unknown) if unknown else None
+    names = list(filter(None, words_of(unknown))) if unknown else None
     found = calibrated(spec, measured, unknown=names, prior=_prior(prior), robust=robust, noise=sigma, seed=seed)
     _write(found, out, report)
     if as_json:

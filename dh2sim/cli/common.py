@@ -136,8 +136,12 @@ def refuse_options(what: str, options: Mapping[str, object]) -> None:
 
 
 def words_of(texts: Sequence[str] | None) -> list[str]:
-    """Return the words of an option that takes several, with commas between them, or repeated, or both."""
-    return [word for text in texts or () for part in re.split(f"[,{MANY}]", text) if (word := part.strip())]
+    """Return the words of an option that takes several, with commas between them, or repeated, or both.
+
+    Of one that is given without any it is an empty word, which is refused where one is needed.
+    """
+    words = [word for text in texts or () for part in re.split(f"[,{MANY}]", text) if (word := part.strip())]
+    return words or ([""] if texts else [])
 
 
 def named_values(texts: Sequence[str] | None, option: str, form: str) -> dict[str, str]:
@@ -147,7 +151,7 @@ def named_values(texts: Sequence[str] | None, option: str, form: str) -> dict[st
         BadParameter: The text is not of that form, or has a name twice.
     """
     values: dict[str, str] = {}
-    for item in words_of(texts):
+    for item in filter(None, words_of(texts)):
         name, equals, value = (part.strip() for part in item.partition("="))
         if not equals or not name or not value:
             raise typer.BadParameter(f"'{item}' is not of the form {form}", param_hint=option)

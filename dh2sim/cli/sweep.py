@@ -76,7 +76,7 @@ def sweep(
       dh2sim sweep puma560 --designs designs.csv --measure reach -o arms.csv
       dh2sim sweep ur5e --vary d4=0.1 --count 32 --measure reach --json
     """
-    if not vary and designs is None:
+    if not any(vary or ()) and designs is None:
         raise Dh2simError("there is nothing to vary: give --vary or --designs")
     model = build_serial(robot)
     from dh2sim.robot_facade import Robot

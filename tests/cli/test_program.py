@@ -243,6 +243,8 @@ def test_an_unknown_command_is_reported_with_the_one_that_may_be_meant() -> None
         ),
         ("--foo", "unknown option '--foo'. 'dh2sim --help' lists them all"),
         ("check --only file,drift", "--only: 'file' is not one of files, drift, poses. Did you mean 'files'?"),
+        ("check --only=", "--only: '' is not one of files, drift, poses"),
+        ("sweep rpr --vary=", "there is nothing to vary: give --vary or --designs"),
     ],
 )
 def test_wrong_usage_is_one_line_that_says_what_to_do(arguments: str, message: str) -> None:

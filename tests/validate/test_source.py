@@ -64,7 +64,7 @@ def test_a_source_without_masses_is_skipped(source: Path) -> None:
         (["stanford", "--source", "source.urdf"], "its arm has no joint joint_1, joint_2"),
         (["made.yaml", "--source", "none.urdf"], "none.urdf: cannot be read"),
         (["made.yaml", "--source", "made.yaml"], "must be a URDF or an MJCF"),
-        (["made.yaml", "--tip", "tool0"], "only with --source"),
+        (["made.yaml", "--tip", "tool0"], "--tip needs --source"),
         (["made.yaml", "stanford", "--source", "source.urdf"], "is the source of one robot"),
     ],
 )
