@@ -364,7 +364,7 @@ def test_shares_in_any_order_make_the_run_of_one_process(folder: Path) -> None:
         (("--share", "1-3"), "'1-3' is not of the form I/N, as in 3/16"),
         (("--blocks", "a:b"), "'a:b' is not of the form A:B, as in 10:20"),
         (("--blocks", "4:2"), "'4:2' ends before it begins"),
-        (("--blocks", "5:9"), "the run has blocks 0 to 4, got 5:9"),
+        (("--blocks", "5:9"), "--blocks must be of the run, which has blocks 0 to 4; got 5:9"),
         (("--share", "1/2", "--blocks", "1:2"), "dh2sim: --share must not be given together with --blocks\n"),
         (("--share", "1/2", "--overwrite"), "dh2sim: --overwrite must not be given with a part of the blocks"),
         (("--block-size", "11"), "dh2sim: --block-size must be a whole number from 1 to 10 "),

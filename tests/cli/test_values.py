@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.core import TyperCommand
 
-from dh2sim.cli.app import PlainCommand
+from dh2sim.cli.values import PlainValues
 from tests.program import shell
 
 WITHOUT_PYDANTIC = """
@@ -24,6 +24,10 @@ except SystemExit as end:
     print(end.code, "pydantic" in sys.modules, file=sys.stderr)
 ' {arguments} > out.txt
 """
+
+
+class OwnValues(PlainValues, TyperCommand):
+    """A command whose values are converted as ours are, and whose errors typer reports."""
 
 
 def outcome(kind: type[TyperCommand], words: list[str]) -> object:
@@ -75,7 +79,7 @@ def test_values_are_those_of_typer_and_so_are_its_words(
     monkeypatch.chdir(tmp_path)
     Path("here").touch()
     Path("unreadable").touch(mode=0o000)
-    assert outcome(PlainCommand, words) == outcome(TyperCommand, words)
+    assert outcome(OwnValues, words) == outcome(TyperCommand, words)
 
 
 @pytest.mark.slow
