@@ -268,7 +268,10 @@ def build_continuation(arm: Arm, moving: Flags) -> Continuation:
         )
         goals = np.broadcast_to(goal, begin.shape)
         q, rest, infinite = bare._followed(np.concatenate([known.q, seeds]), begin, goals)
-        start = _Start(parameters=goal, q=_distinct(q[(rest == 0.0) & ~infinite], arm))
+        arrived = (rest == 0.0) & ~infinite
+        if not arrived.any():  # as of an arm that is regular by rounding alone
+            return bare
+        start = _Start(parameters=goal, q=_distinct(q[arrived], arm))
         confirmed = confirmed + 1 if number and len(start.q) == len(known.q) else 0
         if confirmed == _CONFIRMED and len(start.q) % 2 == 0:
             return Continuation(arm=arm, moving=moving, starts=(known, start))

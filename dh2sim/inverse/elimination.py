@@ -191,7 +191,7 @@ class Method:
             found = self._sharp(self._joined_with(found, stuck, more))
             met = np.where(found.sigma < _MET, 2, 1)  # where solutions have met, one stands for two
             counts = np.bincount(found.pose, weights=met, minlength=len(T))[again]
-            lost &= counts + elsewhere != self.continuation.count
+            lost &= (counts + elsewhere != self.continuation.count) | (self.continuation.count == 0)
         too_many = np.bincount(found.pose[found.sigma > _MET], minlength=len(T))[again] > self.continuation.count
         return replace(found, unsure=again[lost | too_many])
 

@@ -11,7 +11,7 @@ from dh2sim.inverse.polish import polish
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
-from tests.inverse.arms import SIXTEEN, odd_arm
+from tests.inverse.arms import SIXTEEN, arm, odd_arm
 from tests.inverse.campaign import is_found
 from tests.sample_robots import robot
 
@@ -44,3 +44,12 @@ def test_locked_joints_follow_to_the_values_of_each_pose() -> None:
     ends = build_continuation(arm, moving).ends(T, {2: q[:, 2]})
     for i, own in enumerate(q):
         assert is_found(spec, own, ends.q[ends.pose == i])
+
+
+def test_an_arm_whose_configurations_are_all_singular_has_no_paths_and_leaves_its_poses_open() -> None:
+    parallel = build_arm(
+        build_chain(arm("parallel", *[(0.1 + 0.05 * i, 0.0, 0.0, 0.0, "R") for i in range(6)])), [None] * 6
+    )
+    continuation = build_continuation(parallel, np.ones(6, dtype=np.bool_))
+    assert continuation.count == 0
+    assert continuation.ends(np.eye(4)[None], {}).lost.tolist() == [1]
