@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -108,11 +109,11 @@ def make_tables(dataset: xr.Dataset) -> tuple[Table, Table, Table]:
         match tuple(map(str, dataset[name].dims)):
             case ("rollout", "step" | "interval", "joint" | "actuator"):
                 joints.append(_of_joints(dataset, name))
-            case ("rollout", "step" | "interval", *other) if len(other) <= 1:
+            case ("rollout", "step" | "interval", *other):
                 steps += _wide(dataset, name, other)
             case ("rollout",) if "flag_meanings" in dataset[name].attrs:
                 rollouts.append(_of_flags(dataset, name))
-            case ("rollout", *other) if len(other) <= 1:
+            case ("rollout", *other):
                 rollouts += _wide(dataset, name, other)
             case dims:
                 raise Dh2simError(f"variable '{name}' has the dimensions {', '.join(dims)}, which fit no table")
@@ -139,15 +140,18 @@ def _of_joints(dataset: xr.Dataset, name: str) -> Column:
     return Column(name=name, type=_type(dataset[name]), values=values, metadata=_metadata(dataset[name]))
 
 
-def _wide(dataset: xr.Dataset, name: str, dimension: list[str]) -> Iterator[Column]:
-    """Yield a column for every label of the last dimension, or the only one."""
+def _wide(dataset: xr.Dataset, name: str, dimensions: list[str]) -> Iterator[Column]:
+    """Yield a column for every label of the last dimension, or labels of the last ones; or the only one."""
     variable = dataset[name]
     recorded = variable.dims[1:2] in (("step",), ("interval",))
 
-    def column(title: str, index: int | None) -> Column:
+    def column(title: str, index: tuple[int, ...]) -> Column:
+        where: tuple[Any, ...] = (..., *index)
+
         def values(part: xr.Dataset) -> NDArray[Any]:
             full = _every_step(part, name) if recorded else np.asarray(part[name].values)
-            return full if index is None else full[..., index]
+            chosen: NDArray[Any] = full[where]
+            return chosen
 
         return Column(
             name=title,
@@ -157,12 +161,13 @@ def _wide(dataset: xr.Dataset, name: str, dimension: list[str]) -> Iterator[Colu
             metadata=_metadata(variable),
         )
 
-    if not dimension:
-        yield column(name, None)
+    if not dimensions:
+        yield column(name, ())
         return
     prefix = name.removesuffix("_pose").removesuffix("_twist")
-    for index, label in enumerate(_labels(dataset, dimension[0])):
-        yield column(f"{prefix}_{label}", index)
+    for labels in product(*(enumerate(_labels(dataset, dimension)) for dimension in dimensions)):
+        title = "_".join([prefix, *(label for _, label in labels)])
+        yield column(title, tuple(index for index, _ in labels))
 
 
 def _of_flags(dataset: xr.Dataset, name: str) -> Column:

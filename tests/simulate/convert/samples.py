@@ -15,6 +15,7 @@ from dh2sim.simulate.store.writer import RunWriter
 ROLLOUTS, BLOCK, RECORDS = 7, 3, 4
 JOINTS, ACTUATORS = ("shoulder", "elbow_2", "slide"), ("shoulder_position", "slide_motor")
 LINKS = ("link_1", "link_2", "link_3")
+AXES = ("x", "y", "z")
 STOPPED, STOP_RECORD = 4, 2
 """A rollout that stopped early, and the last record that it has."""
 TOUCHED = 2
@@ -37,6 +38,7 @@ def make_layout(*, rollouts: int = ROLLOUTS, block: int = BLOCK, actuators: Sequ
             "energy_kind": 2,
             "twist": 6,
             "link": len(LINKS),
+            "axis": len(AXES),
         },
         coordinates=(
             Coordinate(name="rollout", dimension="rollout", values=np.arange(rollouts)),
@@ -51,6 +53,7 @@ def make_layout(*, rollouts: int = ROLLOUTS, block: int = BLOCK, actuators: Sequ
             Coordinate(name="energy_kind", dimension="energy_kind", values=("potential", "kinetic")),
             Coordinate(name="twist", dimension="twist", values=TWIST),
             Coordinate(name="link", dimension="link", values=LINKS),
+            Coordinate(name="axis", dimension="axis", values=AXES),
         ),
         variables=tuple(_variables()),
         attributes={
@@ -97,6 +100,7 @@ def _variables() -> list[Variable]:
         "energy": ((*steps, "energy_kind"), "J"),
         "mass_scale": (("rollout", "link"), "1"),
         "gain_scale": (("rollout", "actuator"), "1"),
+        "com_offset": (("rollout", "link", "axis"), "m"),
     }
     reported = {"flag_values": list(STATUS.values()), "flag_meanings": " ".join(STATUS)}
     touching = {"flag_values": [-1, 1, 2, 4], "flag_meanings": "none base_link link_1 link_3"}

@@ -16,6 +16,7 @@ from dh2sim.simulate.convert.parquet import parquet_files, to_parquet
 from dh2sim.simulate.dataset_layout import POSE, STATUS, TWIST, Layout
 from tests.simulate.convert.samples import (
     ACTUATORS,
+    AXES,
     BLOCK,
     JOINTS,
     LINKS,
@@ -100,6 +101,11 @@ def test_a_row_of_rollouts_tells_how_it_ended_and_what_was_its_own(run: Path, ar
             **{f"saturation_{name}": arrays["saturation"][i, c] for c, name in enumerate(ACTUATORS)},
             **{f"mass_scale_{name}": arrays["mass_scale"][i, c] for c, name in enumerate(LINKS)},
             **{f"gain_scale_{name}": arrays["gain_scale"][i, c] for c, name in enumerate(ACTUATORS)},
+            **{
+                f"com_offset_{name}_{axis}": arrays["com_offset"][i, c, k]
+                for c, name in enumerate(LINKS)
+                for k, axis in enumerate(AXES)
+            },
         }
         for i in range(ROLLOUTS)
     ]
