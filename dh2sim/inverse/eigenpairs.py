@@ -14,6 +14,8 @@ from dh2sim.typing import Array
 
 _CLOSE = 1e-5
 """Half angles that differ by less, in rad, may be one, whose eigenvector is any mixture of those of two solutions."""
+_NEAR = 1e-2
+"""Half angles that differ by less may be one that rounding has split: whether they are is looked at."""
 _LARGE = 1e5
 """Quotient of matrices above which eigenvalues are ill-conditioned."""
 _SINGULAR = 1e8
@@ -22,15 +24,16 @@ _WEIGHTS = (0.8, 0.6)
 """Of the shifts of two powers: where one does not tell solutions apart, both do."""
 
 
-def eigenpairs(C: Array) -> tuple[Array, Array, Flags]:
+def eigenpairs(C: Array) -> tuple[Array, Array, Flags, Array]:
     """Return what solves (C_0 + t C_1 + t² C_2) v = 0.
 
     Args:
         C: Shape (3, N, s, s).
 
     Returns:
-        Eigenvalues, complex, shape (N, 2s), vectors in columns, shape (N, s, 2s), and which are ill-conditioned,
-        because C_2 is nearly singular, bool, shape (N,).
+        Eigenvalues, complex, shape (N, 2s), vectors in columns, shape (N, s, 2s), which are ill-conditioned, because
+        C_2 is nearly singular, bool, shape (N,), and by how much rounding may have changed the pencils that these are
+        the eigenvalues of, shape (N,).
     """
     size = C.shape[-1]
     companion = np.zeros((C.shape[1], 2 * size, 2 * size))
@@ -44,7 +47,10 @@ def eigenpairs(C: Array) -> tuple[Array, Array, Flags]:
     t = np.where(bad[:, None], np.nan, t).astype(np.complex128)
     condition = np.abs(C[2]).max(axis=(1, 2)) * np.abs(solved[:, :, 2 * size :]).max(axis=(1, 2))
     large = bad | (np.abs(companion).max(axis=(1, 2)) > _LARGE) | (condition > _SINGULAR)
-    return t, np.where((np.abs(t) <= 1.0)[:, None, :], V[:, :size], V[:, size:]).astype(np.complex128), large
+    # of the companion matrix, whose eigenvalues are those of one that differs by so much, and back to the pencil
+    rounding = np.finfo(np.float64).eps * np.linalg.norm(companion, axis=(1, 2)) * np.linalg.norm(C[2], axis=(1, 2))
+    V = np.where((np.abs(t) <= 1.0)[:, None, :], V[:, :size], V[:, size:]).astype(np.complex128)
+    return t, V, large, rounding
 
 
 def are_double(half: Array) -> Flags:
@@ -57,7 +63,26 @@ def are_double(half: Array) -> Flags:
     return np.asarray(double | (angles[:, 0] + np.pi - last < _CLOSE))
 
 
-def taken_apart(C: Array, half: Array, poses: Indices) -> tuple[Indices, Array, Array]:
+def shared(C: Array, half: Array, rounding: Array) -> tuple[Indices, Array, Indices]:
+    """Return real half angles that several solutions share: those that are the same, or have been split by rounding.
+
+    Args:
+        C: Coefficients of 1, t, t², shape (3, N, s, s).
+        half: Half angles, complex, shape (N, 2s).
+        rounding: By how much rounding may have changed the pencils, shape (N,).
+
+    Returns:
+        The pose of each, shape (M,), the half angle, rad, shape (M,), and how many solutions share it, shape (M,).
+    """
+    poses = np.flatnonzero(are_double(half))
+    groups = [(i, group.mean(), len(group)) for i in poses for group in _equal(half[i])]
+    pose, count = (np.array([group[k] for group in groups], dtype=np.intp) for k in (0, 2))
+    angle = np.array([group[1] for group in groups], dtype=np.float64)
+    split = _split(C, half, rounding)
+    return np.append(pose, split[0]), np.append(angle, split[1]), np.append(count, split[2])
+
+
+def taken_apart(C: Array, pose: Indices, angle: Array, count: Indices) -> tuple[Indices, Array, Array]:
     """Return the vectors of the solutions that share an eigenvalue, of which its eigenvectors are mixtures.
 
     A vector of products t_4^i t_5^j is that of one solution if shifting the powers multiplies it by a number. On the
@@ -67,19 +92,17 @@ def taken_apart(C: Array, half: Array, poses: Indices) -> tuple[Indices, Array, 
 
     Args:
         C: Coefficients of 1, t, t², shape (3, N, s, s).
-        half: Half angles, complex, shape (N, 2s).
-        poses: Indices of the poses at which some are the same, shape (D,).
+        pose: The pose of each half angle that several share, shape (G,).
+        angle: The half angles, rad, shape (G,).
+        count: How many share them, shape (G,).
 
     Returns:
         The pose of each vector, shape (M,), its half angle, rad, shape (M,), and the vectors, shape (M, s).
     """
     size = C.shape[-1]
-    most = 6 if size > 4 else 3  # numbers that a shift gives
-    groups = [(i, group.mean(), len(group)) for i in poses for group in _equal(half[i]) if len(group) <= most]
-    pose, count = (np.array([group[k] for group in groups], dtype=np.intp) for k in (0, 2))
-    angle = np.array([group[1] for group in groups], dtype=np.float64)
-    c, s = np.cos(angle)[:, None, None], np.sin(angle)[:, None, None]
-    null = np.linalg.svd(c * c * C[0, pose] + s * c * C[1, pose] + s * s * C[2, pose])[2]
+    few = count <= (6 if size > 4 else 3)  # numbers that a shift gives
+    pose, angle, count = pose[few], angle[few], count[few]
+    null = np.linalg.svd(_at(C, pose, angle))[2]
     chosen, vectors = [np.zeros(0, dtype=np.intp)], [np.zeros((0, size))]
     for m in sorted(set(count.tolist())):
         same = np.flatnonzero(count == m)
@@ -94,6 +117,35 @@ def taken_apart(C: Array, half: Array, poses: Indices) -> tuple[Indices, Array, 
         vectors.append(np.swapaxes(single, 1, 2).reshape(-1, size))
     which = np.concatenate(chosen)
     return pose[which], angle[which], np.concatenate(vectors)
+
+
+def _split(C: Array, half: Array, rounding: Array) -> tuple[Indices, Array, Indices]:
+    """Return what :func:`shared` does, of half angles that rounding has split so far that they seem to be two.
+
+    How far it moves two that are the same depends on the pencil: the farther, the nearer others are, real or not. But
+    where the two were, two singular values of the pencil are no more than rounding; between two that differ, one at
+    most is. Source: F. Tisseur, Backward error and condition of polynomial eigenvalue problems, Linear Algebra and
+    its Applications 309, 2000.
+    """
+    real = np.where(np.abs(half.imag) < _NEAR, half.real, np.inf)
+    order = np.argsort(real, axis=1)
+    angles, imaginary = (np.take_along_axis(part, order, 1) for part in (real, np.abs(half.imag)))
+    following = np.roll(angles, -1, axis=1)
+    following[np.arange(len(angles)), np.isfinite(angles).sum(axis=1) - 1] = angles[:, 0] + np.pi  # half a turn on
+    with np.errstate(invalid="ignore"):  # of infinities
+        gaps = np.where(np.isfinite(angles), following - angles, np.inf)
+    distinct = (gaps >= _CLOSE) | (np.maximum(imaginary, np.roll(imaginary, -1, axis=1)) >= _CLOSE)
+    pose, k = np.nonzero((gaps < _NEAR) & distinct)
+    angle = angles[pose, k] + 0.5 * gaps[pose, k]
+    count = (np.linalg.svd(_at(C, pose, angle), compute_uv=False) <= rounding[pose, None]).sum(axis=1)
+    split = count > 1
+    return pose[split], angle[split], count[split]
+
+
+def _at(C: Array, pose: Indices, angle: Array) -> Array:
+    """Return the pencils of poses at half angles, times the squares of their cosines, shape (M, s, s)."""
+    c, s = np.cos(angle)[:, None, None], np.sin(angle)[:, None, None]
+    return np.asarray(c * c * C[0, pose] + s * c * C[1, pose] + s * s * C[2, pose])
 
 
 def _equal(half: Array) -> list[Array]:

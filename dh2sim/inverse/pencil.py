@@ -15,7 +15,7 @@ from functools import reduce
 
 import numpy as np
 
-from dh2sim.inverse.eigenpairs import are_double, eigenpairs, taken_apart
+from dh2sim.inverse.eigenpairs import are_double, eigenpairs, shared, taken_apart
 from dh2sim.inverse.loop import Candidates, Indices, Loop, inverse_poses, joint_motion, loop_order
 from dh2sim.inverse.spherical import spherical_angles
 from dh2sim.typing import Array
@@ -68,15 +68,16 @@ class Pencil:
         right = self._right_side(ring, ends[1])
         C = self._matrices(ring, ends[0], right)
         with np.errstate(all="ignore"):
-            t, v, large = eigenpairs(C)
+            t, v, large, rounding = eigenpairs(C)
             half = np.arctan(t)
-        double = are_double(half)
+        double, groups = are_double(half), shared(C, half, rounding)
+        double[groups[0]] = True
         blurred = np.flatnonzero(large | double | (right.condition(self.rank) > _UNDETERMINED))
         largest = np.take_along_axis(v, np.abs(v).argmax(1)[:, None], 1)[:, 0]
         poses, k = np.nonzero((np.abs(half.imag) < _GATE) & (np.abs(largest) > 0.0))
         # rounding may have split a double root into a pair: begin on both sides of it
         angles, v = half[poses, k].real + half[poses, k].imag, (v[poses, :, k] / largest[poses, k, None]).real
-        more = taken_apart(C, half, np.flatnonzero(double))
+        more = taken_apart(C, *groups)
         poses, angles, v = (np.concatenate(pair) for pair in zip((poses, angles, v), more, strict=True))
         psi = [angles, *_ratios(v.reshape(len(v), 4, v.shape[1] // 4))]
         q = np.full((len(poses), 6), np.nan)

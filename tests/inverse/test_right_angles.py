@@ -9,7 +9,7 @@ from dh2sim.inverse.nearest import goal_sigma_min
 from dh2sim.inverse.solver import InverseSolver
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
-from tests.inverse.arms import CRX, JACO, ORTHOGONAL, arm
+from tests.inverse.arms import ARMS, CRX, JACO, ORTHOGONAL, arm
 from tests.inverse.campaign import is_found
 from tests.inverse.right_angles import Tally, compare, random_arms
 from tests.sample_robots import robot
@@ -43,6 +43,12 @@ def test_regular_configurations_with_joints_at_right_angles_are_found(spec: Robo
     [
         pytest.param(CRX, (RIGHT, np.pi, np.pi, 0.03804475, np.pi, RIGHT), 12, id="solutions are close together"),
         pytest.param(ORTHOGONAL, (RIGHT, 0.0, 0.0, RIGHT, RIGHT, -RIGHT), 6, id="solutions share an angle"),
+        pytest.param(
+            ARMS["manocha_canny"],
+            (RIGHT, -RIGHT, 0.0, 3.141735470035416, RIGHT, np.pi),
+            4,
+            id="rounding splits an angle that solutions share",
+        ),
         pytest.param(JACO, (-RIGHT, 0.0, np.pi, RIGHT, np.pi, -RIGHT), 8, id="solutions of a skew wrist share one"),
         pytest.param(CRX, (0.526857, np.pi, np.pi, 0.878053, np.pi, -RIGHT), 12, id="all pencils are singular"),
         pytest.param(
