@@ -176,7 +176,7 @@ def test_a_saved_robot_is_loaded_as_the_same(arm: Robot, tmp_path: Path) -> None
     np.testing.assert_allclose(Robot.load(path).fk(q), arm.fk(q), atol=1e-14)
     with pytest.raises(OutputError) as caught:
         arm.save(path)
-    assert str(caught.value) == f"'{path}' exists already; choose another name, or pass overwrite=True"
+    assert str(caught.value) == f"'{path}' already exists; choose another name, or pass overwrite=True"
     arm.save(str(path), overwrite=True)
     assert Robot.load(path).mjcf().splitlines()[5:] == arm.mjcf().splitlines()[5:]
 

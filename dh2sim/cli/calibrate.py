@@ -158,10 +158,9 @@ def calibrate(
 
     from dh2sim.calibrate.calibration import calibrate as calibrated
 
-    sigma = _noise(noise)
+    sigma, names, expected = _noise(noise), words_of(unknown, "--unknown") or None, _prior(prior)
     measured = _measured(spec, data, from_run, kind, groups, sigma, rows, seed)
-    names = list(filter(None, words_of(unknown))) if unknown else None
-    found = calibrated(spec, measured, unknown=names, prior=_prior(prior), robust=robust, noise=sigma, seed=seed)
+    found = calibrated(spec, measured, unknown=names, prior=expected, robust=robust, noise=sigma, seed=seed)
     _write(found, out, report)
     if as_json:
         from dh2sim.calibrate.data import calibration_data
@@ -319,7 +318,7 @@ def _noise(text: str | None) -> float | tuple[float, float] | None:
 
 def _prior(texts: list[str] | None) -> dict[str, float] | None:
     found: dict[str, float] = {}
-    for part in words_of(texts):
+    for part in words_of(texts, "--prior"):
         name, is_named, number = part.partition("=")
         if is_named:
             found[name.strip()] = _quantity(number, "--prior")[0]

@@ -110,7 +110,7 @@ def check(
 
     shown = ReportFormat.JSON if json_ else choice(form, ReportFormat, "--format")
     assert shown is not None
-    parts = [part for name in words_of(only) if (part := choice(name, CheckPart, "--only")) is not None]
+    parts = [part for name in words_of(only, "--only") if (part := choice(name, CheckPart, "--only")) is not None]
     forms = [(path, format_of(path)) for path in out or ()]
     accepted = None if baseline is None else Baseline.read(baseline)
     for path in paths or ():

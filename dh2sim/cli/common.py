@@ -135,23 +135,29 @@ def refuse_options(what: str, options: Mapping[str, object]) -> None:
             raise typer.BadParameter(f"does not apply to {what}", param_hint=name)
 
 
-def words_of(texts: Sequence[str] | None) -> list[str]:
+def words_of(texts: Sequence[str] | None, option: str) -> list[str]:
     """Return the words of an option that takes several, with commas between them, or repeated, or both.
 
-    Of one that is given without any it is an empty word, which is refused where one is needed.
+    Raises:
+        BadParameter: The option is given without a word, as ``--only "$PARTS"`` of an unset variable is.
     """
-    words = [word for text in texts or () for part in re.split(f"[,{MANY}]", text) if (word := part.strip())]
-    return words or ([""] if texts else [])
+    words: list[str] = []
+    for text in texts or ():
+        found = [word for part in re.split(f"[,{MANY}]", text) if (word := part.strip())]
+        if not found:
+            raise typer.BadParameter("must not be empty; leave it out for the default", param_hint=option)
+        words += found
+    return words
 
 
 def named_values(texts: Sequence[str] | None, option: str, form: str) -> dict[str, str]:
     """Return the values by name of an option ``name=value,…``; ``form`` says what each is like.
 
     Raises:
-        BadParameter: The text is not of that form, or has a name twice.
+        BadParameter: The text is empty or not of that form, or has a name twice.
     """
     values: dict[str, str] = {}
-    for item in filter(None, words_of(texts)):
+    for item in words_of(texts, option):
         name, equals, value = (part.strip() for part in item.partition("="))
         if not equals or not name or not value:
             raise typer.BadParameter(f"'{item}' is not of the form {form}", param_hint=option)
@@ -220,6 +226,10 @@ def _blames_drawing(error: BaseException) -> bool:
     return "MUJOCO_GL" in os.environ and any(Path(frame.filename).name == "gl_context.py" for frame in frames)
 
 
+_BEGINS_WITH_PLACE = re.compile(r"(?:(?!: )[^\n'])+:\d+:\d+: ")
+"""``file:line:column: ``, which editors and terminals make a link of: nothing may stand before it."""
+
+
 def complain(error: object) -> int:
     """Print an error and return its exit status; problems of robot files and settings have a line each.
 
@@ -231,9 +241,11 @@ def complain(error: object) -> int:
         case SettingsError():
             text = "\n".join(f"dh2sim: {_as_option(name, message)}" for name, message in error.problems)
         case _:
-            text = f"dh2sim: {error}"
+            text = str(error)
+            if not _BEGINS_WITH_PLACE.match(text):
+                text = f"dh2sim: {text}"
     text = printable(text)
-    if sys.stderr.isatty() and not isinstance(error, RobotFileError):
+    if sys.stderr.isatty() and not (isinstance(error, RobotFileError) or _BEGINS_WITH_PLACE.match(text)):
         text = _for_terminal(text)
     print(text, file=sys.stderr)
     return FELL_SHORT if isinstance(error, MismatchError) else BAD_INPUT

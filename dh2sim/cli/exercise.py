@@ -56,7 +56,7 @@ def exercise(
         }
         existing = [name for name in files if (out / name).exists()]
         if existing and not force:
-            raise OutputError(f"'{out / existing[0]}' exists already; choose another folder, or give --force")
+            raise OutputError(f"'{out / existing[0]}' already exists; choose another folder, or give --force")
         with atomic_files(out) as staging:
             for name, text in files.items():
                 (staging / name).write_text(text, encoding="utf-8")

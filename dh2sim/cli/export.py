@@ -100,7 +100,8 @@ def _report_waiting(folder: Path) -> None:
 def _formats(names: list[str] | None) -> list[Format]:
     from dh2sim.export import Format
 
-    chosen = [format_ for name in words_of(names) if (format_ := choice(name, Format, "--format")) is not None]
+    option = "--format"
+    chosen = [format_ for name in words_of(names, option) if (format_ := choice(name, Format, option)) is not None]
     return list(dict.fromkeys(chosen or Format))
 
 

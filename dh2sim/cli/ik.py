@@ -277,7 +277,7 @@ def _locked(
     from dh2sim.cli.goal import numbers
     from dh2sim.inverse.reach import amount_text, beyond_limits
 
-    words = list(filter(None, words_of(options.lock)))
+    words = words_of(options.lock, "--lock")
     rows = {row.name: row for row in spec.moving_rows}
     lock: dict[str, float] = {}
     for word in words:

@@ -177,7 +177,7 @@ def require_free(out: Path | None, *, force: bool) -> None:
         return
     require_folder(out)
     if out.exists() and not force:
-        raise OutputError(f"'{out}' exists already; choose another name, or overwrite it with --force")
+        raise OutputError(f"'{out}' already exists; choose another name, or overwrite it with --force")
 
 
 def hand_over(text: str, out: Path | None, *, summary: str, notes: Iterable[str] = (), quiet: bool = False) -> None:

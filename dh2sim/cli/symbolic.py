@@ -85,7 +85,7 @@ def symbolic(
         "--fold": fold != "parallel",
         "--no-fold": no_fold,
     }
-    parts = words_of(what) or ["pose"]
+    parts = words_of(what, "--what") or ["pose"]
     if is_about_code(parts, as_):
         words = {"--no-names": not names, "--numbers": numbers, "--letters": letters, "--q": q}
         refuse_options("code", frames | nesting | words)

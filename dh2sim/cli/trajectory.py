@@ -219,7 +219,7 @@ def _limits(model: RobotModel, texts: Sequence[str] | None) -> dict[str, Any]:
     problems: list[tuple[str, str]] = []
     found: dict[str, Any] = {}
     joints = [joint.name for joint in model.moving_joints]
-    for word in filter(None, words_of(texts)):
+    for word in words_of(texts, "--limits"):
         name, equals, value = word.partition("=")
         joint, _, quantity = name.rpartition(".")
         quantity = quantity.replace("-", "_")

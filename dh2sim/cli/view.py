@@ -135,7 +135,7 @@ def _begins_with_time(path: Path) -> bool:
 
 
 def _host_names(texts: list[str] | None) -> list[str]:
-    names = words_of(texts)
+    names = words_of(texts, "--allow-host")
     for name in names:
         if not re.fullmatch(r"[\w.-]{1,253}", name):
             raise typer.BadParameter(

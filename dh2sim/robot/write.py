@@ -208,7 +208,7 @@ def save_robot(
     """
     file = Path(path)
     if file.exists() and not overwrite:
-        raise OutputError(f"'{file}' exists already; choose another name, or pass overwrite=True")
+        raise OutputError(f"'{file}' already exists; choose another name, or pass overwrite=True")
     units = spec.units if spec.source_file else Units(angle=AngleUnit.DEG)
     header = [f"Note: {note}" for note in notes]
     folder = file.absolute().parent

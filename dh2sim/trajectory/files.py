@@ -155,7 +155,7 @@ class SampledTrajectory:
         file = Path(path)
         require_suffix(file)
         if file.exists() and not overwrite:
-            raise OutputError(f"'{file}' exists already; choose another name, or pass overwrite=True")
+            raise OutputError(f"'{file}' already exists; choose another name, or pass overwrite=True")
         with atomic_file(file) as draft, draft.open("wb") as stream:
             if file.suffix.lower() == ".csv":
                 with stage("writing", "samples", len(self.time)) as advance:

@@ -59,7 +59,7 @@ def test_the_report_says_what_is_told_and_how_well(points: Path, tmp_path: Path)
     assert [row.limits.position for row in calibrated.rows] == [row.limits.position for row in robot("stanford").rows]
     again = dh2sim("calibrate", "stanford", points, "-o", out)
     assert again.status == 2
-    assert "exists already" in again.err
+    assert "already exists" in again.err
 
 
 def test_json_is_the_same_as_data(points: Path) -> None:

@@ -59,7 +59,7 @@ def test_a_picture_that_exists_is_not_overwritten_and_nothing_else_is_written(ax
     before = contents(tmp_path)
     run = dh2sim("frames", axes, "--picture", drawing, "-o", out)
     assert (run.status, run.out) == (2, "")
-    assert run.err == f"dh2sim: '{drawing}' exists already; choose another name, or overwrite it with --force\n"
+    assert run.err == f"dh2sim: '{drawing}' already exists; choose another name, or overwrite it with --force\n"
     assert contents(tmp_path) == before
 
 

@@ -48,7 +48,7 @@ def test_a_file_that_exists_is_not_overwritten_unless_forced(urdf: Path, tmp_pat
     out.write_text("mine\n")
     run = dh2sim("import", urdf, "-o", out)
     assert (run.status, run.out) == (2, "")
-    assert run.err == f"dh2sim: '{out}' exists already; choose another name, or overwrite it with --force\n"
+    assert run.err == f"dh2sim: '{out}' already exists; choose another name, or overwrite it with --force\n"
     assert out.read_text() == "mine\n"
     assert dh2sim("import", urdf, "-o", out, "--force").status == 0
     assert out.read_text() != "mine\n"

@@ -80,7 +80,7 @@ def test_a_file_is_never_overwritten_without_force() -> None:
     Path("arm.yaml").write_text("mine", encoding="utf-8")
     run = dh2sim("new", "arm")
     assert (run.status, run.out) == (2, "")
-    assert run.err == "dh2sim: 'arm.yaml' exists already; choose another name, or overwrite it with --force\n"
+    assert run.err == "dh2sim: 'arm.yaml' already exists; choose another name, or overwrite it with --force\n"
     assert Path("arm.yaml").read_text(encoding="utf-8") == "mine"
     assert dh2sim("new", "arm", "--force").status == 0
     assert (

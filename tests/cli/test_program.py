@@ -243,7 +243,6 @@ def test_an_unknown_command_is_reported_with_the_one_that_may_be_meant() -> None
         ),
         ("--foo", "unknown option '--foo'. 'dh2sim --help' lists them all"),
         ("check --only file,drift", "--only: 'file' is not one of files, drift, poses. Did you mean 'files'?"),
-        ("check --only=", "--only: '' is not one of files, drift, poses"),
         ("sweep rpr --vary=", "there is nothing to vary: give --vary or --designs"),
     ],
 )
@@ -433,3 +432,25 @@ def test_lists_are_given_with_commas_or_by_repeating_the_option() -> None:
     assert commas == repeated
     code = ("symbolic", "rpr", "--as", "python")
     assert dh2sim(*code, "--what", "pose,jacobian") == dh2sim(*code, "--what", "pose", "--what", "jacobian")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("check", "{robot}", "--only"),
+        ("symbolic", "rpr", "--what"),
+        ("export", "rpr", "--format", "urdf", "--format"),
+        ("trajectory", "rpr", "0,0,0", "0.1,0.1,0.1", "--limits"),
+        ("ik", "rpr", "--xyz", "0.1", "0.2", "0.3", "--lock"),
+        ("calibrate", "rpr", "data.csv", "--prior"),
+        ("calibrate", "rpr", "data.csv", "--unknown"),
+        ("view", "rpr", "--no-browser", "--allow-host"),
+    ],
+    ids=" ".join,
+)
+@pytest.mark.parametrize("empty", ["", " , "])
+def test_an_empty_list_does_not_mean_the_default(arguments: tuple[str, ...], empty: str, tmp_path: Path) -> None:
+    robot = write(tmp_path, small())
+    run = dh2sim(*(each.format(robot=robot) for each in arguments), empty)
+    assert (run.status, run.out) == (2, "")
+    assert run.err == f"dh2sim: {arguments[-1]} must not be empty; leave it out for the default\n"

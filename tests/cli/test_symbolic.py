@@ -51,7 +51,7 @@ def test_json_goes_to_a_file_whole(tmp_path: Path) -> None:
     assert json.loads(out.read_text())["equations"][1]["entries"] == [["a1*a2*s2"]]
     again = dh2sim("symbolic", "scara", "-o", out)
     assert again.status == 2
-    assert "exists already" in again.err
+    assert "already exists" in again.err
     assert dh2sim("symbolic", "scara", "-o", out, "--force").status == 0
 
 

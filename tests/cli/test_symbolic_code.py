@@ -27,7 +27,7 @@ def test_code_is_written_to_a_file_and_a_file_is_not_overwritten_unasked(tmp_pat
     assert file.read_text() == generate_code(robot("rpr"), ALL.split(","), "c")
     again = dh2sim("symbolic", "rpr", "--as", "c", "-o", file)
     assert again.status == 2
-    assert "exists already" in again.err
+    assert "already exists" in again.err
     assert dh2sim("symbolic", "rpr", "--as", "c", "-o", file, "--force").status == 0
 
 

@@ -274,7 +274,7 @@ def test_an_invalid_host_is_refused(host: str) -> None:
     assert done.err.count("\n") == 1, "a sentence, no traceback"
 
 
-@pytest.mark.parametrize("name", ["", "http://lab.example.org", "lab.example.org:80", "a b", "*"])
+@pytest.mark.parametrize("name", ["http://lab.example.org", "lab.example.org:80", "a b", "*"])
 def test_an_invalid_name_of_this_machine_is_refused(name: str) -> None:
     done = dh2sim("view", "stanford", "--no-browser", "--allow-host", name)
     assert (done.status, done.out) == (2, "")
@@ -304,7 +304,7 @@ def test_an_exported_page_replaces_another_only_with_force(tmp_path: Path) -> No
     assert dh2sim("view", "scara", "--export", page).status == 0
     scara = page.read_bytes()
     done = dh2sim("view", "stanford", "--export", page)
-    message = f"dh2sim: '{page}' exists already; choose another name, or overwrite it with --force\n"
+    message = f"dh2sim: '{page}' already exists; choose another name, or overwrite it with --force\n"
     assert (done.status, done.out, done.err) == (2, "", message)
     assert page.read_bytes() == scara
     assert dh2sim("view", "stanford", "--export", page, "--force").status == 0

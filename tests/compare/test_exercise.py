@@ -59,7 +59,7 @@ def test_the_command_writes_the_same_bytes_for_the_same_seed(tmp_path: Path) -> 
     assert max(map(len, text.splitlines())) <= 100
     again = dh2sim("exercise", "--seed", "8", "-o", tmp_path / "one")
     assert (again.status, again.out) == (2, "")
-    assert "exists already" in again.err
+    assert "already exists" in again.err
 
 
 def test_seeds_and_levels_that_are_not_allowed_are_refused() -> None:

@@ -162,7 +162,7 @@ def test_an_assembly_that_cannot_be_closed_is_refused_with_its_place(tmp_path: P
     file.write_text(text.replace("ground: 2,", "ground: 9,"), encoding="utf-8")
     result = dh2sim("mobility", file)
     assert result.status == 2
-    assert result.err.startswith(f"dh2sim: {file}:20:15: assembly.q: the loops cannot be closed: C stays open by")
+    assert result.err.startswith(f"{file}:20:15: assembly.q: the loops cannot be closed: C stays open by")
 
 
 def test_schatzs_linkage_turns_inside_out() -> None:

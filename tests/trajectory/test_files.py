@@ -52,7 +52,7 @@ def test_a_trajectory_is_written_as_the_same_bytes_and_over_nothing(tmp_path: Pa
         planned.save(one, samples=50)
         planned.save(other, samples=50)
         assert one.read_bytes() == other.read_bytes()
-        with pytest.raises(OutputError, match=r"exists already; choose another name, or pass overwrite=True"):
+        with pytest.raises(OutputError, match=r"already exists; choose another name, or pass overwrite=True"):
             planned.save(one)
     with pytest.raises(SettingsError, match=r"out must end in .csv or .npz, got"):
         planned.save(tmp_path / "motion.txt")
