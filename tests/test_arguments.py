@@ -23,6 +23,8 @@ WRONG: dict[str, Any] = {
     "array of objects": np.array([object()] * 3, object),
     "complex array": np.array([1j, 2.0, 3.0]),
     "texts": [["a"] * 3],
+    "list of NaN": [np.nan],
+    "NaN": np.nan,
     "negative": -1.5,
 }
 CALLS: dict[str, Callable[[Any], object]] = {
@@ -66,6 +68,10 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "export(out)": ARM.export,
     "export(formats)": lambda x: ARM.export("build", formats=x),
     "validate(samples)": lambda x: ARM.validate(samples=x),
+    "validate(seed)": lambda x: ARM.validate(samples=1, seed=x),
+    "validate(tolerance)": lambda x: ARM.validate(samples=1, tolerance=x),
+    "validate(tolerance) of a mechanism": lambda x: LOOP.validate(samples=1, tolerance=x),
+    "diff(tolerance)": lambda x: ARM.diff(ARM, tolerance=x),
     "sweep(vary)": lambda x: ARM.sweep(vary=x),
     "sweep(count)": lambda x: ARM.sweep(vary={"L2": 0.1}, count=x),
     "sweep(measure)": lambda x: ARM.sweep(vary={"L2": 0.1}, measure=x),

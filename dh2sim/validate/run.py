@@ -96,14 +96,17 @@ def validate_robot(
         The report. A file that is missing or that an engine refuses is a check that failed.
 
     Raises:
-        Dh2simError: ``samples`` is not a whole number of at least 1, or the source is not of this robot.
+        ArgumentError: ``seed`` or ``tolerance`` is of a wrong kind.
+        Dh2simError: ``samples`` is not a whole number of at least 1, ``tolerance`` is not above 0 and below 1, or the
+            source is not of this robot.
         ImportedFileError: The source is wrong.
         ModelError: A format cannot hold the robot.
         OutputError: The files cannot be written to the temporary folder.
     """
     if not isinstance(samples, int | np.integer) or samples < 1:
         raise Dh2simError(f"samples must be a whole number of at least 1, got {samples!r}")
-    number("tolerance", tolerance)
+    if not 0.0 < number("tolerance", tolerance) < 1.0:
+        raise Dh2simError(f"tolerance must be above 0 and below 1, got {tolerance!r}")
     seed = whole_number("seed", seed)
     if isinstance(robot, MechanismModel):
         if source is not None:
