@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeAlias
@@ -189,7 +190,8 @@ def compile_plant(mjcf: str, robot: RobotModel | MechanismModel) -> Plant:
         EngineError: MuJoCo refuses it.
     """
     try:
-        with mujoco_warnings():  # a rollout says itself what becomes of it
+        # a rollout says itself what becomes of it; of a description MuJoCo warns by Python's warnings
+        with mujoco_warnings(), warnings.catch_warnings(action="ignore"):
             described = mujoco.MjSpec.from_string(mjcf)
             _name_pairs(described)
             compiled = described.compile()
