@@ -153,6 +153,10 @@ class RunDamagedError(RunError):
     """Files of a run are missing or are not what was written."""
 
 
+class RunUnreachableError(RunError):
+    """The server with a run does not answer."""
+
+
 class RunBusyError(RunError):
     """Another process is writing to the run."""
 

@@ -22,7 +22,15 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
-from dh2sim.errors import Dh2simError, ExecutorError, RunDiffersError, RunError, SettingsError
+from dh2sim.errors import (
+    Dh2simError,
+    ExecutorError,
+    RunDiffersError,
+    RunError,
+    RunOutputError,
+    RunUnreachableError,
+    SettingsError,
+)
 from dh2sim.extras import require_extra
 from dh2sim.processors import available_processors
 from dh2sim.progress import Advance
@@ -38,6 +46,8 @@ MOST_WAITING: Final = 1024
 """Tasks that an executor is given before it has finished others: they take some 50 kB each."""
 _A_MOMENT: Final = 0.2
 """s between two questions whether to stop."""
+_HANDED_OVER: Final = 1.0
+"""s in which a worker begins the tasks that it was given before anybody knew that one failed."""
 _LOCAL: Final = "local"
 _DASK: Final = "dask://"
 _CONNECT: Final = 5
@@ -236,13 +246,27 @@ def _simulate(common: bytes, initial: InitialStates, rollouts: range, threads: i
 
 
 def _commit(common: bytes, initial: InitialStates, place: str, digest: str, block: int, threads: int) -> None:
-    """Simulate a block and commit it, unless that was done before."""
+    """Simulate a block and commit it, unless that was done before, or the worker's last one could not be written."""
     job = _job(common)
-    with _joined(place, job, digest) as writer:
-        if writer.pending([block]):
-            start = time.perf_counter()
-            arrays = simulate_block(replace(job, initial=initial), job.layout.rollouts(block), threads=threads)
-            writer.write(block, arrays, time.perf_counter() - start)
+    when, failure = _failures.get(place, (0.0, None))
+    if failure is not None and time.monotonic() - when < _HANDED_OVER:
+        raise failure
+    try:
+        with _joined(place, job, digest) as writer:
+            if writer.pending([block]):
+                start = time.perf_counter()
+                arrays = simulate_block(replace(job, initial=initial), job.layout.rollouts(block), threads=threads)
+                writer.write(block, arrays, time.perf_counter() - start)
+    except (RunOutputError, RunUnreachableError) as error:
+        reading = isinstance(error, RunUnreachableError)  # before the block was begun
+        advice = "; what was committed is safe. Resume when it answers" if reading else ""
+        told = RunOutputError(f"{error}{advice}")
+        _failures[place] = time.monotonic(), told
+        raise told from error
+
+
+_failures: dict[str, tuple[float, RunOutputError]] = {}
+"""When and why this worker could not write to a run, by its place."""
 
 
 @contextmanager

@@ -319,6 +319,8 @@ def fill(
             if stopping():
                 finished = False
                 break
+            if written is not None and written.done():
+                written.result()  # raises its error before another block is begun
             rollouts = writer.layout.rollouts(block)
             if not writer.pending([block]):  # another process was quicker
                 report(len(rollouts))

@@ -10,13 +10,14 @@ import errno
 import os
 import re
 import socket
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import timedelta
 from typing import Any, Final
 
-from dh2sim.errors import RunError, RunExistsError, RunOutputError
+from dh2sim.errors import RunError, RunExistsError, RunOutputError, RunUnreachableError
 from dh2sim.extras import require_extra
 from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.store.directory import check_replaceable
@@ -27,7 +28,9 @@ from dh2sim.simulate.store.storage import run_all
 _WHOLE: Final = 2**28
 """Bytes of objects that are sent in one request; larger ones in several, at whose end they appear."""
 _PATIENCE: Final = timedelta(seconds=60)
-"""For a request that fails and is sent again."""
+"""After which a request that failed is not sent again."""
+_PAUSE: Final = timedelta(seconds=5)
+"""Longest one before a request is sent again."""
 _CREDENTIALS: Final = (
     "AWS_ACCESS_KEY_ID",
     "AWS_WEB_IDENTITY_TOKEN_FILE",
@@ -40,14 +43,15 @@ _CREDENTIALS: Final = (
 _METADATA: Final = "169.254.169.254"
 """Where machines of a cloud are asked for credentials."""
 _NO_CREDENTIALS: Final = "no credentials were found: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY"
-_TIMEOUT: Final = timedelta(seconds=120)
-"""For a single request."""
+_TIMEOUT: Final = timedelta(seconds=60)
+"""For a single request, its data included; not less than ``_PATIENCE``, so that a silent server is asked once."""
 _CONNECTING: Final = timedelta(seconds=5)
-"""For a server to answer at all."""
+"""For a server to accept a connection."""
+_NO_ANSWER: Final = "the server does not answer; see AWS_ENDPOINT_URL, AWS_REGION and the network"
 _CAUSES: Final = {
     (f"//{_METADATA}/",): _NO_CREDENTIALS,
     ("NoSuchBucket",): "there is no such bucket",
-    ("error sending request",): "the server does not answer; see AWS_ENDPOINT_URL, AWS_REGION and the network",
+    ("error sending request", "error decoding response body", "operation timed out"): _NO_ANSWER,
     ("RequestTimeTooSkewed",): "the clock of this machine is too far from the server's: set it",
     ("ExpiredToken", "TokenRefreshRequired"): "the credentials have expired",
     ("ETag Header missing",): "what answers is no object store; see AWS_ENDPOINT_URL",
@@ -63,7 +67,10 @@ _MANIFEST: Final = f"{BLOCKS}/{METADATA}"
 
 
 class ObjectStore:
-    """The objects of a bucket whose names begin with a prefix; see ``Store``."""
+    """The objects of a bucket whose names begin with a prefix; see ``Store``.
+
+    Once its server has not answered a request in time, no other is sent.
+    """
 
     def __init__(self, url: str) -> None:
         """Use ``s3://BUCKET/PREFIX``, with credentials, region and endpoint of the variables ``AWS_…``.
@@ -81,6 +88,7 @@ class ObjectStore:
         endpoint = os.environ.get("AWS_ENDPOINT_URL_S3") or os.environ.get("AWS_ENDPOINT_URL")
         more: dict[str, Any] = {"endpoint": endpoint} if endpoint else {}
         self.name = url
+        self._lost = False
         if not any(os.environ.get(name) for name in _CREDENTIALS) and not _reaches_metadata():
             raise RunError(f"cannot use '{url}': {_NO_CREDENTIALS}")
         try:
@@ -92,7 +100,11 @@ class ObjectStore:
                     "timeout": _TIMEOUT,
                     "connect_timeout": _CONNECTING,
                 },
-                retry_config={"max_retries": 10, "retry_timeout": _PATIENCE},
+                retry_config={
+                    "max_retries": 10,
+                    "retry_timeout": _PATIENCE,
+                    "backoff": {"init_backoff": timedelta(milliseconds=100), "max_backoff": _PAUSE, "base": 2},
+                },
                 **more,
             )
         except Exception as error:
@@ -122,7 +134,7 @@ class ObjectStore:
 
         def send(key: str) -> None:
             data = b"".join(files[key])
-            with _writing():
+            with self._writing():
                 obstore.put(self._objects, key, data, use_multipart=len(data) > _WHOLE)
 
         *others, last = files
@@ -135,7 +147,7 @@ class ObjectStore:
         from obstore.exceptions import AlreadyExistsError
 
         try:
-            with _writing():
+            with self._writing():
                 obstore.put(self._objects, key, data, mode="create", use_multipart=False)
         except FileExistsError:
             return False
@@ -175,7 +187,7 @@ class ObjectStore:
         """Remove an object, if it is there."""
         import obstore
 
-        with _writing():
+        with self._writing():
             obstore.delete(self._objects, key)
 
     def clear(self) -> None:
@@ -184,7 +196,7 @@ class ObjectStore:
 
         with self._reading():
             keys = [each["path"] for some in obstore.list(self._objects) for each in some]
-        with _writing():
+        with self._writing():
             obstore.delete(self._objects, [key for key in keys if key != METADATA])
             obstore.delete(self._objects, METADATA)
 
@@ -194,10 +206,13 @@ class ObjectStore:
 
         Raises:
             FileNotFoundError: There is no such object.
-            RunError: The store cannot be read.
+            RunUnreachableError: Its server does not answer.
+            RunError: The store cannot be read otherwise.
         """
         from obstore.exceptions import BaseError, NotFoundError
 
+        if self._lost:
+            raise RunUnreachableError(f"cannot read '{self.name}': {_NO_ANSWER}")
         try:
             yield
         except (NotFoundError, FileNotFoundError) as error:
@@ -205,7 +220,37 @@ class ObjectStore:
                 raise RunError(f"cannot read '{self.name}': there is no such bucket") from error
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT)) from error
         except BaseError as error:
-            raise RunError(f"cannot read '{self.name}': {_cause(error)}") from error
+            told = reading_error(self.name, error)
+            assert told is not None
+            self._lost |= isinstance(told, RunUnreachableError)
+            raise told from error
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Turn obstore's errors into an ``OSError``."""
+        from obstore.exceptions import BaseError
+
+        if self._lost:
+            raise OSError(errno.ETIMEDOUT, _NO_ANSWER)
+        try:
+            yield
+        except BaseError as error:
+            cause = _cause(error)
+            self._lost |= cause == _NO_ANSWER
+            raise OSError(errno.EIO, cause) from error
+
+
+def reading_error(place: str, error: BaseException) -> RunError | None:
+    """Return the error for users that stands for one of obstore's; None for any other error."""
+    if "obstore" not in sys.modules:
+        return None
+    from obstore.exceptions import BaseError
+
+    if not isinstance(error, BaseError):
+        return None
+    cause = _cause(error)
+    kind = RunUnreachableError if cause == _NO_ANSWER else RunError
+    return kind(f"cannot read '{place}': {cause}")
 
 
 def create_objects(store: ObjectStore, files: Mapping[str, bytes], *, overwrite: bool) -> None:
@@ -252,17 +297,6 @@ def complete_objects(store: ObjectStore, layout: Layout) -> None:
 def _put_rest(store: ObjectStore, files: Mapping[str, bytes]) -> None:
     run_all(lambda key: store.put_new(key, files[key]), [key for key in files if key not in (METADATA, _MANIFEST)])
     store.put_new(_MANIFEST, files[_MANIFEST])
-
-
-@contextmanager
-def _writing() -> Iterator[None]:
-    """Turn obstore's errors into an ``OSError``."""
-    from obstore.exceptions import BaseError
-
-    try:
-        yield
-    except BaseError as error:
-        raise OSError(errno.EIO, _cause(error)) from error
 
 
 def _cause(error: BaseException) -> str:

@@ -25,6 +25,7 @@ from dh2sim.simulate.store.manifest import (
     read_manifest,
     read_node,
 )
+from dh2sim.simulate.store.objects import reading_error
 from dh2sim.simulate.store.places import open_store
 from dh2sim.simulate.store.storage import Place, Store, run_all
 
@@ -254,6 +255,7 @@ def reading(path: Place) -> Iterator[None]:
 
     Raises:
         RunDamagedError: A chunk is damaged.
+        RunError: The object store cannot be read.
     """
     try:
         yield
@@ -261,6 +263,10 @@ def reading(path: Place) -> Iterator[None]:
         raise
     except (OSError, ValueError, RuntimeError, KeyError, TypeError) as error:
         raise RunDamagedError(damaged_run(path)) from error
+    except Exception as error:
+        if told := reading_error(fspath(path), error):
+            raise told from error
+        raise
 
 
 def damaged_run(path: Place) -> str:

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from numpy.typing import NDArray
 
-from dh2sim.errors import RunDiffersError, RunExistsError, RunOutputError
+from dh2sim.errors import RunDiffersError, RunExistsError, RunOutputError, RunUnreachableError
 from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.store.codec import checksum_bytes, encode, encode_text
 from dh2sim.simulate.store.compatibility import differences
@@ -158,10 +158,18 @@ class RunWriter:
         return os.path.abspath(store.path) if isinstance(store, LocalStore) else store.name
 
     def pending(self, blocks: Iterable[int] | None = None) -> tuple[int, ...]:
-        """Return the blocks, of all or of some, that are not committed, or were found damaged by ``resume``."""
+        """Return the blocks, of all or of some, that are not committed, or were found damaged by ``resume``.
+
+        Raises:
+            RunError: The run cannot be read.
+            RunOutputError: Its server does not answer.
+        """
         wanted = range(self.layout.blocks) if blocks is None else list(blocks)
         unknown = [block for block in wanted if block not in self._committed]
-        self._committed.update(self._run.records(unknown))
+        try:
+            self._committed.update(self._run.records(unknown))
+        except RunUnreachableError as error:
+            raise self._unreachable(error) from error
         return tuple(block for block in wanted if block not in self._committed)
 
     def write(self, block: int, arrays: Mapping[str, NDArray[Any]], seconds: float) -> None:
@@ -181,6 +189,8 @@ class RunWriter:
         self._check(block, arrays)
         try:
             self._write(block, arrays, seconds)
+        except RunUnreachableError as error:
+            raise self._unreachable(error) from error
         except OSError as error:
             raise self._cannot_write(error) from error
         self._committed.add(block)
@@ -249,15 +259,24 @@ class RunWriter:
                 raise ValueError(f"'{variable.name}' must have the shape {expected}, got {shape}")
 
     def _cannot_write(self, error: OSError) -> RunOutputError:
-        blocks = self._committed
-        with suppress(OSError, ValueError):
-            blocks = {*self._run.recorded_blocks()}
-        safe = sum(len(self.layout.rollouts(block)) for block in blocks)
+        problem = f"cannot write to '{self._run.store.name}': {error.strerror or error}"
+        try:
+            blocks = self._run.recorded_blocks()
+        except RunUnreachableError:
+            return self._unreachable(problem)
+        except (OSError, ValueError):
+            blocks = list(self._committed)
         advice = "Make room, then resume" if error.errno in _FULL else "Resume when it can be written to"
-        return RunOutputError(
-            f"cannot write to '{self._run.store.name}': {error.strerror or error}; {safe} of "
-            f"{self.layout.sizes['rollout']} rollouts are safe. {advice}"
-        )
+        return RunOutputError(f"{problem}; {self._safe(blocks)} are safe. {advice}")
+
+    def _unreachable(self, problem: object) -> RunOutputError:
+        """Return the error for a server that does not answer; nor is it asked what others have committed."""
+        safe = f"at least {self._safe(self._committed)} are" if self._committed else "what was committed is"
+        return RunOutputError(f"{problem}; {safe} safe. Resume when it answers")
+
+    def _safe(self, blocks: Iterable[int]) -> str:
+        count = sum(len(self.layout.rollouts(block)) for block in blocks)
+        return f"{count} of {self.layout.sizes['rollout']} rollouts"
 
 
 def _is_vacant(path: Place) -> bool:

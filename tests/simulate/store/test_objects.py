@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from contextlib import suppress
+from datetime import timedelta
 from importlib.util import find_spec
 from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
+from typing import Any
 
 import pytest
 
-from dh2sim.errors import RunDiffersError, RunError, RunExistsError
+from dh2sim.errors import RunDiffersError, RunError, RunExistsError, RunOutputError
 from dh2sim.simulate.description import describe
+from dh2sim.simulate.run import rollout
 from dh2sim.simulate.store import objects as objects_module
 from dh2sim.simulate.store.codec import encode_text
 from dh2sim.simulate.store.metadata import make_metadata
@@ -201,3 +210,125 @@ def test_a_server_that_does_not_answer_is_reported_within_seconds(
     shown = dh2sim(*command.format(RUN).split())
     told = "the server does not answer; see AWS_ENDPOINT_URL, AWS_REGION and the network"
     assert (shown.status, shown.err) == (2, f"dh2sim: cannot read '{RUN}': {told}\n")
+
+
+class Proxy:
+    """Passes requests on to a server, until it answers none any more."""
+
+    def __init__(self, server: str) -> None:
+        self.answered = 0
+        self.most = 10**9
+        """Requests that are answered."""
+        self.hangs = True
+        """Whether it says nothing then; else it closes connections."""
+        self._server = server.removeprefix("http://").rpartition(":")
+        self._listening = socket.create_server(("127.0.0.1", 0), backlog=128)
+        self._open: list[socket.socket] = [self._listening]
+        self.url = f"http://127.0.0.1:{self._listening.getsockname()[1]}"
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            while True:
+                client = self._listening.accept()[0]
+                server = socket.create_connection((self._server[0], int(self._server[2])))
+                self._open += [client, server]
+                threading.Thread(target=self._pass, args=(client, server), daemon=True).start()
+                threading.Thread(target=self._pass, args=(server, client), daemon=True).start()
+
+    def _pass(self, source: socket.socket, target: socket.socket) -> None:
+        with suppress(OSError):
+            while data := source.recv(2**16):
+                begun = len(re.findall(rb"(?m)^[A-Z]+ /\S* HTTP/1.1\r$", data))
+                if begun and self.answered + begun > self.most:
+                    if self.hangs:
+                        continue
+                    break
+                self.answered += begun
+                target.sendall(data)
+        for end in (source, target):
+            with suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """Close all connections."""
+        for each in self._open:
+            with suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+            each.close()
+
+
+@pytest.fixture
+def proxy(server: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Proxy]:
+    """A server that may fail, of which clients have little patience."""
+    for name in ("_TIMEOUT", "_PATIENCE"):
+        monkeypatch.setattr(objects_module, name, timedelta(seconds=1))
+    monkeypatch.setattr(objects_module, "_PAUSE", timedelta(seconds=0.2))
+    proxy = Proxy(server)
+    monkeypatch.setenv("AWS_ENDPOINT_URL", proxy.url)
+    yield proxy
+    proxy.close()
+
+
+MADE = "rollout planar_2r --rollouts 12 --steps 4 --block-size 2 -q --out"
+NO_ANSWER = "the server does not answer; see AWS_ENDPOINT_URL, AWS_REGION and the network"
+
+
+@pytest.mark.parametrize(("hangs", "most"), [(True, 20), (True, 110), (False, 110)])  # 40 make a run, some 15 a block
+def test_a_server_that_stops_ends_the_command_and_the_run_is_resumed(
+    proxy: Proxy, tmp_path: Path, *, hangs: bool, most: int
+) -> None:
+    proxy.hangs, proxy.most = hangs, most
+    start = time.monotonic()
+    stopped = dh2sim(*MADE.split(), RUN)
+    assert time.monotonic() - start < 10
+    assert (stopped.status, stopped.out, stopped.err.count("\n")) == (2, "", 1)
+    told = re.fullmatch(rf"dh2sim: cannot (?:read|write to) '{RUN}': {NO_ANSWER}(.*)\n", stopped.err)
+    assert told is not None, stopped.err
+    proxy.most = 10**9
+    if most > 100:
+        safe = re.fullmatch(r"; at least (\d+) of 12 rollouts are safe\. Resume when it answers", told[1])
+        assert safe is not None
+        assert 12 > 12 - describe(RUN).not_run >= int(safe[1]) > 0
+    assert dh2sim(*MADE.split(), RUN, "--resume").status == 0
+    assert dh2sim(*MADE.split(), tmp_path / "run.zarr").status == 0
+    assert open_dataset(RUN).drop_attrs().equals(open_dataset(tmp_path / "run.zarr").drop_attrs())
+
+
+class Hasty(Executor):
+    """Does each task when it is submitted, as a worker that has been given all of them; the server stops before."""
+
+    def __init__(self, proxy: Proxy) -> None:
+        self._proxy = proxy
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **keywords: Any) -> Future[Any]:
+        """Call a function."""
+        self._proxy.most = 0
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*arguments, **keywords))
+        except RunOutputError as error:
+            future.set_exception(error)
+        return future
+
+
+def test_a_worker_waits_once_for_a_server_that_stops(proxy: Proxy) -> None:
+    start = time.monotonic()
+    told = f"cannot read '{RUN}': {NO_ANSWER}; what was committed is safe. Resume when it answers"
+    with pytest.raises(RunOutputError, match=re.escape(told)):
+        rollout("planar_2r", rollouts=24, steps=4, block_size=2, out=RUN, executor=Hasty(proxy))
+    assert time.monotonic() - start < 8  # for twelve blocks
+
+
+@pytest.mark.parametrize(
+    ("command", "most"), [("runs", 20), ("plot", 43), ("runs --verify", 43), (f"{MADE[:-6]} --resume --out", 35)]
+)
+def test_a_server_that_stops_while_a_run_is_read_ends_the_command(proxy: Proxy, command: str, most: int) -> None:
+    assert dh2sim(*MADE.split(), RUN).status == 0
+    proxy.most = proxy.answered + most
+    start = time.monotonic()
+    stopped = dh2sim(*command.split(), RUN)
+    assert time.monotonic() - start < 10
+    assert stopped.status == 2, "it needs fewer requests"
+    assert stopped.err.startswith(f"dh2sim: cannot read '{RUN}': {NO_ANSWER}")
+    assert stopped.err.count("\n") == 1
