@@ -162,9 +162,10 @@ def _curve_text(spec: RobotSpec, curve: Curve) -> str:
     most = int(np.ptp(curve.q, axis=0).argmax())
     row = spec.moving_rows[most]
     unit = (spec.units.angle if row.type.turns else spec.units.length).value
-    low, high = (
-        _value(spec, float(end), turns=row.type.turns) for end in (curve.q[:, most].min(), curve.q[:, most].max())
-    )
+    values = curve.q[:, most]
+    if curve.closed and row.type.turns:  # the last step leads to the first point, or to it and whole turns on
+        values = np.append(values, values[0] + 2.0 * np.pi * np.round((values[-1] - values[0]) / (2.0 * np.pi)))
+    low, high = (_value(spec, float(end), turns=row.type.turns) for end in (values.min(), values.max()))
     return f"{curve.kind}, {ends}, {row.name} from {low} to {high} {unit}"
 
 

@@ -201,6 +201,18 @@ def test_a_joint_to_spare_leaves_a_curve() -> None:
     assert "curve 1: self-motion, open, joint_5 from -17" in dh2sim("ik", *arguments).out
 
 
+def test_a_curve_along_which_a_joint_turns_round_is_a_whole_turn_long(tmp_path: Path) -> None:
+    table = "".join(
+        f"  - {{name: joint_{i}, type: revolute, a: {a}, alpha: 0, d: 0, theta: 0}}\n"
+        for i, a in enumerate((1.0, 0.8, 0.0), start=1)
+    )
+    file = tmp_path / "planar_3r.yaml"
+    file.write_text(f"name: planar_3r\nconvention: standard\njoints:\n{table}", encoding="utf-8")
+    text = dh2sim("ik", file, "--xyz", "1", "0.5", "0").out
+    ends = re.findall("curve [12]: self-motion, closed, joint_3 from (.*) to (.*) rad", text)
+    assert [round(float(high) - float(low), 5) for low, high in ends] == [6.28319, 6.28319]
+
+
 def test_the_textbooks_steps_are_printed_with_explain() -> None:
     text = dh2sim("ik", "planar_2r", "--xyz", "0.6", "0.4", "0", "--explain").out
     assert "by the law of cosines" in text
