@@ -77,19 +77,21 @@ def _goes_on(arm: Arm, q: Array, T: Array, moving: Flags) -> bool:
     return bool(((error < CONVERGED) & (np.linalg.norm(back - q, axis=1) > 0.5 * STEP)).any())
 
 
-def family_kind(path: Path, joints: int) -> str:
+def family_kind(path: Path, joints: int, turns: Sequence[bool]) -> str:
     """Return what textbooks call the singularity at which a family of six joints, or of a wrist's three, is found.
 
     Args:
         path: The family.
         joints: How many joints the robot has.
+        turns: Whether each joint turns: slides that make up for each other have no name of their own.
     """
     moves = moving_joints(path, joints)
     if joints not in (3, 6) or not moves:
         return SELF_MOTION
     if joints == 6 and 0 in moves:
-        return "shoulder singularity"
-    return "wrist singularity" if joints - 1 in moves and joints - 2 not in moves else SELF_MOTION
+        return "shoulder singularity" if turns[0] else SELF_MOTION
+    wrist = joints - 1 in moves and joints - 2 not in moves and turns[joints - 1]
+    return "wrist singularity" if wrist else SELF_MOTION
 
 
 def moving_joints(path: Path, joints: int) -> Sequence[int]:

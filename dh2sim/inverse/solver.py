@@ -338,7 +338,7 @@ class InverseSolver:
         limits: bool,
     ) -> Solutions:
         """Add families at a singularity to the isolated solutions of a pose, of which there are so many in all."""
-        kinds = [family_kind(path, len(q0)) for path in paths]
+        kinds = [family_kind(path, len(q0), arm.turns) for path in paths]
         families = self._of_paths(no_solutions(len(q0)), arm, paths, kinds, T, q0, free, limits=limits)
         if not len(families):
             return isolated if len(isolated) else replace(isolated, reason=isolated.reason or families.reason)

@@ -8,6 +8,7 @@ import pytest
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.solver import InverseSolver
 from dh2sim.kinematics.table_oracle import table_tool_pose
+from dh2sim.robot.spec import JointType, RobotSpec, Row
 from tests.sample_robots import robot
 
 
@@ -41,6 +42,24 @@ def test_a_wrist_in_line_leaves_the_other_solutions_isolated() -> None:
 def test_a_wrist_centre_on_the_first_axis_is_a_shoulder_singularity() -> None:
     solutions = solved("cylindrical_wrist", [0.0, 0.0, 0.0, 0.4, 0.7, -0.2])  # the arm's slide is drawn in
     assert {curve.kind for curve in solutions.curves} == {"shoulder singularity"}
+
+
+def test_two_slides_along_parallel_lines_are_no_singularity_of_shoulder_or_wrist() -> None:
+    slide, turn = JointType.PRISMATIC, JointType.REVOLUTE
+    arm = (
+        (slide, 0.1, 1.5),
+        (turn, 0.3, -1.5),
+        (slide, 0.0, 0.6),
+        (turn, 0.2, 1.5),
+        (turn, 0.1, 1.0),
+        (slide, 0.0, 0.4),
+    )
+    spec = RobotSpec(name="arm", rows=tuple(Row(type=kind, a=a, alpha=alpha, d=0.1) for kind, a, alpha in arm))
+    q = np.array([0.1, 0.0, 0.2, 0.3, 0.4, 0.5])  # joint 2 has the first slides along parallel lines
+    solutions = InverseSolver(spec).solve(table_tool_pose(spec, q), q, limits=False)
+    moves = np.ptp(solutions.curves[0].q, axis=0) > 1e-6
+    assert moves.tolist() == [True, False, True, False, False, False]
+    assert {curve.kind for curve in solutions.curves} == {"self-motion"}
 
 
 def test_a_stretched_elbow_is_one_isolated_solution() -> None:
