@@ -17,7 +17,9 @@ from tests.sample_robots import robot
 
 
 @pytest.mark.parametrize(
-    ("spec", "count"), [(robot("puma560"), 8), (SIXTEEN, 16), (odd_arm("PRPRPR"), 2)], ids=["puma", "16", "slides"]
+    ("spec", "count"),
+    [pytest.param(robot("puma560"), 8, marks=pytest.mark.slow), (SIXTEEN, 16), (odd_arm("PRPRPR"), 2)],
+    ids=["puma", "16", "slides"],
 )
 def test_all_configurations_are_among_as_many_ends_as_the_arm_has_solutions(spec: RobotSpec, count: int) -> None:
     arm = build_arm(build_chain(spec), [row.limits.position for row in spec.moving_rows])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,11 @@ IN_THE_VALLEY = [0.772338, -0.63405, 1.37133703e-05, 0.247879, -1.132738, 1.6114
 WRIST_TOO = [-0.935642, 1.007584, 1.85578127e-03, -0.401353, 5.45290418e-05, -1.906015]
 
 
+@cache
+def stanford_solver() -> InverseSolver:
+    return InverseSolver(robot("stanford"))
+
+
 @pytest.mark.parametrize(
     "q",
     [
@@ -27,7 +34,7 @@ WRIST_TOO = [-0.935642, 1.007584, 1.85578127e-03, -0.401353, 5.45290418e-05, -1.
 def test_all_eight_are_found_where_the_slide_is_almost_drawn_in(q: list[float]) -> None:
     stanford = robot("stanford")
     T = table_tool_pose(stanford, np.array(q))
-    found = InverseSolver(stanford).solve(T, limits=False)
+    found = stanford_solver().solve(T, limits=False)
     assert len(found) == 8
     assert is_found(stanford, np.array(q), found.q)
     assert found.complete

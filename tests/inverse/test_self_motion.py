@@ -64,6 +64,7 @@ def test_a_closed_curve_holds_the_points_between_its_last_and_its_first(angle: f
     assert not lies_on(circle, angle * np.array([1.0, 0.0, -1.0]) + [0.0, 0.02, 0.0], turns, closed=True)
 
 
+@pytest.mark.slow
 def test_no_curve_is_returned_twice() -> None:
     answer = whole_curves("franka_panda")
     for i, curve in enumerate(answer.curves):
@@ -176,6 +177,7 @@ def test_axes_all_in_line_leave_one_closed_curve_of_two_joints() -> None:
     assert np.abs(table_tool_pose(iiwa, curve.q) - table_tool_pose(iiwa, q)).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_an_arm_stretched_to_one_point_has_no_curve() -> None:
     kinova = robot("kinova_gen3")
     q = np.zeros(7)
