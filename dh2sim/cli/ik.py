@@ -97,7 +97,7 @@ def ik(
     \b
     Examples:
       dh2sim ik puma560 --at 10 -20 30 40 50 60       # all ways to get there
-      dh2sim ik stanford --xyz 0.3 0.2 0.6 --rpy 0 90 45
+      dh2sim ik stanford --xyz 0.5 0.2 0.4 --rpy 0 90 45
       dh2sim ik planar_2r --xyz 0.6 0.4 0             # in any orientation
       dh2sim ik arm_5r --at home --free roll          # along tool0's z
       dh2sim ik franka_panda --at home --lock joint_7=0.5

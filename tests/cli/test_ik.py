@@ -400,3 +400,11 @@ def test_a_file_that_is_not_there_is_reported_beside_wrong_options() -> None:
         err="dh2sim: missing.json: cannot be read: No such file or directory\n"
         "dh2sim: --free must be one of rotation, roll, got 'x'\n",
     )
+
+
+@pytest.mark.slow
+def test_every_example_of_the_help_reaches_its_pose() -> None:
+    lines = [line.strip() for line in dh2sim("ik", "--help").out.split("Examples:\n")[1].splitlines()]
+    examples = [line.split("#")[0].split()[1:] for line in lines if line.startswith("dh2sim ik")]
+    assert len(examples) == 5
+    assert [example for example in examples if dh2sim(*example).status != 0] == []
