@@ -167,6 +167,7 @@ def test_a_slide_at_its_limit_ends_a_curve() -> None:
     assert curve.q[:, 0] == pytest.approx(-curve.q[:, 2])
 
 
+@pytest.mark.slow
 def test_axes_all_in_line_leave_one_closed_curve_of_two_joints() -> None:
     iiwa = robot("kuka_iiwa14")
     q = np.zeros(7)
