@@ -37,6 +37,7 @@ run.zarr  complete
               energy          7 x 5 x 2  rollout, step, energy_kind
               mass_scale      7 x 3      rollout, link
               gain_scale      7 x 2      rollout, actuator
+              com_offset      7 x 3 x 3  rollout, link, axis
               contacts        7 x 4      rollout, interval
               status          7          rollout
               stop_step       7          rollout
