@@ -1,12 +1,16 @@
-"""How many processors this process may use."""
+"""How many processors this process may use, and processes for them that do not outlive it."""
 
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from multiprocessing.process import BaseProcess
 
 _MEMBERSHIP: Final = Path("/proc/self/cgroup")
 _GROUPS: Final = Path("/sys/fs/cgroup")
@@ -53,3 +57,20 @@ def _shares(membership: Path, groups: Path) -> Iterator[float]:
                     quota, period = (folder / "cpu.max").read_text().split()
                 if float(period) > 0.0 and float(quota) > 0.0:  # "max" is not a number, -1 no limit
                     yield float(quota) / float(period)
+
+
+def end_with_parent() -> None:
+    """End this process, which a pool has started, when the one that started it is gone, even if it was killed.
+
+    The pool's own workers would wait for tasks for ever, and whoever reads what they inherited would wait with them.
+    """
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
+
+
+def _end_after(parent: BaseProcess) -> None:
+    parent.join()
+    os._exit(1)

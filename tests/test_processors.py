@@ -1,6 +1,9 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -53,3 +56,26 @@ def test_the_smallest_share_of_any_control_group_counts(
 
 def test_without_control_groups_affinity_counts(groups: Path) -> None:
     assert available_processors(groups / "missing", groups) == 8
+
+
+POOL = """
+import os, signal
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+from dh2sim.processors import end_with_parent
+
+if __name__ == "__main__":
+    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=end_with_parent)
+    assert pool.submit(abs, -1).result() == 1
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no process can be killed so here")
+def test_workers_end_when_the_process_that_started_them_is_killed(tmp_path: Path) -> None:
+    script = tmp_path / "pool.py"
+    script.write_text(POOL, encoding="utf-8")
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE) as killed:
+        assert killed.communicate(timeout=180)[0] == b"", "the worker has it open, too, until it ends"
+    assert killed.returncode == -signal.SIGKILL

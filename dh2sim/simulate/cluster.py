@@ -32,7 +32,7 @@ from dh2sim.errors import (
     SettingsError,
 )
 from dh2sim.extras import require_extra
-from dh2sim.processors import available_processors
+from dh2sim.processors import available_processors, end_with_parent
 from dh2sim.progress import Advance
 from dh2sim.simulate.block import BATCH_SIZE, Block, Job, simulate_block
 from dh2sim.simulate.initial_states import InitialStates
@@ -109,13 +109,14 @@ def _processes(text: str) -> Iterator[Executor]:
     if kind != _LOCAL or (colon and not (count.isascii() and count.isdigit() and 1 <= int(count) <= 1024)):
         raise _unknown(text)
     workers = int(count) if colon else available_processors()
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_ignore_interrupts) as pool:
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin) as pool:
         yield pool
 
 
-def _ignore_interrupts() -> None:
+def _begin() -> None:
     """Leave it to the process that has started this one to react to Ctrl-C: blocks in progress are finished."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
 
 
 def fill_on(

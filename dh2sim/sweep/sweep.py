@@ -22,6 +22,7 @@ from dh2sim.errors import Dh2simError, MeasureError, Problem, RobotError, Settin
 from dh2sim.messages import counted, listed
 from dh2sim.model.build import ModelLike, build_model, model_of
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.processors import end_with_parent
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.write import robot_file_text
 from dh2sim.simulate.designs import Designs, draws_of, read_design_table
@@ -340,6 +341,7 @@ _task: Task | None = None
 def _start(task: Task) -> None:
     global _task
     _task = task
+    end_with_parent()
 
 
 def _rows(chunk: int) -> tuple[int, tuple[list[str], Rows]]:
