@@ -17,9 +17,10 @@ import stat
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from pathlib import Path
 from types import FrameType
-from typing import BinaryIO, Final
+from typing import Final
 
 from dh2sim.errors import OutputError
 from dh2sim.locks import FolderLock, leftovers, lock_folder, make_hidden
@@ -30,7 +31,7 @@ _JOURNAL: Final = "journal"
 """File in a folder of files that are being moved: what is moved, so that another process can finish the work."""
 
 
-def open_plain_file(path: Path) -> BinaryIO:
+def open_plain_file(path: Path) -> BufferedReader:
     """Open a file of a folder that may come from a stranger, for reading: no link, pipe or device, and no waiting.
 
     Raises:
@@ -83,10 +84,12 @@ def require_folder(path: Path) -> None:
     """Check that a file can be written somewhere: its folder exists, as no command makes folders for single files.
 
     Raises:
-        OutputError: It does not, or there is a folder in the file's place.
+        OutputError: It does not, or there is a folder, a device or a pipe in the file's place.
     """
     if path.is_dir():
         raise OutputError(f"cannot write '{path}': that is a folder")
+    if path.exists() and not path.is_file():
+        raise OutputError(f"cannot write '{path}': that is a device or a pipe, not a file")
     if not path.parent.is_dir():
         raise OutputError(f"cannot write '{path}': there is no folder '{path.parent}'")
 
@@ -96,23 +99,24 @@ def atomic_file(path: Path) -> Iterator[Path]:
     """Yield a temporary file to write to; it replaces ``path`` when the block ends well, and is removed otherwise.
 
     Args:
-        path: The file to write. Its folder must exist.
+        path: The file to write, or a link to it, which stays. Its folder must exist.
 
     Yields:
-        The path of an empty file beside ``path`` with the same suffix.
+        The path of an empty file beside the one that is written, with the suffix of ``path``.
 
     Raises:
         OutputError: The file cannot be written; what was at ``path`` is unchanged.
     """
-    require_folder(path)
-    temporary = path.with_name(f".{path.stem[:80]}-{secrets.token_hex(4)}{path.suffix}")
+    target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    require_folder(target)
+    temporary = target.with_name(f".{path.stem[:80]}-{secrets.token_hex(4)}{path.suffix}")
     try:
         try:
             os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
             yield temporary
             sync(temporary)
             with signals_deferred():
-                os.replace(temporary, path)
+                os.replace(temporary, target)
         except OSError as error:
             raise OutputError(f"cannot write '{path}': {_reason(error)}") from error
     finally:

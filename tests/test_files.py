@@ -88,6 +88,31 @@ def test_a_file_replaces_another_only_when_it_is_whole(tmp_path: Path) -> None:
     assert out.stat().st_mode & 0o777 == 0o640, "readable like any other new file"
 
 
+def test_a_link_stays_and_the_file_that_it_names_is_written(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    link, target = tmp_path / "picture.png", tmp_path / "elsewhere" / "object"
+    link.symlink_to(target)
+    for data in (b"first", b"second"):  # a link to nothing at first
+        with atomic_file(link) as draft:
+            assert (draft.parent, draft.suffix) == (target.parent, ".png")
+            draft.write_bytes(data)
+        assert contents(tmp_path) == {"picture.png": data, "elsewhere/object": data}
+        assert link.is_symlink()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with names here")
+def test_devices_and_pipes_are_not_replaced(tmp_path: Path) -> None:
+    pipe, link = tmp_path / "pipe.csv", tmp_path / "link.csv"
+    os.mkfifo(pipe)
+    link.symlink_to(pipe)
+    for path in (pipe, link, Path(os.devnull)):
+        with pytest.raises(OutputError, match="that is a device or a pipe, not a file"), atomic_file(path):
+            pytest.fail("it may not be written")
+    assert pipe.is_fifo()
+    assert link.is_symlink()
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["link.csv", "pipe.csv"]
+
+
 def test_paths_that_no_file_can_have_are_refused(tmp_path: Path) -> None:
     for out, reported in (
         (tmp_path / "no" / "a.png", f"there is no folder '{tmp_path / 'no'}'"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.errors import PictureError
+from dh2sim.errors import OutputError, PictureError
 from dh2sim.extras import require_extra
 from dh2sim.files import atomic_file
 from dh2sim.messages import shown
@@ -125,7 +126,7 @@ def save(figure: Any, out: Path, *, dpi: float) -> None:
         dpi: pixels an inch, of .png.
 
     Raises:
-        OutputError: it cannot be written.
+        OutputError: it cannot be written, or is too small for its labels.
     """
     dates: dict[str, dict[str, Any]] = {
         ".svg": {"Date": None, "Creator": "dh2sim"},
@@ -133,8 +134,12 @@ def save(figure: Any, out: Path, *, dpi: float) -> None:
         ".png": {"Software": "dh2sim"},
     }
     ending = out.suffix.lower()
-    with atomic_file(out) as draft:
-        figure.savefig(draft, dpi=dpi, format=ending[1:], metadata=dates[ending])
+    with atomic_file(out) as draft, warnings.catch_warnings():
+        warnings.filterwarnings("error", message="constrained_layout not applied")
+        try:
+            figure.savefig(draft, dpi=dpi, format=ending[1:], metadata=dates[ending])
+        except UserWarning as warning:
+            raise OutputError(f"cannot write '{out}': the picture is too small for its labels") from warning
 
 
 def value_range(*values: NDArray[Any]) -> tuple[float, float]:

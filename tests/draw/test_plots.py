@@ -242,6 +242,12 @@ def test_a_plot_is_as_large_as_is_asked_for(tmp_path: Path) -> None:
         assert picture.size == (640, 400)
 
 
+def test_a_plot_that_is_too_small_for_its_labels_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="the picture is too small for its labels"):
+        write_plot(tmp_path / "a.png", rollout(), "joints", size=(300, 200))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_users_own_settings_of_matplotlib_change_nothing_and_stay(tmp_path: Path) -> None:
     write_plot(tmp_path / "a.svg", rollout(), "energy")
     with mpl.rc_context({"lines.linewidth": 9.0, "axes.facecolor": "black"}):

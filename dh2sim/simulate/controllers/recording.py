@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import stat
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -13,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from dh2sim.errors import ControllerError, RunError
+from dh2sim.files import open_plain_file
 from dh2sim.input_files import csv_lines, npy_array, read_input, refuse_named_pipe, repeated
 from dh2sim.messages import closest, listed, shown
 from dh2sim.robot.spec import ActuatorType
 from dh2sim.simulate.controllers.reference import read_reference
 from dh2sim.simulate.dataset_layout import FORMAT
 from dh2sim.simulate.store.local import LocalStore
-from dh2sim.simulate.store.manifest import check_array
+from dh2sim.simulate.store.manifest import METADATA, check_array, read_node
 from dh2sim.typing import Array, read_only
 
 MOST_LABELS = 10_000
@@ -139,17 +141,20 @@ def read_run(path: Path, file: str, kind: str) -> Recording:
     positions = kind == "reference"
     variable, labels, instants = ("qpos", "joint", "time") if positions else ("ctrl", "actuator", "interval_time")
     with _readable(file):
-        # without consolidated metadata, so that arrays are what was checked
-        run: Any = zarr.open_group(path, mode="r", zarr_format=3, use_consolidated=False)
-        if run.attrs.get("dh2sim_run") != FORMAT:
+        store = LocalStore(path)
+        attributes = (read_node(store, METADATA) or {}).get("attributes")
+        if not isinstance(attributes, dict) or attributes.get("dh2sim_run") != FORMAT:
             raise ControllerError(f"'{file}' is not a run of dh2sim")
         if not (path / variable).is_dir():
             what = "positions" if positions else "controls"
             raise ControllerError(f"'{file}' has recorded no {what}; run it again with '{variable}' in record")
-        store = LocalStore(path)
         check_array(store, variable)
         for array, most in ((labels, MOST_LABELS), ("joint", MOST_LABELS), (instants, MOST_INSTANTS)):
             check_array(store, array, most=most)
+        _plain_files(path, "joint")
+        digest = _digest(path, (variable, labels, instants))
+        # without consolidated metadata, so that arrays are what was checked
+        run: Any = zarr.open_group(path, mode="r", zarr_format=3, use_consolidated=False)
         names = tuple(str(name) for name in run[labels][:])
         joints = len(run["joint"][:])
         times = read_only(run[instants][:])
@@ -164,7 +169,7 @@ def read_run(path: Path, file: str, kind: str) -> Recording:
         times=times,
         rollouts=rollouts,
         read=functools.partial(_some_of_run, run[variable], file),
-        digest=_digest(path, (variable, labels, instants)),
+        digest=digest,
     )
 
 
@@ -198,12 +203,23 @@ def _some_of_run(variable: Any, file: str, rollouts: range) -> Array:
 def _digest(path: Path, arrays: tuple[str, ...]) -> str:
     digest = hashlib.sha256()
     for array in arrays:
-        for file in sorted((path / array).rglob("*")):
-            if file.is_file():
-                digest.update(f"{file.relative_to(path).as_posix()}\0".encode())
-                with file.open("rb") as stream:
-                    digest.update(hashlib.file_digest(stream, "sha256").digest())
+        for file in _plain_files(path, array):
+            digest.update(f"{file.relative_to(path).as_posix()}\0".encode())
+            with open_plain_file(file) as stream:
+                digest.update(hashlib.file_digest(stream, "sha256").digest())
     return digest.hexdigest()
+
+
+def _plain_files(path: Path, array: str) -> list[Path]:
+    """Return the files of an array, in order; refuse what zarr would follow or wait for, links and pipes."""
+    files = []
+    for entry in sorted([path / array, *(path / array).rglob("*")]):
+        mode = entry.lstat().st_mode
+        if stat.S_ISREG(mode):
+            files.append(entry)
+        elif not stat.S_ISDIR(mode):
+            raise ControllerError(f"'{entry}' is not a plain file")
+    return files
 
 
 _MOST_BYTES = 2**30

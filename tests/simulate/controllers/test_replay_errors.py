@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -93,9 +94,7 @@ def test_a_file_that_is_not_there_or_of_no_known_kind_is_refused(
     assert refused(f"replay:file={'a' * 300}") == (
         f"controller 'replay': cannot read '{'a' * 300}': [Errno 36] File name too long: '{'a' * 300}'"
     )
-    assert refused("replay:file=folder").startswith(
-        "controller 'replay': 'folder' cannot be read as a run of dh2sim: "
-    )
+    assert refused("replay:file=folder") == "controller 'replay': 'folder' is not a run of dh2sim"
 
 
 @pytest.mark.parametrize(
@@ -156,6 +155,24 @@ def test_a_run_of_another_program_is_refused(tmp_path: Path, monkeypatch: pytest
     monkeypatch.chdir(tmp_path)
     run(Path("run.zarr"), dh2sim_run=99)
     assert refused("replay:file=run.zarr") == "controller 'replay': 'run.zarr' is not a run of dh2sim"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with names here")
+def test_links_and_pipes_in_a_run_are_refused_and_never_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run(Path("run.zarr"))
+    chunk = next(path for path in sorted(Path("run.zarr/ctrl").rglob("*")) if path.is_file() and path.suffix == "")
+    for file in (Path("run.zarr/zarr.json"), Path("run.zarr/ctrl/zarr.json"), chunk):
+        whole = file.read_bytes()
+        Path("secret").write_bytes(whole)
+        for replace in (os.mkfifo, lambda path: path.symlink_to(tmp_path / "secret")):
+            file.unlink()
+            replace(file)
+            assert refused("replay:file=run.zarr").startswith("controller 'replay': 'run.zarr")
+            file.unlink()
+            file.write_bytes(whole)
 
 
 def test_a_run_without_controls_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
