@@ -219,7 +219,7 @@ def _limits(model: RobotModel, texts: Sequence[str] | None) -> dict[str, Any]:
     problems: list[tuple[str, str]] = []
     found: dict[str, Any] = {}
     joints = [joint.name for joint in model.moving_joints]
-    for word in words_of(texts, "--limits"):
+    for word in words_of([text for text in texts or () if text], "--limits"):  # alone: the robot's own
         name, equals, value = word.partition("=")
         joint, _, quantity = name.rpartition(".")
         quantity = quantity.replace("-", "_")

@@ -112,7 +112,7 @@ def test_samples_are_written_once_and_at_the_rate_asked_for(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("name", ["puma560", "franka_panda", "so101", "ur5e"])
 def test_the_report_fits_into_80_columns(name: str) -> None:
-    run = dh2sim("trajectory", name, "home", "home")
+    run = dh2sim("trajectory", name, "home", "home", "--limits")
     assert run.status == 0
     assert max(map(len, run.out.splitlines())) <= 80
 
