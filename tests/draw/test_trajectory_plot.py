@@ -35,4 +35,4 @@ def test_the_command_plots_a_trajectory_file_beside_it(tmp_path: Path, suffix: s
     for words, said in ((["--what", "tool"], "--what"), (["--rollout", "1"], "--rollout")):
         refused = dh2sim("plot", motion, *words)
         assert refused.status == 2
-        assert f"{said}: does not apply to a trajectory file" in refused.err
+        assert f"{said} does not apply to a trajectory file" in refused.err
