@@ -11,6 +11,7 @@ from dh2sim.engines.engine import DynamicsEngine, DynamicTerms
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.errors import EngineError
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.robot.spec import JointType
 from dh2sim.typing import Array
 from dh2sim.validate.report import Check, Quantity, Worst
 
@@ -74,7 +75,8 @@ def check_dynamics(
         A check for each of the three terms. Entries of the mass matrix are relative to sqrt(M_ii M_jj), forces to the
         greatest force on the same joint in any of the states, so that light wrists count as much as heavy shoulders.
         Inertias and forces that are tiny beside those of the robot's mass and weight at its reach are only rounding:
-        they have the lower bounds ``LEAST_INERTIA`` and ``LEAST_FORCE``.
+        they have the lower bounds ``LEAST_INERTIA`` and ``LEAST_FORCE``. Where an engine rounds inertias, so are
+        forces that are small beside those which the links' own inertias can make.
     """
     terms = engine.dynamic_terms(q, velocity, model.spec.gravity)
     lever = max(model.reach, LEAST_LEVER)
@@ -86,7 +88,8 @@ def check_dynamics(
     least_force = max(LEAST_FORCE * weight * lever, ROUNDING * (weight * model.longest_lever + rounded))
     force = np.maximum(np.abs(reference.bias).max(axis=0), least_force)
     names = [joint.name for joint in model.moving_joints]
-    bias, gravity = np.abs(terms.bias - reference.bias) / force, np.abs(terms.gravity - reference.gravity) / force
+    made = np.maximum(force, _turning_torque(model, velocity)) if engine.inertia_rounding > TOLERANCE else force
+    bias, gravity = np.abs(terms.bias - reference.bias) / made, np.abs(terms.gravity - reference.gravity) / force
     tolerance = max(TOLERANCE, engine.inertia_rounding)
     return [
         _check(engine.name, Quantity.MASS_MATRIX, mass.max(axis=2), names, q, tolerance),
@@ -99,6 +102,21 @@ def _inertia(model: RobotModel, lever: float) -> float:
     """Return the inertia, kg·m², of the robot's mass at the end of a lever, and of its links about themselves."""
     own = [float(np.trace(body.inertia)) for body in model.bodies if body is not None]
     return model.mass * lever * lever + math.fsum(own)
+
+
+def _turning_torque(model: RobotModel, velocity: Array) -> Array:
+    """Return an upper bound of the torque, N·m, with which links keep turning: by the joints that carry them, (n,).
+
+    It is their inertia about themselves times the square of their rate: for a rod that turns about its length, say,
+    far more than what is left of it.
+    """
+    own = [0.0 if body is None else float(np.trace(body.inertia)) for body in model.bodies]
+    carried = np.cumsum(own[::-1])[::-1]
+    moving = [row for row, joint in enumerate(model.joints) if joint.type.moves]
+    turning = [model.joints[row].type is not JointType.PRISMATIC for row in moving]
+    rate = np.abs(velocity[:, turning]).sum(axis=1).max(initial=0.0)
+    bound: Array = carried[moving] * rate**2
+    return bound
 
 
 def _check(engine: str, quantity: Quantity, error: Array, names: Sequence[str], q: Array, tolerance: float) -> Check:

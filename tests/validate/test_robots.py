@@ -142,3 +142,20 @@ def test_a_tolerance_below_rounding_fails_and_names_the_worst_configuration(tmp_
         assert len(worst["q"]) == 4
         assert -2.5 <= worst["q"][0] <= 2.7
         assert abs(worst["q"][2]) <= math.pi
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not PYBULLET, reason="PyBullet is not installed")
+def test_a_rod_of_kilometres_that_turns_about_its_length_is_judged_by_its_inertia() -> None:
+    rod = (
+        "name: rod\nconvention: hayati\nunits: {length: in}\njoints:\n"
+        "  - {type: continuous, convention: standard, d: 7145.706925471067, theta: -1.5707963267948966}\n"
+        "  - {type: revolute, alpha: -999999.9999999999, theta: -1e-06, link: {mass: 1e-12,"
+        " radius: 787401.5748031497, inertia: {ixx: 1.0, iyy: 0.50000000000001, izz: 0.50000000000001}}}\n"
+        "  - {type: revolute, a: -8.297555178567258, alpha: -1e-06, theta: -1.0}\n"
+        "  - {type: prismatic, alpha: 0.5235987755982988, d: -3937007.874015748, theta: -1.5707963267948966,"
+        " beta: 1.5707963267948966}\n"
+        "configurations: {home: [1.0, -1e-06, 999999.9999999999, -787401.5748031497]}\n"
+    )
+    report = validate_robot(build_model(parse_robot(rod)))
+    assert [check for check in report.checks if check.ok is False] == []
