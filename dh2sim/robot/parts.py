@@ -210,7 +210,8 @@ def inertia_problem(matrix: Array) -> str | None:
         return f"not positive definite: the principal moments are {moments}"
     if a + b < c * (1 - _TRIANGLE_TOLERANCE):
         return f"no body has the principal moments {moments}: two make less than the third"
-    if a * scale < INERTIA.least * (1 - _TRIANGLE_TOLERANCE):
+    rounding = 4.0 * float(np.finfo(float).eps) * scale  # of the least of moments that differ much
+    if a * scale < max(INERTIA.least * (1 - _TRIANGLE_TOLERANCE) - rounding, 0.5 * INERTIA.least):
         return f"the principal moments must be at least {shown_size(INERTIA.least)} kg·m², found {moments}"
     return None
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from dh2sim.robot.parts import inertia_problem
 from tests.robot.files import MINIMAL, complaints, with_joint, with_keys
 
 TOP = (
@@ -275,6 +277,15 @@ def test_inertias_of_any_size_are_checked_without_overflow() -> None:
         "r.yaml:4:33: joints[0].link.inertia: the principal moments must be at least 2e-14 kg·m², "
         "found 1e-20, 1e-20, 1e-20"
     ]
+
+
+def test_the_least_moment_may_be_rounded_where_the_others_are_far_greater() -> None:
+    for seed in range(20):
+        turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+        matrix = turn @ np.diag([2e-14, 8e-5, 8e-5]) @ turn.T
+        assert inertia_problem((matrix + matrix.T) / 2) is None
+    assert inertia_problem(np.diag([0.9e-14, 1e9, 1e9])) is not None
+    assert inertia_problem(np.diag([1.9e-14, 1e-13, 1e-13])) is not None
 
 
 def test_mesh_files_are_looked_for_beside_the_robot_file(tmp_path: Path) -> None:
