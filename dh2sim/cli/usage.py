@@ -23,7 +23,7 @@ def complain_usage(error: Any, ctx: Any) -> int:
     """Print what is wrong with how a command was called, and what to do; return the exit status.
 
     Args:
-        error: A usage error of typer; the classes are click's in its earlier versions, and are told by their names.
+        error: A usage error of typer; its classes, click's in earlier versions, are recognized by their names.
         ctx: The context of the command, or of the program if no command was found.
     """
     path = ctx.command_path

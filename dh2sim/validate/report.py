@@ -122,7 +122,7 @@ def unread_check(engine: str, package: str, error: ImportError | EngineCapacityE
 
     Args:
         engine: The engine.
-        package: What installs it, as ``pip install`` is told.
+        package: What installs it, as given to ``pip install``.
         error: What it raised.
     """
     if isinstance(error, ImportError):
