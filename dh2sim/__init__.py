@@ -7,23 +7,23 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # that of ``typing``, whose import would cost half the time
 _HOMES = {
-    "ActuatorSpec": "robot.spec",
+    "ActuatorSpec": "robot.row",
     "Calibration": "calibrate.result",
     "Comparison": "compare.comparison",
     "Continuous": "robot.table_rows",
     "Dh2simError": "errors",
-    "Dynamics": "robot.spec",
+    "Dynamics": "robot.row",
     "Explanation": "inverse.textbook",
     "Fixed": "robot.table_rows",
     "ImportOptions": "importing.sources",
     "InverseSolver": "inverse.solver",
     "KinematicChain": "kinematics.chain",
-    "Limits": "robot.spec",
-    "LinkSpec": "robot.spec",
+    "Limits": "robot.row",
+    "LinkSpec": "robot.links",
     "Measurements": "calibrate.measurements",
     "Mobility": "mobility.result",
-    "PayloadSpec": "robot.spec",
-    "Pose": "robot.spec",
+    "PayloadSpec": "robot.links",
+    "Pose": "robot.links",
     "Prismatic": "robot.table_rows",
     "Revolute": "robot.table_rows",
     "Robot": "robot_facade",
@@ -31,15 +31,15 @@ _HOMES = {
     "RobotFileError": "errors",
     "RobotModel": "model.robot_model",
     "RobotSpec": "robot.spec",
-    "Row": "robot.spec",
+    "Row": "robot.row",
     "SampledTrajectory": "trajectory.files",
     "SerialChain": "kinematics.serial_chain",
     "SerialJoint": "kinematics.serial_chain",
-    "ShapeSpec": "robot.spec",
+    "ShapeSpec": "robot.links",
     "Solutions": "inverse.solutions",
     "SymbolicForm": "symbolic.request",
     "TableBatch": "kinematics.table_batch",
-    "ToolSpec": "robot.spec",
+    "ToolSpec": "robot.links",
     "Trajectory": "trajectory.trajectory",
     "Workspace": "workspace.workspace",
     "build_chain": "kinematics.chain",
@@ -116,18 +116,18 @@ if TYPE_CHECKING:
     from dh2sim.model.build import build_model as build_model
     from dh2sim.model.robot_model import RobotModel as RobotModel
     from dh2sim.model.slips import find_slips as find_slips
+    from dh2sim.robot.links import LinkSpec as LinkSpec
+    from dh2sim.robot.links import PayloadSpec as PayloadSpec
+    from dh2sim.robot.links import Pose as Pose
+    from dh2sim.robot.links import ShapeSpec as ShapeSpec
+    from dh2sim.robot.links import ToolSpec as ToolSpec
     from dh2sim.robot.read import load_robot as load_robot
     from dh2sim.robot.read import parse_robot as parse_robot
-    from dh2sim.robot.spec import ActuatorSpec as ActuatorSpec
-    from dh2sim.robot.spec import Dynamics as Dynamics
-    from dh2sim.robot.spec import Limits as Limits
-    from dh2sim.robot.spec import LinkSpec as LinkSpec
-    from dh2sim.robot.spec import PayloadSpec as PayloadSpec
-    from dh2sim.robot.spec import Pose as Pose
+    from dh2sim.robot.row import ActuatorSpec as ActuatorSpec
+    from dh2sim.robot.row import Dynamics as Dynamics
+    from dh2sim.robot.row import Limits as Limits
+    from dh2sim.robot.row import Row as Row
     from dh2sim.robot.spec import RobotSpec as RobotSpec
-    from dh2sim.robot.spec import Row as Row
-    from dh2sim.robot.spec import ShapeSpec as ShapeSpec
-    from dh2sim.robot.spec import ToolSpec as ToolSpec
     from dh2sim.robot.table_rows import Continuous as Continuous
     from dh2sim.robot.table_rows import Fixed as Fixed
     from dh2sim.robot.table_rows import Prismatic as Prismatic

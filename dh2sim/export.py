@@ -29,7 +29,7 @@ from dh2sim.messages import counted, listed
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import FilledIn, RobotModel
 from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Dynamics
+from dh2sim.robot.row import ActuatorSpec, ActuatorType, Dynamics
 
 
 class Format(StrEnum):

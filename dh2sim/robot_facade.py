@@ -20,9 +20,12 @@ from dh2sim.arguments import file_path, names
 from dh2sim.errors import ArgumentError, Dh2simError
 from dh2sim.kinematics.transforms import PoseLike, pose_of
 from dh2sim.messages import member
-from dh2sim.robot.spec import AngleUnit, BaseSpec, Convention, LengthUnit, PayloadSpec, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, PayloadSpec, ToolSpec
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.robot.table_rows import TableRow, spec_rows
 from dh2sim.robot.textbook_table import table_html, table_latex, table_text
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:

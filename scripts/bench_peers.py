@@ -26,7 +26,8 @@ from dh2sim.kinematics.frame_assignment.recover import recover_table
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import RobotSpec, Row
+from dh2sim.robot.row import Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from scripts.bench_timing import Row as TableRow
 from scripts.bench_timing import measure

@@ -19,7 +19,9 @@ from pathlib import Path
 
 from dh2sim import build_model, load_robot
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import Convention, JointType, LinkSpec, RobotSpec, Row
+from dh2sim.robot.links import LinkSpec
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "bodies.md"

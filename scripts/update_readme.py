@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 from dh2sim import build_model, load_robot
 from dh2sim.cli.new import DEFAULT_JOINTS, TYPES, template
 from dh2sim.robot.catalog import builtin_robots, summaries
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from dh2sim.validate.report import Quantity, RobotReport
 from dh2sim.validate.run import validate_robot
 

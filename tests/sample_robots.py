@@ -13,8 +13,10 @@ import pytest
 
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
+from dh2sim.robot.links import BaseSpec, LinkSpec, Pose, ToolSpec
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import BaseSpec, Convention, JointType, Limits, LinkSpec, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.row import Convention, JointType, Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
 STANDARD, MODIFIED, HAYATI = Convention.STANDARD, Convention.MODIFIED, Convention.HAYATI

@@ -15,21 +15,9 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.robot.spec import (
-    BaseSpec,
-    Convention,
-    Dynamics,
-    JointType,
-    Limits,
-    LinkSpec,
-    PayloadSpec,
-    Pose,
-    RobotSpec,
-    Row,
-    ShapeSpec,
-    ShapeType,
-    ToolSpec,
-)
+from dh2sim.robot.links import BaseSpec, LinkSpec, PayloadSpec, Pose, ShapeSpec, ShapeType, ToolSpec
+from dh2sim.robot.row import Convention, Dynamics, JointType, Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
 ODD_TWIST = math.radians(37.3)

@@ -20,7 +20,8 @@ from dh2sim import Continuous, Fixed, Pose, Prismatic, Revolute, Robot
 from dh2sim.draw.diagram.drawing import draw_robot
 from dh2sim.errors import ConfigurationError, Dh2simError, OutputError, UnknownFrameError
 from dh2sim.kinematics.singularity import manipulability, singular_values
-from dh2sim.robot.spec import Convention, JointType, RobotSpec
+from dh2sim.robot.row import Convention, JointType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.validate.report import RobotReport
 
 GENERATED = Path(__file__).parents[1] / "generated"

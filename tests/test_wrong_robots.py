@@ -29,6 +29,7 @@ from dh2sim import (
     ToolSpec,
 )
 from dh2sim.errors import Dh2simError, MeshError, RobotError
+from dh2sim.robot.links import BaseSpec, MeshSpec
 from dh2sim.robot.magnitudes import (
     ACCELERATION,
     ANGLE,
@@ -43,7 +44,6 @@ from dh2sim.robot.magnitudes import (
     VELOCITY_GAIN,
     Magnitude,
 )
-from dh2sim.robot.spec import BaseSpec, MeshSpec
 
 NAN, INF = math.nan, math.inf
 NAME = "is made of letters, digits, '_' and '-', starting with a letter; found"

@@ -32,7 +32,8 @@ from dh2sim.calibrate.unknowns import prior_of, requested_columns
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
 from dh2sim.messages import counted
-from dh2sim.robot.spec import JointType, RobotSpec
+from dh2sim.robot.row import JointType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 
 _TRIES: Final = 300

@@ -19,7 +19,8 @@ from dh2sim.input_files import check_columns, read_input, utf16_hint
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import counted, did_you_mean, listed, member, shown
-from dh2sim.robot.spec import AngleUnit, LengthUnit, RobotSpec
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.typing import Array, read_only
 
 MAX_BYTES: Final = 100_000_000

@@ -22,7 +22,9 @@ from dh2sim.kinematics.transforms import (
     rpy_from_rotation,
 )
 from dh2sim.kinematics.trig import atan2, sin_cos
-from dh2sim.robot.spec import Convention, JointType, LinkSpec, Pose, RobotSpec, Row
+from dh2sim.robot.links import LinkSpec, Pose
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
 NEARLY_PARALLEL: Final = 0.05

@@ -14,7 +14,10 @@ from typing import Final
 import numpy as np
 
 from dh2sim.kinematics.transforms import pose_from_rpy, rpy_from_rotation
-from dh2sim.robot.spec import AngleUnit, Convention, JointType, LengthUnit, Pose, RobotSpec, Row, Units
+from dh2sim.robot.links import Pose
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 from dh2sim.typing import Array, read_only
 
 

@@ -12,9 +12,12 @@ import numpy as np
 from dh2sim.calibrate.result import Calibration
 from dh2sim.errors import Dh2simError
 from dh2sim.robot.edit import can_be_edited, with_cells
+from dh2sim.robot.links import Pose
 from dh2sim.robot.number_text import UnitWriter
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import AngleUnit, Convention, Pose, RobotSpec, Units
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, Units
 from dh2sim.robot.write import robot_file_text
 from dh2sim.robot.yaml_text import comment_lines
 from dh2sim.robot.yaml_tree import Node, Report, compose

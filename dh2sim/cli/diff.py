@@ -94,7 +94,8 @@ def _options(
         BadParameter: A link is given three times, or a word is not allowed.
     """
     from dh2sim.importing.sources import ImportOptions
-    from dh2sim.robot.spec import CONVENTIONS, AngleUnit, Convention, LengthUnit
+    from dh2sim.robot.row import CONVENTIONS, Convention
+    from dh2sim.robot.units import AngleUnit, LengthUnit
 
     for name, given in zip(("--base", "--tip"), links, strict=True):
         if given is not None and len(given) > 2:

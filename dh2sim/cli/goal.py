@@ -179,7 +179,7 @@ def joints_before(spec: RobotSpec, frame: str) -> RobotSpec:
     from dataclasses import replace
     from types import MappingProxyType
 
-    from dh2sim.robot.spec import ToolSpec
+    from dh2sim.robot.links import ToolSpec
 
     if frame == "tool0":
         return spec

@@ -69,7 +69,8 @@ def grade(
     from dh2sim.compare.grading import class_csv, read_rubric
     from dh2sim.compare.grading import grade as graded
     from dh2sim.importing.sources import ImportOptions
-    from dh2sim.robot.spec import CONVENTIONS, AngleUnit, Convention, LengthUnit
+    from dh2sim.robot.row import CONVENTIONS, Convention
+    from dh2sim.robot.units import AngleUnit, LengthUnit
 
     if as_csv and as_json:
         raise typer.BadParameter("must not be given together with --json", param_hint="--csv")

@@ -119,7 +119,8 @@ def import_robot(
       dh2sim import - --convention standard < table.csv
     """
     from dh2sim.importing.sources import STDIN, ImportOptions, import_data, read_file
-    from dh2sim.robot.spec import CONVENTIONS, AngleUnit, Convention, LengthUnit
+    from dh2sim.robot.row import CONVENTIONS, Convention
+    from dh2sim.robot.units import AngleUnit, LengthUnit
 
     require_free(out, force=force)
     options = ImportOptions(
@@ -286,7 +287,7 @@ def frames(
     from dh2sim.importing.axes import import_axes
     from dh2sim.importing.source_errors import errors_of
     from dh2sim.robot.axes_file import read_axes
-    from dh2sim.robot.spec import CONVENTIONS, Convention
+    from dh2sim.robot.row import CONVENTIONS, Convention
 
     chosen = choice(convention, Convention, "--convention", without=(Convention.HAYATI,), other_names=CONVENTIONS)
     allowed = tolerance_of(tolerance)
@@ -348,7 +349,7 @@ def convert(
       dh2sim convert calibrated_ur5.yaml --to compact -o ur5_compact.yaml
     """
     from dh2sim.importing.convert import TableForm, convert_robot
-    from dh2sim.robot.spec import CONVENTIONS
+    from dh2sim.robot.row import CONVENTIONS
 
     target = choice(to, TableForm, "--to", other_names=CONVENTIONS)
     require_free(out, force=force)

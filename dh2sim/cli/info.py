@@ -14,7 +14,9 @@ from dh2sim.cli.output import WIDTH, json_text, print_wrapped, table_lines
 
 if TYPE_CHECKING:
     from dh2sim.model.robot_model import JointModel, RobotModel
-    from dh2sim.robot.spec import RobotSpec, Row, Units
+    from dh2sim.robot.row import Row
+    from dh2sim.robot.spec import RobotSpec
+    from dh2sim.robot.units import Units
 
 T = TypeVar("T")
 

@@ -14,7 +14,9 @@ from dh2sim.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from dh2sim.kinematics.tree import KinematicTree
-    from dh2sim.robot.spec import RobotSpec, Row, Units
+    from dh2sim.robot.row import Row
+    from dh2sim.robot.spec import RobotSpec
+    from dh2sim.robot.units import Units
 
 QArgument = Annotated[
     list[str] | None,
@@ -60,7 +62,7 @@ def read_joint_vector(spec: RobotSpec, texts: Sequence[str] | None, *, degrees: 
     Raises:
         ConfigurationError: The number of coordinates is wrong, one is not a number, or a name is unknown.
     """
-    from dh2sim.robot.spec import AngleUnit, Units
+    from dh2sim.robot.units import AngleUnit, Units
 
     if degrees and radians:
         raise typer.BadParameter("cannot be combined", param_hint="--degrees, --radians")

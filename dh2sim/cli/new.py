@@ -15,7 +15,7 @@ from dh2sim.errors import Dh2simError
 from dh2sim.messages import printable
 
 if TYPE_CHECKING:
-    from dh2sim.robot.spec import Convention
+    from dh2sim.robot.row import Convention
 
 DEFAULT_JOINTS = "RRPRRR"
 MOST_JOINTS = 100
@@ -67,7 +67,7 @@ def new(
     """
     from dh2sim.robot.fields import name_problem
     from dh2sim.robot.read import parse_robot
-    from dh2sim.robot.spec import CONVENTIONS, Convention
+    from dh2sim.robot.row import CONVENTIONS, Convention
 
     name = name.removesuffix(".yaml")
     if (problem := name_problem(name)) is not None:
@@ -129,7 +129,7 @@ def template(name: str, types: list[str], convention: Convention) -> str:
         types: Of the rows, at least one.
         convention: Of the table.
     """
-    from dh2sim.robot.spec import Convention
+    from dh2sim.robot.row import Convention
 
     product, indices = {
         Convention.STANDARD: ("Rz(theta) Tz(d) Tx(a) Rx(alpha)", "row i: theta_i, d_i, a_i, alpha_i"),

@@ -147,7 +147,7 @@ def _table(spec: RobotSpec, q: Array, remarks: Sequence[str], marked: Array | No
 
 def _value(spec: RobotSpec, value: float, *, turns: bool) -> str:
     """Return a coordinate in the robot file's unit, as exactly as a few characters can."""
-    from dh2sim.robot.spec import AngleUnit, LengthUnit
+    from dh2sim.robot.units import AngleUnit, LengthUnit
 
     unit = spec.units.angle if turns else spec.units.length
     places = {AngleUnit.DEG: 3, AngleUnit.RAD: 5, LengthUnit.M: 5, LengthUnit.CM: 3, LengthUnit.MM: 2}.get(unit, 4)

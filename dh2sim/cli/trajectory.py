@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from dh2sim.model.robot_model import RobotModel
-    from dh2sim.robot.spec import RobotSpec, Units
+    from dh2sim.robot.spec import RobotSpec
+    from dh2sim.robot.units import Units
     from dh2sim.trajectory.mechanism import MechanismTrajectory
     from dh2sim.trajectory.trajectory import Trajectory
     from dh2sim.trajectory.waypoints import WaypointFile

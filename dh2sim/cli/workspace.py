@@ -17,7 +17,7 @@ from dh2sim.progress import Advance
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
-    from dh2sim.robot.spec import Units
+    from dh2sim.robot.units import Units
     from dh2sim.workspace.workspace import Workspace
 
 PICTURES = (".png", ".svg", ".pdf")
@@ -135,7 +135,7 @@ def _require_file(out: Path | None) -> bool:
 
 def _lines(found: Workspace, units: Units) -> list[str]:
     """Return what is printed, at most 80 columns wide as far as names allow."""
-    from dh2sim.robot.spec import AngleUnit
+    from dh2sim.robot.units import AngleUnit
 
     kind = {3: "volume", 2: "surface", 1: "curve", 0: "point"}[found.dimension]
     if found.dimension == len(found.axes) == 2:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from dh2sim.codegen.mechanism import Lengths
 from dh2sim.kinematics.trace import Number, Trace
-from dh2sim.robot.spec import LengthUnit, RobotSpec
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import LengthUnit
 
 if TYPE_CHECKING:
     from dh2sim.symbolic.polynomial import Polynomial

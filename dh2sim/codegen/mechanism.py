@@ -15,7 +15,9 @@ from typing import Final, NamedTuple, TypeAlias, cast
 
 from dh2sim.kinematics.trace import Number, Trace
 from dh2sim.kinematics.trig import atan2, sin_cos
-from dh2sim.robot.spec import Convention, Pose, RobotSpec, Row
+from dh2sim.robot.links import Pose
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
 
 Vector: TypeAlias = tuple[Number, Number, Number]
 ORIGIN: Final[Vector] = (0.0, 0.0, 0.0)

@@ -16,7 +16,9 @@ import numpy as np
 from dh2sim.errors import Dh2simError
 from dh2sim.importing.axes import import_axes
 from dh2sim.robot.axes_file import AxesSpec, AxisJoint
-from dh2sim.robot.spec import Convention, JointType, Pose, RobotSpec
+from dh2sim.robot.links import Pose
+from dh2sim.robot.row import Convention, JointType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import read_only
 
 LEVELS = {

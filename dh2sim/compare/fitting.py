@@ -19,7 +19,7 @@ from dh2sim.compare.screws import ScrewAxes
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint, serial_link_poses
 from dh2sim.kinematics.transforms import pose_errors
-from dh2sim.robot.spec import JointType
+from dh2sim.robot.row import JointType
 from dh2sim.typing import Array
 
 _CONFIGURATIONS = 64

@@ -17,7 +17,8 @@ from dh2sim.compare.fitting import any_fit
 from dh2sim.compare.screws import ScrewAxes, axes_of, axes_of_rows, joint_lines
 from dh2sim.compare.words import degrees, millimetres, told_apart
 from dh2sim.kinematics.transforms import identity
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 
 _MOST_ROWS = 12
 """Of tables in which any two rows are exchanged; in longer ones, neighbours."""

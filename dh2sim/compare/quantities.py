@@ -13,7 +13,9 @@ import numpy as np
 
 from dh2sim.compare.words import degrees, millimetres, number
 from dh2sim.kinematics.table_oracle import table_frame_poses
-from dh2sim.robot.spec import ActuatorType, LinkSpec, RobotSpec, Row
+from dh2sim.robot.links import LinkSpec
+from dh2sim.robot.row import ActuatorType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 
 _ROUNDING = 1e-9

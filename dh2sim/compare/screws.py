@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 
 

@@ -22,8 +22,9 @@ from dh2sim.errors import ImportedFileError
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import compose, pose_from_rpy
 from dh2sim.messages import Loc, did_you_mean, listed, shown
+from dh2sim.robot.links import Pose
 from dh2sim.robot.magnitudes import ANGLE, LENGTH, MOST_ROWS, shown_size
-from dh2sim.robot.spec import JointType, Pose
+from dh2sim.robot.row import JointType
 from dh2sim.robot.yaml_tree import Entry, Node, Report, decode
 from dh2sim.robot.yaml_tree import compose as compose_yaml
 from dh2sim.typing import Array, read_only

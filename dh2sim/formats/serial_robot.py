@@ -14,7 +14,7 @@ from dh2sim.model.mass import MassProperties, thickened
 from dh2sim.model.robot_model import Color
 from dh2sim.robot.fields import MESH_SUFFIXES
 from dh2sim.robot.magnitudes import INERTIA, LARGEST, shown_size
-from dh2sim.robot.spec import ActuatorSpec, Dynamics, Limits
+from dh2sim.robot.row import ActuatorSpec, Dynamics, Limits
 from dh2sim.typing import Array, read_only
 
 GREATEST: Final = LARGEST

@@ -15,7 +15,7 @@ from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import member
 from dh2sim.robot.axes_file import AxesSpec
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from dh2sim.typing import Array, read_only
 
 

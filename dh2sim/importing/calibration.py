@@ -39,20 +39,11 @@ from dh2sim.kinematics.transforms import (
     rpy_from_rotation,
 )
 from dh2sim.messages import listed
+from dh2sim.robot.links import LinkSpec, MeshSpec, Pose, ToolSpec
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import (
-    AngleUnit,
-    Convention,
-    Dynamics,
-    Limits,
-    LinkSpec,
-    MeshSpec,
-    Pose,
-    RobotSpec,
-    Row,
-    ToolSpec,
-    Units,
-)
+from dh2sim.robot.row import Convention, Dynamics, Limits, Row
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, Units
 from dh2sim.robot.write import robot_file_text
 from dh2sim.typing import Array, read_only
 

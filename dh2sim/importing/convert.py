@@ -21,7 +21,9 @@ from dh2sim.kinematics.transforms import pose_errors
 from dh2sim.messages import member
 from dh2sim.model.limits import frame_extent, travels_of
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import AngleUnit, Convention, RobotSpec, Units
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, Units
 from dh2sim.robot.write import robot_file_text
 from dh2sim.typing import Array
 

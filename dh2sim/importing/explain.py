@@ -20,7 +20,8 @@ from dh2sim.kinematics.frame_assignment.result import (
     Step,
     TipRule,
 )
-from dh2sim.robot.spec import Convention, Pose
+from dh2sim.robot.links import Pose
+from dh2sim.robot.row import Convention
 from dh2sim.typing import Array
 
 GLUE = "\N{NO-BREAK SPACE}"

@@ -14,7 +14,8 @@ from dh2sim.kinematics.frame_assignment.recover import Residual, bounded_reach
 from dh2sim.kinematics.frame_assignment.result import Assignment
 from dh2sim.kinematics.serial_chain import SerialChain
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
-from dh2sim.robot.spec import Convention, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
 

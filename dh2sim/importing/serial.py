@@ -29,6 +29,7 @@ from dh2sim.kinematics.transforms import invert, pose_from_rpy, rotate_tensor, r
 from dh2sim.messages import Notes, listed, shown
 from dh2sim.model.mass import is_possible, made_possible, substantial
 from dh2sim.robot.fields import LONGEST_NAME, is_reserved, name_problem
+from dh2sim.robot.links import BaseSpec, LinkSpec, MeshSpec, Pose
 from dh2sim.robot.magnitudes import (
     ANGLE,
     ARMATURE,
@@ -44,7 +45,8 @@ from dh2sim.robot.magnitudes import (
     Magnitude,
 )
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import ActuatorSpec, BaseSpec, Convention, Limits, LinkSpec, MeshSpec, Pose, RobotSpec, Row
+from dh2sim.robot.row import ActuatorSpec, Convention, Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.robot.write import robot_file_text
 from dh2sim.typing import Array, read_only
 

@@ -26,7 +26,8 @@ from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.frame_assignment.recover import TOLERANCE
 from dh2sim.messages import Choice, member, shown
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
+from dh2sim.robot.row import Convention
+from dh2sim.robot.units import AngleUnit, LengthUnit
 
 STDIN = "-"
 _NO_HAYATI = "a table is made in the standard or the modified convention; Hayati rows are used where they are needed"

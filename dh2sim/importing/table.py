@@ -14,7 +14,9 @@ from dh2sim.kinematics.frame_assignment.recover import TOLERANCE
 from dh2sim.kinematics.frame_assignment.result import Tolerances
 from dh2sim.kinematics.frame_assignment.rounding import simple_angle, simple_length
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.robot.write import robot_file_text
 
 

@@ -14,7 +14,9 @@ from dh2sim.inverse.numeric import NumericSolver
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import geometric_jacobian
 from dh2sim.kinematics.sampling import scattered_configurations
-from dh2sim.robot.spec import AngleUnit, RobotSpec, Row
+from dh2sim.robot.row import Row
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit
 from dh2sim.typing import Array, read_only
 
 POSITION_FIRST: Final = 1e-3

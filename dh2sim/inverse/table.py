@@ -5,7 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-from dh2sim.robot.spec import BaseSpec, Limits, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, ToolSpec
+from dh2sim.robot.row import Limits, Row
+from dh2sim.robot.spec import RobotSpec
 
 
 def shared_builds(spec: RobotSpec) -> dict[Any, Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from dh2sim.inverse.textbook_axes import wrapped
-from dh2sim.robot.spec import AngleUnit, Units
+from dh2sim.robot.units import AngleUnit, Units
 from dh2sim.typing import Array
 
 Signs = tuple[tuple[str, int], ...]

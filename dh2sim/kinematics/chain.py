@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError, ModelError
 from dh2sim.kinematics.transforms import compose, identity, joint_part, link_part, pose_from_rpy, second_twist
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 
 

@@ -43,7 +43,9 @@ from dh2sim.kinematics.exact import (
     rounded_matrix,
 )
 from dh2sim.kinematics.transforms import rotate_tensor, rpy_from_rotation
-from dh2sim.robot.spec import BaseSpec, Convention, JointType, LinkSpec, MeshSpec, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, LinkSpec, MeshSpec, Pose, ToolSpec
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
 _PARALLEL: Final = Decimal("4e-16")

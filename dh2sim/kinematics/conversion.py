@@ -22,7 +22,9 @@ from dh2sim.kinematics.transforms import (
     rpy_from_rotation,
 )
 from dh2sim.kinematics.trig import atan2, sin_cos
-from dh2sim.robot.spec import BaseSpec, Convention, LinkSpec, MeshSpec, PayloadSpec, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, LinkSpec, MeshSpec, PayloadSpec, Pose, ToolSpec
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dh2sim.kinematics.loop_closure import POSITIONS, TOLERANCE, mechanism_size
 from dh2sim.kinematics.tree import BASE, Closure, Frame, KinematicTree
-from dh2sim.robot.spec import ClosureType
+from dh2sim.robot.mechanism import ClosureType
 from dh2sim.typing import Array
 
 _BLOCK: Final = 2048

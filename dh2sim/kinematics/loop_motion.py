@@ -23,7 +23,8 @@ from dh2sim.kinematics.loop_closure import assembly, close_loops, is_closed
 from dh2sim.kinematics.transforms import identity
 from dh2sim.kinematics.tree import Frame, KinematicTree, body_poses, joint_values, placed
 from dh2sim.messages import counted, listed
-from dh2sim.robot.spec import ClosureType, RobotSpec
+from dh2sim.robot.mechanism import ClosureType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
 LONGEST: Final = 0.1

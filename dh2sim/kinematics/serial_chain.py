@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.robot.spec import JointType
+from dh2sim.robot.row import JointType
 from dh2sim.typing import Array
 
 _BLOCK = 2048

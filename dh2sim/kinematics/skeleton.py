@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.transforms import Rows, compose
-from dh2sim.robot.spec import JointType
+from dh2sim.robot.row import JointType
 from dh2sim.typing import Point
 
 Travel = tuple[float, float]

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.trig import sin_cos
-from dh2sim.robot.spec import Convention, JointType
+from dh2sim.robot.row import Convention, JointType
 from dh2sim.robot.variation import CELLS, Variation
 from dh2sim.typing import Array, read_only
 

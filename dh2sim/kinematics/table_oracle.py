@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.robot.spec import Convention, Pose, RobotSpec, Row
+from dh2sim.robot.links import Pose
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 
 _Coordinate = TypeVar("_Coordinate", float, Array)

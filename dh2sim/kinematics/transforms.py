@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from dh2sim.errors import Problem, RobotError
 from dh2sim.kinematics.trig import atan2, sin_cos
-from dh2sim.robot.spec import Pose
+from dh2sim.robot.links import Pose
 from dh2sim.typing import Array, read_only
 
 Rows: TypeAlias = Sequence[Sequence[float]]

@@ -10,7 +10,7 @@ from dh2sim.kinematics.tree import BASE, Closure, KinematicTree, body_poses, pla
 from dh2sim.mobility.analysis import mobility_of
 from dh2sim.mobility.mechanism import Mechanism, Pair, PairType, pair
 from dh2sim.mobility.result import Mobility
-from dh2sim.robot.spec import ClosureType
+from dh2sim.robot.mechanism import ClosureType
 from dh2sim.typing import Array
 
 

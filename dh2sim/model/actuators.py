@@ -17,7 +17,7 @@ from dh2sim.kinematics.forward import reference_joint_frames, reference_joint_po
 from dh2sim.kinematics.transforms import Rows, move_point, rotated_tensor
 from dh2sim.model.mass import MassProperties, shifted_inertia
 from dh2sim.model.shapes import neat
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType, JointType
+from dh2sim.robot.row import ActuatorSpec, ActuatorType, JointType
 from dh2sim.typing import Array
 
 

@@ -21,8 +21,10 @@ from dh2sim.model.mass import TOOL_DENSITY, MassProperties, ball, ball_radius, l
 from dh2sim.model.meshes import load_mesh
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel, carrying
 from dh2sim.model.shapes import Shape, given_shape, placed
+from dh2sim.robot.links import LinkSpec
 from dh2sim.robot.read import place_in
-from dh2sim.robot.spec import LinkSpec, RobotSpec, Row
+from dh2sim.robot.row import Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, Point, read_only
 
 PALETTE: tuple[Color, ...] = (

@@ -13,7 +13,7 @@ from dh2sim.model.actuators import Duty
 from dh2sim.model.mass import MassProperties
 from dh2sim.model.shapes import neat
 from dh2sim.robot.magnitudes import LENGTH
-from dh2sim.robot.spec import JointType, Limits, Row
+from dh2sim.robot.row import JointType, Limits, Row
 from dh2sim.typing import Array
 
 Range: TypeAlias = tuple[float, float]

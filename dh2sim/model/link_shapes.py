@@ -17,7 +17,7 @@ from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.skeleton import Skeleton
 from dh2sim.model.limits import NO_LENGTH
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart, between, neat
-from dh2sim.robot.spec import JointType
+from dh2sim.robot.row import JointType
 from dh2sim.typing import Array, Point
 
 NEGLIGIBLE = 1e-6

@@ -13,9 +13,9 @@ import numpy as np
 
 from dh2sim.kinematics.transforms import Rows, move_point, rotate_tensor, rotated_tensor
 from dh2sim.model.shapes import Shape, ShapeKind
+from dh2sim.robot.links import LinkSpec
 from dh2sim.robot.magnitudes import INERTIA
 from dh2sim.robot.parts import inertia_problem
-from dh2sim.robot.spec import LinkSpec
 from dh2sim.typing import Array, Point, read_only
 
 ROUNDING = (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)

@@ -18,7 +18,9 @@ from dh2sim.model.build import build_model
 from dh2sim.model.collision_exclusions import ExcludedPair, Reason
 from dh2sim.model.robot_model import FilledIn, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart, between, neat
-from dh2sim.robot.spec import ActuatorType, BaseSpec, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, ToolSpec
+from dh2sim.robot.row import ActuatorType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
 

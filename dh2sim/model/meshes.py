@@ -14,7 +14,7 @@ from dh2sim.errors import MeshError
 from dh2sim.files import read_plain_file
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.limited_process import WorkerError, ask_worker
-from dh2sim.robot.spec import MeshSpec
+from dh2sim.robot.links import MeshSpec
 from dh2sim.typing import Array
 
 MAX_BYTES: Final = 100_000_000

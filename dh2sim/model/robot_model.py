@@ -18,7 +18,8 @@ from dh2sim.model.limits import Range, clamped
 from dh2sim.model.mass import MassProperties, combine, in_frame
 from dh2sim.model.meshes import MeshAsset
 from dh2sim.model.shapes import Shape
-from dh2sim.robot.spec import ActuatorType, Dynamics, Limits, RobotSpec
+from dh2sim.robot.row import ActuatorType, Dynamics, Limits
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
 Color = tuple[float, float, float, float]

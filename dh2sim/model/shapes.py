@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from dh2sim.kinematics.transforms import compose, pose_from_rpy
-from dh2sim.robot.spec import ShapeSpec
+from dh2sim.robot.links import ShapeSpec
 from dh2sim.typing import Array, read_only
 
 

@@ -19,7 +19,9 @@ from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.limits import NO_LENGTH
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import place_in
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec, Row
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit
 
 TURN = 2 * math.pi
 MOST_TURNS = 4

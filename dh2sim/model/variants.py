@@ -11,7 +11,7 @@ from dh2sim.model.actuators import actuator_model
 from dh2sim.model.mass import ASSUMED_DENSITY, of_shapes
 from dh2sim.model.mechanism import BranchModel, MechanismModel
 from dh2sim.model.robot_model import JointModel, LinkModel, RobotModel
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType
+from dh2sim.robot.row import ActuatorSpec, ActuatorType
 
 M = TypeVar("M", bound=RobotModel | MechanismModel)
 P = TypeVar("P", bound=RobotModel | BranchModel)

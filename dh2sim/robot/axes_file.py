@@ -11,25 +11,34 @@ import numpy as np
 from dh2sim.errors import ImportedFileError
 from dh2sim.messages import Loc, closest
 from dh2sim.robot.checks import check_actuators, check_configurations, check_names, check_type, placed_rows
-from dh2sim.robot.fields import WRONG, Choice, Configurations, Name, Numbers, Parameters, Scope, Text, Tree, UnitsLike
+from dh2sim.robot.fields import (
+    LENGTHS,
+    WRONG,
+    Choice,
+    Configurations,
+    Name,
+    Numbers,
+    Parameters,
+    Scope,
+    Text,
+    Tree,
+    UnitsLike,
+)
+from dh2sim.robot.links import Pose
 from dh2sim.robot.parts import Internal, Part, Parts
 from dh2sim.robot.read import read_tree, units_of
-from dh2sim.robot.spec import (
+from dh2sim.robot.row import (
     CONVENTIONS,
-    GRAVITY,
     JOINT_LETTERS,
-    LENGTHS,
     ActuatorSpec,
     Convention,
     Dynamics,
     JointType,
     Limits,
-    Pose,
-    SourceFile,
-    Units,
     filled_in,
-    joint_vectors,
 )
+from dh2sim.robot.spec import GRAVITY, SourceFile, joint_vectors
+from dh2sim.robot.units import Units
 from dh2sim.robot.yaml_tree import Report
 from dh2sim.typing import Array, read_only
 

@@ -332,6 +332,8 @@ _SLACK: Final = 1 + 1e-9
 """By which a number may pass its bound: another unit and back is rounding."""
 _ANY: Final = Number()
 _FRACTION: Final = Number(least=0, most=1)
+ANGLES: Final = Number("", Dimension.ANGLE)
+LENGTHS: Final = Number("", Dimension.LENGTH)
 COORDINATE: Final = Number("", Dimension.COORDINATE)
 """Of a joint."""
 

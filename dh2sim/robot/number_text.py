@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from dh2sim.errors import ModelError, NotFiniteError
 from dh2sim.robot.fields import Dimension
-from dh2sim.robot.spec import AngleUnit, LengthUnit, Units
+from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 
 _NEIGHBOURS = 4
 """Doubles tried on either side: the way to a unit and back rounds three times, less than an ulp each time."""

@@ -22,6 +22,8 @@ from dh2sim.robot.fields import WRONG, Choice, Kind, Number, Scope, Tree, UnitsL
 from dh2sim.robot.magnitudes import INERTIA, MOST_ROWS, shown_size
 from dh2sim.typing import Array, read_only
 
+FILLED_IN: Final[Any] = None
+"""Default of a field that the robot fills in: in its rows there is always a value."""
 _TRIANGLE_TOLERANCE: Final = 1e-9
 """By which two principal moments may fall short of the third, relative to it."""
 

@@ -20,17 +20,8 @@ from dh2sim.robot.checks import placed_rows
 from dh2sim.robot.expressions import NumberError, is_name, names_in, parameter_name_problem, to_number
 from dh2sim.robot.fields import WRONG, Scope, Tree
 from dh2sim.robot.parts import Part
-from dh2sim.robot.spec import (
-    ROBOT,
-    AngleUnit,
-    LengthUnit,
-    RobotSpec,
-    SourceFile,
-    Units,
-    check_robot,
-    robot_fields,
-    robot_of_checked,
-)
+from dh2sim.robot.spec import ROBOT, RobotSpec, SourceFile, check_robot, robot_fields, robot_of_checked
+from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 from dh2sim.robot.yaml_tree import MAX_BYTES, Entry, Node, Report, check_size, compose, decode
 
 _MOST_NAMED: Final = 8

@@ -26,7 +26,8 @@ from dh2sim.robot.fields import (
 )
 from dh2sim.robot.magnitudes import ANGLE, LENGTH, MOST_ROWS, Magnitude
 from dh2sim.robot.parts import Inertia, InertiaNumbers, NamedParts, Part, Parts, fields_of
-from dh2sim.robot.spec import ROBOT, AngleUnit, LengthUnit
+from dh2sim.robot.spec import ROBOT
+from dh2sim.robot.units import AngleUnit, LengthUnit
 
 _NAME = {"pattern": NAME_PATTERN, "maxLength": LONGEST_NAME}
 NUMBER = {"type": ["number", "string"]}

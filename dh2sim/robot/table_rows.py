@@ -9,7 +9,8 @@ from typing import ClassVar
 
 from dh2sim.errors import Problem, RobotError
 from dh2sim.messages import did_you_mean, listed, shown
-from dh2sim.robot.spec import ActuatorSpec, Convention, Dynamics, JointType, Limits, LinkSpec, Row
+from dh2sim.robot.links import LinkSpec
+from dh2sim.robot.row import ActuatorSpec, Convention, Dynamics, JointType, Limits, Row
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

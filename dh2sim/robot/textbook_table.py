@@ -7,7 +7,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 
 _TITLES = {Convention.STANDARD: "standard", Convention.MODIFIED: "modified", Convention.HAYATI: "Hayati"}
 _HTML = {"alpha": "α", "beta": "β", "theta": "θ"}

@@ -23,7 +23,9 @@ from dh2sim.robot.expressions import CONSTANTS, evaluate_in, names_in
 from dh2sim.robot.fields import IN_SI, WRONG, Color, Dimension, Kind, Number, Numbers, Scope, Tree
 from dh2sim.robot.parts import Inertia, InertiaNumbers, NamedParts, Part, Parts
 from dh2sim.robot.read import Places, evaluate_parameters, plain_node, units_of
-from dh2sim.robot.spec import ROBOT, Dynamics, RobotSpec, Row, Units, check_robot, robot_fields, robot_of_checked
+from dh2sim.robot.row import Dynamics, Row
+from dh2sim.robot.spec import ROBOT, RobotSpec, check_robot, robot_fields, robot_of_checked
+from dh2sim.robot.units import Units
 from dh2sim.robot.write import robot_file_text
 from dh2sim.robot.yaml_tree import Report, compose
 from dh2sim.typing import Array

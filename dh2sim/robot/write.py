@@ -24,18 +24,9 @@ from dh2sim.robot.fields import Choice, Color, Dimension, Flag, Kind, MeshFile, 
 from dh2sim.robot.mechanism_checks import default_closure_name
 from dh2sim.robot.number_text import UnitWriter, number, numbers
 from dh2sim.robot.parts import Inertia, Internal, Part, fields_of
-from dh2sim.robot.spec import (
-    ActuatorSpec,
-    AngleUnit,
-    Convention,
-    Dynamics,
-    JointType,
-    LengthUnit,
-    Limits,
-    RobotSpec,
-    Row,
-    Units,
-)
+from dh2sim.robot.row import ActuatorSpec, Convention, Dynamics, JointType, Limits, Row
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 from dh2sim.robot.yaml_text import WIDTH, Tree, block_lines, comment_lines, entry_lines, inline, text_lines, word
 from dh2sim.robot.yaml_tree import NOT_PRINTABLE
 from dh2sim.typing import Array

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dh2sim.robot.spec import Convention, Row
+from dh2sim.robot.row import Convention, Row
 from dh2sim.robot.variation import CELLS, Variation
 from dh2sim.simulate.contacts import NO_CONTACT, links_with_shapes
 from dh2sim.simulate.options import RolloutOptions

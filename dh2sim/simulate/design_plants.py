@@ -18,7 +18,7 @@ from dh2sim.model.build import build_model
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.designs import Designs
 from dh2sim.simulate.plant import Plant, compile_plant
 from dh2sim.typing import Array, read_only

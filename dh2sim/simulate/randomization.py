@@ -13,7 +13,7 @@ from typing import Final, TypeAlias, overload
 import mujoco
 import numpy as np
 
-from dh2sim.robot.spec import Convention, JointType
+from dh2sim.robot.row import Convention, JointType
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.plant import Plant
 from dh2sim.simulate.quantities import (

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.kinematics.chain import build_chain
-from dh2sim.robot.spec import Convention, Row
+from dh2sim.robot.row import Convention, Row
 from dh2sim.simulate.plant import Plant
 from dh2sim.simulate.randomization import links
 from dh2sim.typing import Array

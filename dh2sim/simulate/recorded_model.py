@@ -21,7 +21,7 @@ from dh2sim.messages import shown
 from dh2sim.model.build import build_model
 from dh2sim.robot.fields import name_problem
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.robot.variation import Variation
 from dh2sim.simulate.design_plants import PlantRecipe
 

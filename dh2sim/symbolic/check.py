@@ -10,7 +10,7 @@ import numpy as np
 
 from dh2sim.errors import MismatchError
 from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses, table_tool_pose
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from dh2sim.symbolic.angles import slide_row, trig_of
 from dh2sim.symbolic.expression import evaluated
 from dh2sim.symbolic.form import Form

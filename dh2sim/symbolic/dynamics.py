@@ -15,7 +15,7 @@ from fractions import Fraction
 from functools import partial
 from typing import Any, Protocol, TypeAlias
 
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from dh2sim.symbolic.angles import derivative_by, rate, slide
 from dh2sim.symbolic.harmonics import Harmonics, Runs
 from dh2sim.symbolic.polynomial import ZERO, Atom, Matrix, Polynomial, exact_number, simple

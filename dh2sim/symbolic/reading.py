@@ -15,7 +15,10 @@ from typing import Final, Literal
 from dh2sim.errors import Dh2simError
 from dh2sim.messages import Loc
 from dh2sim.robot.expressions import ExpressionError, evaluate, evaluate_in
-from dh2sim.robot.spec import AngleUnit, Convention, Pose, RobotSpec, Row
+from dh2sim.robot.links import Pose
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit
 from dh2sim.robot.yaml_tree import Node, Report, compose
 from dh2sim.symbolic.angles import Angle, slide
 from dh2sim.symbolic.constant_rows import constant_runs

@@ -12,7 +12,8 @@ from typing import Final, Literal, NamedTuple
 
 from dh2sim.errors import Dh2simError, UnknownFrameError
 from dh2sim.messages import did_you_mean
-from dh2sim.robot.spec import LengthUnit, RobotSpec
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import LengthUnit
 from dh2sim.symbolic.angles import Angle, trig_of
 from dh2sim.symbolic.polynomial import ONE, ROOTS, ZERO, Atom, Matrix, Polynomial, identity, product
 

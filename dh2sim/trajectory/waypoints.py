@@ -16,6 +16,7 @@ from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import Loc, did_you_mean, listed, path_of, shown
 from dh2sim.robot.expressions import NumberError, to_number
 from dh2sim.robot.fields import (
+    LENGTHS,
     WRONG,
     Choice,
     Dimension,
@@ -31,8 +32,10 @@ from dh2sim.robot.fields import (
 )
 from dh2sim.robot.parts import Internal, Part, Parts, plain
 from dh2sim.robot.read import read_tree
+from dh2sim.robot.row import Row
 from dh2sim.robot.schema import NUMBER, schema_of
-from dh2sim.robot.spec import LENGTHS, AngleUnit, LengthUnit, RobotSpec, Row, Units
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 from dh2sim.robot.yaml_tree import read_yaml_file
 from dh2sim.trajectory.limits import GIVEN, QUANTITIES, LimitValue
 from dh2sim.trajectory.profiles import Profile

@@ -11,7 +11,7 @@ from dh2sim.engines.engine import DynamicsEngine, DynamicTerms
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.errors import EngineError
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import JointType
+from dh2sim.robot.row import JointType
 from dh2sim.typing import Array
 from dh2sim.validate.report import Check, Quantity, Worst
 

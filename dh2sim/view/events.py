@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from dh2sim.draw.projection import Pinhole
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
+from dh2sim.robot.row import Convention
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.view.state import Ghost, LinkDrag, Matrix, Mode, Part
 
 if TYPE_CHECKING:

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 
 from dh2sim.draw.projection import Pinhole
 from dh2sim.model.robot_model import JointModel, RobotModel
-from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Units
+from dh2sim.robot.row import Convention, JointType
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, Units
 from dh2sim.view.scene.items import Vector
 
 if TYPE_CHECKING:

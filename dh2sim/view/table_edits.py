@@ -11,7 +11,7 @@ from dh2sim.kinematics.forward import frame_names
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.edit import PARAMETERS, Cell, own_conventions
-from dh2sim.robot.spec import Convention, JointType
+from dh2sim.robot.row import Convention, JointType
 from dh2sim.robot.write import robot_file_text
 from dh2sim.view.events import ConvertTable, EditCell, SetConvention, SetUnits
 from dh2sim.view.scene.ghost import misread

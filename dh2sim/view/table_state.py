@@ -20,7 +20,8 @@ from dh2sim.robot.edit import (
     written_parameters,
 )
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import AngleUnit, LengthUnit, RobotSpec, Units
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 from dh2sim.robot.write import robot_file_text
 from dh2sim.view.state import COLUMNS, CONVENTION, CellError, TableRow, TableState
 

@@ -16,7 +16,8 @@ from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.progress import Advance, no_progress
-from dh2sim.robot.spec import JointType, Limits, RobotSpec
+from dh2sim.robot.row import JointType, Limits
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from dh2sim.workspace.point import STILL
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dh2sim.importing.sources import ImportOptions
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from scripts.real_arms.packages import Package
 
 TOLERANCE = ImportOptions().tolerance

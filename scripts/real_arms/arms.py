@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from scripts.real_arms.arm import Arm
 from scripts.real_arms.packages import (
     AIRO,

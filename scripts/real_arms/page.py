@@ -14,7 +14,7 @@ from dh2sim.importing.result import Imported
 from dh2sim.importing.sources import import_robot
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
-from dh2sim.robot.spec import Convention, Row
+from dh2sim.robot.row import Convention, Row
 from scripts.real_arms.arm import TOLERANCE, Arm
 from scripts.real_arms.arms import ARMS
 from scripts.real_arms.congruence import congruence

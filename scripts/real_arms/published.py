@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from scripts.real_arms.arm import Arm
 from scripts.real_arms.arms import IIWA, IIWA_OFFSET, PANDA, PUMA, UR5, UR5E, UR10, XARM6, XARM7
 

@@ -9,7 +9,9 @@ import numpy as np
 from dh2sim.calibrate.hayati_rows import fit_rows
 from dh2sim.calibrate.measurements import Measurements, measurements
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.spec import Convention, JointType, Pose, RobotSpec
+from dh2sim.robot.links import Pose
+from dh2sim.robot.row import Convention, JointType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
 SIGMA = 5e-5

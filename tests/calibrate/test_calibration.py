@@ -13,7 +13,9 @@ from dh2sim.calibrate.measurements import measurements
 from dh2sim.calibrate.result import Calibration, ParameterStatus
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.spec import Limits, Pose, RobotSpec, ToolSpec
+from dh2sim.robot.links import Pose, ToolSpec
+from dh2sim.robot.row import Limits
+from dh2sim.robot.spec import RobotSpec
 from tests.calibrate.measured import SIGMA, measured, numbers, off, random_q, turned
 from tests.refusals import refusal
 from tests.sample_robots import ODD_ROBOT, robot, row

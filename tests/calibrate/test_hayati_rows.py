@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from dh2sim.calibrate.hayati_rows import NEARLY_PARALLEL, fit_rows
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
-from dh2sim.robot.spec import Convention, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
 from tests.calibrate.measured import off, random_q
 from tests.sample_robots import NAMES, robot
 from tests.strategies import robot_specs

@@ -7,7 +7,7 @@ import pytest
 from dh2sim import build_model, load_robot, parse_robot
 from dh2sim.cli.new import TYPES, template
 from dh2sim.robot.catalog import builtin_robots
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from tests.program import Outcome, dh2sim
 
 JOINTS = (

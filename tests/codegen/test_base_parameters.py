@@ -14,7 +14,8 @@ from dh2sim.codegen.generate import generate_code, summarize
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import LinkSpec, RobotSpec
+from dh2sim.robot.links import LinkSpec
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import read_only
 from tests.codegen.test_inverse_dynamics import compare_with_mujoco
 from tests.sample_robots import ODD_ROBOT, robot

@@ -14,8 +14,9 @@ from dh2sim.errors import MeshError, ModelError
 from dh2sim.kinematics.forward import geometric_jacobian
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
+from dh2sim.robot.links import MeshSpec
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import MeshSpec, RobotSpec
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.codegen.running import python_functions
 from tests.sample_robots import NAMES, robot

@@ -17,7 +17,9 @@ from dh2sim.errors import ModelError
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import Dynamics, RobotSpec, ToolSpec
+from dh2sim.robot.links import ToolSpec
+from dh2sim.robot.row import Dynamics
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.codegen.running import python_functions
 from tests.sample_robots import NAMES, ODD_ROBOT, in_limits, model

@@ -10,7 +10,8 @@ import pytest
 
 from dh2sim import Revolute, Robot
 from dh2sim.codegen.generate import summarize
-from dh2sim.robot.spec import LinkSpec, RobotSpec
+from dh2sim.robot.links import LinkSpec
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import read_only
 from tests.codegen.test_base_parameters import with_general_links
 from tests.sample_robots import robot

@@ -14,7 +14,9 @@ import numpy as np
 from dh2sim.compare.comparison import Equivalence
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import compose, link_part, pose_from_rpy, rpy_from_rotation
-from dh2sim.robot.spec import BaseSpec, Convention, JointType, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, Pose, ToolSpec
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 
 Generator = np.random.Generator
 

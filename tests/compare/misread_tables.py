@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from dh2sim.compare.misreadings import MisreadingKind
-from dh2sim.robot.spec import Convention, RobotSpec, Row
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
 from tests.compare.disguises import random_table
 
 KINDS = ("sign", "swapped rows", "convention", "offset", "mm", "degrees")

@@ -15,7 +15,8 @@ from dh2sim.compare.comparison import diff
 from dh2sim.compare.matching import ObstacleKind
 from dh2sim.errors import Dh2simError, ModelError
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.robot.spec import Pose, RobotSpec, ToolSpec
+from dh2sim.robot.links import Pose, ToolSpec
+from dh2sim.robot.spec import RobotSpec
 from tests.compare.disguises import disguised, equation_error, random_table
 from tests.compare.misread_tables import misread
 from tests.refusals import refusal

@@ -21,7 +21,8 @@ from dh2sim.draw.diagram.stick import tick_step
 from dh2sim.draw.projection import look_from
 from dh2sim.errors import ConfigurationError, PictureError
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
-from dh2sim.robot.spec import Convention, JointType, RobotSpec
+from dh2sim.robot.row import Convention, JointType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.program import dh2sim, environment
 from tests.sample_robots import NAMES, robot

@@ -21,7 +21,8 @@ from dh2sim.importing.axes import import_axes
 from dh2sim.importing.result import Imported
 from dh2sim.importing.sources import ImportOptions, import_data
 from dh2sim.robot.axes_file import read_axes
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, Limits
+from dh2sim.robot.row import Convention, Limits
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.typing import Array
 from tests.importing.axes_samples import MODIFIED, SLIDE, STANDARD, TURN, made_of, random_axes
 

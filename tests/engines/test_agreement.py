@@ -17,7 +17,9 @@ from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import Convention, Dynamics, JointType, LinkSpec, RobotSpec, Row
+from dh2sim.robot.links import LinkSpec
+from dh2sim.robot.row import Convention, Dynamics, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.engines.files import DYNAMIC, ENGINES, dynamics_engine, joint_names, path_of, pose_engine, write
 from tests.formats.readers import parsed

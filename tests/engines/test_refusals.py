@@ -13,7 +13,8 @@ from dh2sim.errors import EngineCapacityError, EngineError
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.build import build_model
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from tests.engines.files import ENGINES, joint_names, path_of, pose_engine, write
 from tests.refusals import refusal
 from tests.sample_robots import model

@@ -15,8 +15,8 @@ from dh2sim.kinematics.loop_closure import FREEDOMS
 from dh2sim.kinematics.table_oracle import table_mechanism_frames
 from dh2sim.kinematics.tree import build_tree, tree_frames
 from dh2sim.model.mechanism import MechanismModel, build_mechanism
+from dh2sim.robot.mechanism import ClosureType
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import ClosureType
 from tests.program import dh2sim
 
 TWO_CHAINS = """\

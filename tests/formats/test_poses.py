@@ -12,7 +12,9 @@ from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import BaseSpec, LinkSpec, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, LinkSpec, Pose, ToolSpec
+from dh2sim.robot.row import Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.formats.readers import body_poses, in_mujoco, site_poses
 from tests.sample_robots import (

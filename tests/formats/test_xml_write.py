@@ -16,7 +16,9 @@ from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.formats.xml_write import number, numbers
 from dh2sim.model.build import build_model
 from dh2sim.model.mass import MassProperties
-from dh2sim.robot.spec import Limits, LinkSpec, RobotSpec, Row, SourceFile
+from dh2sim.robot.links import LinkSpec
+from dh2sim.robot.row import Limits, Row
+from dh2sim.robot.spec import RobotSpec, SourceFile
 from dh2sim.typing import read_only
 from tests.formats.readers import in_check_urdf, in_mujoco, parsed
 from tests.sample_robots import CONTINUOUS, FIXED, ODD_ROBOT, REVOLUTE, STANDARD, model

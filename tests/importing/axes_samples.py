@@ -9,7 +9,8 @@ import numpy as np
 from dh2sim.importing.axes import import_axes
 from dh2sim.importing.result import Imported
 from dh2sim.robot.axes_file import AxesSpec, AxisJoint
-from dh2sim.robot.spec import Convention, JointType, Limits, Pose
+from dh2sim.robot.links import Pose
+from dh2sim.robot.row import Convention, JointType, Limits
 from dh2sim.typing import read_only
 
 TURN, SLIDE = JointType.REVOLUTE, JointType.PRISMATIC

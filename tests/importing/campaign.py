@@ -28,7 +28,8 @@ from dh2sim.export import export_robot
 from dh2sim.importing.sources import ImportOptions, import_robot
 from dh2sim.model.build import build_model
 from dh2sim.model.meshes import load_mesh
-from dh2sim.robot.spec import Convention, MeshSpec
+from dh2sim.robot.links import MeshSpec
+from dh2sim.robot.row import Convention
 from scripts.real_arms.arms import ARMS
 from scripts.real_arms.packages import installed
 

@@ -11,7 +11,7 @@ from dh2sim.importing.axes import import_axes, serial_robot
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.axes_file import AxesSpec, read_axes
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from tests.kinematics.frame_assignment.chains import Axis, pose, tip_by_exponentials, unit
 
 DOCS = Path(__file__).parents[2] / "docs"

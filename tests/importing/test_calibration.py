@@ -19,8 +19,10 @@ from dh2sim.kinematics.compaction import far_frames
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.model.build import build_model
+from dh2sim.robot.links import LinkSpec, MeshSpec, Pose, ToolSpec
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import Convention, LinkSpec, MeshSpec, Pose, RobotSpec, ToolSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.refusals import refusal
 

@@ -17,7 +17,9 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.robot.write import robot_file_text
 from tests.kinematics.perturbed_arms import KINDS, perturbed, textbook_table
 from tests.kinematics.test_compaction import UR5, calibrated_ur5

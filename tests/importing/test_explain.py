@@ -9,7 +9,8 @@ from dh2sim.importing.explain import explanation
 from dh2sim.importing.result import Imported
 from dh2sim.importing.sources import ImportOptions, import_data
 from dh2sim.kinematics.serial_chain import serial_link_poses
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
+from dh2sim.robot.row import Convention
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.typing import Array
 from tests.importing.axes_samples import MODIFIED, SLIDE, STANDARD, TURN, Axis, made_of, random_axes
 

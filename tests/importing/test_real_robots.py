@@ -20,7 +20,8 @@ from dh2sim.importing.result import Imported
 from dh2sim.importing.sources import ImportOptions, import_robot
 from dh2sim.model.build import build_model
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import Convention, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from scripts.real_arms.arm import TOLERANCE, Arm
 from scripts.real_arms.arms import ARMS, IIWA, IIWA_OFFSET, PANDA, UR5, XARM6, XARM7

@@ -18,7 +18,8 @@ from dh2sim.model.build import build_model
 from dh2sim.model.mass import MassProperties, in_frame
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import Convention, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.robot_files import ODD, RICH
 from tests.sample_robots import COSTLY_NAMES

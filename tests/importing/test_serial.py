@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from dh2sim.importing.serial import joint_names, robot_name, simpler_with
 from dh2sim.robot.fields import name_problem
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import Convention, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
 
 
 def test_names_that_are_allowed_stay() -> None:

@@ -9,7 +9,7 @@ import pytest
 from dh2sim.errors import ImportedFileError
 from dh2sim.importing.result import Imported
 from dh2sim.importing.sources import ImportOptions, import_robot
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from tests.refusals import refusal
 
 URDF = """<robot name="r"><link name="b"/>

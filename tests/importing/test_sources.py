@@ -18,7 +18,9 @@ from dh2sim.importing.sources import ImportOptions, import_data, import_robot
 from dh2sim.importing.table import import_table
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.magnitudes import MOST_ROWS
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from tests.kinematics.test_compaction import UR5
 from tests.refusals import refusal
 

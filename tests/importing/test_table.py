@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from dh2sim.importing.table import import_table
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 
 ROUNDED = b"theta,d (m),a (m),alpha (rad)\nq1,0.4,0,-1.571\nq2,0.15000004,0.3,0.5\n"
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 
 _RIGHT = math.pi / 2
 

@@ -14,7 +14,9 @@ from typing import Final
 import numpy as np
 
 from dh2sim.kinematics.conversion import convert_rows
-from dh2sim.robot.spec import BaseSpec, Convention, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, Pose, ToolSpec
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import row
 

@@ -21,7 +21,8 @@ import numpy as np
 from dh2sim.inverse.nearest import goal_sigma_min
 from dh2sim.inverse.solver import InverseSolver
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.spec import BaseSpec, Pose, RobotSpec, ToolSpec
+from dh2sim.robot.links import BaseSpec, Pose, ToolSpec
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.inverse.arms import ARMS
 from tests.inverse.campaign import is_found

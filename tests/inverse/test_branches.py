@@ -10,7 +10,8 @@ from dh2sim.inverse.branches import branch_names
 from dh2sim.inverse.textbook import explain_inverse_kinematics
 from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.spec import BaseSpec, Convention, Pose
+from dh2sim.robot.links import BaseSpec, Pose
+from dh2sim.robot.row import Convention
 from dh2sim.typing import read_only
 from tests.inverse.disguised_arms import CLASSES, disguised, random_configuration, textbook_table
 from tests.sample_robots import ODD_ROBOT, robot

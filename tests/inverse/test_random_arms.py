@@ -18,7 +18,9 @@ from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.forward import geometric_jacobian
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import pose_from_rpy, rpy_from_rotation
-from dh2sim.robot.spec import BaseSpec, Convention, JointType, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, Pose, ToolSpec
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.inverse.arms import CRX, GENERAL, JACO, ORTHOGONAL, SIXTEEN, UR5, odd_arm
 from tests.kinematics.perturbed_arms import perturbed, textbook_table

@@ -12,7 +12,9 @@ from dh2sim.inverse.reach import beyond_limits, limits_reason, why_unreachable
 from dh2sim.inverse.solver import inverse_kinematics
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.robot.spec import AngleUnit, Limits, RobotSpec, Units
+from dh2sim.robot.row import Limits
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, Units
 from dh2sim.typing import Array
 from tests.sample_robots import row
 

@@ -15,7 +15,8 @@ from dh2sim.inverse.solutions import Curve, Solutions
 from dh2sim.inverse.solver import inverse_kinematics
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.spec import JointType, Limits, RobotSpec, Row
+from dh2sim.robot.row import JointType, Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.sample_robots import STANDARD, in_limits, model, robot, row
 

@@ -14,7 +14,8 @@ from dh2sim.inverse.polish import solved
 from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.solver import InverseSolver
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.spec import JointType, RobotSpec, Row
+from dh2sim.robot.row import JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.sample_robots import robot
 

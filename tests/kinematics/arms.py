@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.spec import BaseSpec, Convention, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, Pose, ToolSpec
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import HAYATI, MODIFIED, ODD, STANDARD, row
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from dh2sim.kinematics.transforms import rpy_from_rotation
-from dh2sim.robot.spec import BaseSpec, Convention, JointType, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, Pose, ToolSpec
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.kinematics.frame_assignment.chains import Axis, pose, turn, unit
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from dh2sim.kinematics.arm_path import arm_path
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.table_oracle import table_tool_pose
-from dh2sim.robot.spec import Limits, RobotSpec
+from dh2sim.robot.row import Limits
+from dh2sim.robot.spec import RobotSpec
 from tests.kinematics.frame_assignment.chains import chain_of
 from tests.kinematics.perturbed_arms import KINDS, perturbed, textbook_table
 from tests.sample_robots import CONTINUOUS, STANDARD

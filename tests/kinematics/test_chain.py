@@ -11,7 +11,9 @@ from dh2sim.kinematics.chain import KinematicChain, build_chain
 from dh2sim.kinematics.forward import frame_poses
 from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses
 from dh2sim.kinematics.transforms import compose, joint_part, link_part
-from dh2sim.robot.spec import RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import ToolSpec
+from dh2sim.robot.row import Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import HAYATI, MODIFIED, ODD, ODD_ROBOT, STANDARD, STANFORD, row
 from tests.strategies import robot_specs, robots_with_joint_vectors

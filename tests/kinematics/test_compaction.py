@@ -16,19 +16,10 @@ from dh2sim.kinematics.compaction import compact_rows, far_frames
 from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_errors
 from dh2sim.kinematics.transforms import pose_from_rpy
+from dh2sim.robot.links import BaseSpec, LinkSpec, MeshSpec, PayloadSpec, Pose, ToolSpec
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import (
-    BaseSpec,
-    Dynamics,
-    Limits,
-    LinkSpec,
-    MeshSpec,
-    PayloadSpec,
-    Pose,
-    RobotSpec,
-    Row,
-    ToolSpec,
-)
+from dh2sim.robot.row import Dynamics, Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.kinematics.arms import table
 from tests.kinematics.perturbed_arms import KINDS, REACHES, perturbed, textbook_table

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import Convention, Limits, RobotSpec
+from dh2sim.robot.row import Convention, Limits
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.kinematics.arms import (
     GENERAL,

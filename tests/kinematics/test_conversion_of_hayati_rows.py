@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from dh2sim.kinematics.conversion import convert_rows
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from tests.kinematics.arms import (
     KINDS,
     PURE,

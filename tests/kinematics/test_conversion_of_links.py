@@ -17,7 +17,9 @@ from dh2sim.kinematics.forward import reference_joint_poses
 from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.model.build import build_model
-from dh2sim.robot.spec import BaseSpec, Convention, LinkSpec, MeshSpec, RobotSpec
+from dh2sim.robot.links import BaseSpec, LinkSpec, MeshSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import HAYATI, MODIFIED, ODD, STANDARD, row
 from tests.strategies import inertias, lengths, poses, robots_with_joint_vectors, vectors

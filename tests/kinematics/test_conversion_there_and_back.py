@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 
 from dh2sim.kinematics.conversion import convert_rows
+from dh2sim.robot.links import Pose
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import Convention, Pose, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.kinematics.arms import GENERAL, KINDS, PURE, Q, arm, assert_same_arm, assert_same_numbers, table
 from tests.sample_robots import MODIFIED, NAMES, STANDARD

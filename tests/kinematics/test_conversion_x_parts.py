@@ -8,7 +8,7 @@ from hypothesis import given
 
 from dh2sim.kinematics.conversion import XPart, as_pose, before, behind, inverse, merged, x_part_of
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.robot.spec import Pose
+from dh2sim.robot.links import Pose
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import ODD
 from tests.strategies import angles, lengths, poses

@@ -20,8 +20,9 @@ from dh2sim.kinematics.loop_closure import (
 )
 from dh2sim.kinematics.tree import build_tree, tree_frames
 from dh2sim.robot.catalog import builtin_mechanisms
+from dh2sim.robot.mechanism import ClosureType
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import ClosureType, RobotSpec
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.refusals import refusal
 from tests.robot.test_mechanism_file import FOUR_BAR

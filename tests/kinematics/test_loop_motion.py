@@ -19,8 +19,9 @@ from dh2sim.kinematics.loop_motion import (
     mechanism_jacobian,
     mechanism_pose,
 )
+from dh2sim.robot.links import ToolSpec
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import RobotSpec, ToolSpec
+from dh2sim.robot.spec import RobotSpec
 from tests.refusals import refusal
 
 

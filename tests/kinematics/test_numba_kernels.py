@@ -16,7 +16,8 @@ from dh2sim.kinematics.chain import KinematicChain, build_chain
 from dh2sim.kinematics.forward import forward_kinematics, frame_pose, geometric_jacobian
 from dh2sim.kinematics.numba_kernels import LARGEST, cache_folder
 from dh2sim.kinematics.trig import sin_cos
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from tests.sample_robots import ODD_ROBOT
 
 needs_numba = pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="numba is not installed")

@@ -8,7 +8,9 @@ from hypothesis import given, settings
 
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.skeleton import Skeleton, build_skeleton
-from dh2sim.robot.spec import RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import ToolSpec
+from dh2sim.robot.row import Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import read_only
 from tests.sample_robots import MODIFIED, PRISMATIC, REVOLUTE, STANDARD, row
 from tests.strategies import robot_specs

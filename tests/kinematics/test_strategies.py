@@ -5,7 +5,8 @@ import re
 import numpy as np
 from hypothesis import given
 
-from dh2sim.robot.spec import Convention, JointType, RobotSpec
+from dh2sim.robot.row import Convention, JointType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.strategies import inertias, robot_specs, robots_with_joint_vectors
 

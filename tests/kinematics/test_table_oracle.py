@@ -13,7 +13,9 @@ from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics import table_oracle as table
 from dh2sim.kinematics.table_oracle import row_matrix, table_frame_poses, table_tool_errors, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
-from dh2sim.robot.spec import Convention, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import Pose, ToolSpec
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import HAYATI, MODIFIED, ODD, ODD_ROBOT, REVOLUTE, STANDARD, STANFORD, row
 from tests.strategies import robots_with_joint_vectors
@@ -146,7 +148,7 @@ def test_the_oracle_imports_nothing_of_what_it_judges() -> None:
     imported = {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     imported |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     ours = {name for name in imported if name.startswith("dh2sim")}
-    assert ours == {"dh2sim.errors", "dh2sim.robot.spec", "dh2sim.typing"}
+    assert ours == {"dh2sim.errors", "dh2sim.robot.links", "dh2sim.robot.row", "dh2sim.robot.spec", "dh2sim.typing"}
 
 
 @given(robot=robots_with_joint_vectors(max_rows=6))

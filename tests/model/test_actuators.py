@@ -13,7 +13,9 @@ from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.model.actuators import gravity_loads, seen_inertias
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import LinkSpec, PayloadSpec, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import LinkSpec, PayloadSpec, ToolSpec
+from dh2sim.robot.row import Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.model.samples import compiled
 from tests.sample_robots import NAMES, ODD, ODD_ROBOT, PRISMATIC, REVOLUTE, STANDARD, in_limits, model

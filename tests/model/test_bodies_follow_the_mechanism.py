@@ -17,7 +17,9 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import link_part, pose_from_rpy, rpy_from_rotation, second_twist
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import BaseSpec, Convention, JointType, LinkSpec, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, LinkSpec, Pose, ToolSpec
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import HAYATI, MODIFIED, NAMES, REVOLUTE, STANDARD, model, robot
 from tests.strategies import robot_specs

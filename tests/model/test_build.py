@@ -15,7 +15,9 @@ from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.model.actuators import ASSUMED_BANDWIDTH, ActuatorModel
 from dh2sim.model.build import BASE_COLOR, JOINT_COLOR, PALETTE, build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType, BaseSpec, Dynamics, LinkSpec, RobotSpec, Row
+from dh2sim.robot.links import BaseSpec, LinkSpec
+from dh2sim.robot.row import ActuatorSpec, ActuatorType, Dynamics, Row
+from dh2sim.robot.spec import RobotSpec
 from tests.arrays import arrays_in
 from tests.sample_robots import NAMES, ODD_ROBOT, REVOLUTE, STANDARD, model
 

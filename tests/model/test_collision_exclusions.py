@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from dh2sim.model.build import build_model
 from dh2sim.model.collision_exclusions import ExcludedPair, Reason, segment_distance
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import JointType, RobotSpec, Row
+from dh2sim.robot.row import JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.model.samples import compiled
 from tests.sample_robots import FIXED, MODIFIED, NAMES, REVOLUTE, STANDARD, model

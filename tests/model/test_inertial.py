@@ -15,7 +15,9 @@ from dh2sim.model.mass import ASSUMED_DENSITY, MIN_MASS, MassProperties
 from dh2sim.model.robot_model import LinkModel
 from dh2sim.model.shapes import neat
 from dh2sim.robot import magnitudes
-from dh2sim.robot.spec import Convention, LinkSpec, RobotSpec, Row
+from dh2sim.robot.links import LinkSpec
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.model.test_mass import plates
 from tests.sample_robots import FIXED, HAYATI, MODIFIED, ODD, REVOLUTE, STANDARD

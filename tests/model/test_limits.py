@@ -11,7 +11,9 @@ from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.limits import ASSUMED_SLIDE_RATE, ASSUMED_TURN_RATE
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import BaseSpec, JointType, Limits, Pose, RobotSpec, Row
+from dh2sim.robot.links import BaseSpec, Pose
+from dh2sim.robot.row import JointType, Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.sample_robots import (
     CONTINUOUS,

@@ -8,7 +8,9 @@ from dataclasses import replace
 import pytest
 
 from dh2sim.model.build import build_model
-from dh2sim.robot.spec import LinkSpec, RobotSpec, Row
+from dh2sim.robot.links import LinkSpec
+from dh2sim.robot.row import Row
+from dh2sim.robot.spec import RobotSpec
 from tests.sample_robots import REVOLUTE, STANDARD, robot
 
 PUBLISHED = ("ur5e", "ur10e", "franka_panda", "kuka_iiwa14", "xarm7", "kuka_kr6_r900")

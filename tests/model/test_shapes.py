@@ -9,7 +9,8 @@ from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart, between, placed, pose_with_z
-from dh2sim.robot.spec import Limits, RobotSpec, Row
+from dh2sim.robot.row import Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.sample_robots import CONTINUOUS, MODIFIED, NAMES, ODD, PRISMATIC, REVOLUTE, STANDARD, in_limits, model
 from tests.strategies import robot_specs

@@ -14,8 +14,10 @@ from dh2sim.errors import ModelError, RobotError
 from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
+from dh2sim.robot.links import ShapeType
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import Convention, RobotSpec, ShapeType
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.model.samples import body_inertia
 from tests.strategies import massless_robot_specs

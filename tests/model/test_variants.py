@@ -16,7 +16,7 @@ from dh2sim.model.build import build_model
 from dh2sim.model.mass import MIN_MASS
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType
+from dh2sim.robot.row import ActuatorSpec, ActuatorType
 from tests.sample_robots import NAMES, ODD_ROBOT, model
 
 KINDS = list(ActuatorType)

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from dh2sim.kinematics.table_oracle import table_frame_poses
 from dh2sim.robot.axes_file import AxesSpec, read_axes
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import ActuatorType, Convention, JointType
+from dh2sim.robot.row import ActuatorType, Convention, JointType
 
 PUMA = Path(__file__).parents[2] / "docs" / "puma560_axes.yaml"
 

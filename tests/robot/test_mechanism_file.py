@@ -11,9 +11,12 @@ import pytest
 
 from dh2sim.errors import RobotError, RobotFileError
 from dh2sim.robot.catalog import builtin_mechanisms, builtin_path
+from dh2sim.robot.links import Pose
+from dh2sim.robot.mechanism import AssemblySpec, BranchSpec, ClosureSpec, ClosureType
 from dh2sim.robot.read import load_robot, parse_robot
+from dh2sim.robot.row import ActuatorType, Row
 from dh2sim.robot.schema import json_schema
-from dh2sim.robot.spec import ActuatorType, AssemblySpec, BranchSpec, ClosureSpec, ClosureType, Pose, RobotSpec, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.robot.write import robot_file_text
 from dh2sim.robot.yaml_tree import Report, compose
 from tests.refusals import refusal

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from dh2sim.errors import ModelError, NotFiniteError
 from dh2sim.robot.fields import Dimension
 from dh2sim.robot.number_text import UnitWriter, number
-from dh2sim.robot.spec import AngleUnit, Convention, JointType, LengthUnit, Row, Units
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 from dh2sim.robot.write import PartWriter
 from dh2sim.robot.yaml_tree import resolve_plain
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dh2sim.robot.spec import JointType
+from dh2sim.robot.row import JointType
 from tests.robot.files import complaints, robot, with_joint
 
 VARIABLE = "looks like the joint variable; leave it out, or write 0: the joint coordinate adds to"

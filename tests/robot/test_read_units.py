@@ -13,7 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dh2sim.robot.spec import ActuatorType, Convention, JointType, RobotSpec
+from dh2sim.robot.row import ActuatorType, Convention, JointType
+from dh2sim.robot.spec import RobotSpec
 from tests.arrays import arrays_in
 from tests.robot.files import FULL, MINIMAL, robot, with_joint
 

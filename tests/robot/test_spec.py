@@ -12,21 +12,10 @@ import numpy as np
 import pytest
 
 from dh2sim.errors import Dh2simError, RobotError
-from dh2sim.robot.spec import (
-    ActuatorSpec,
-    ActuatorType,
-    BaseSpec,
-    Convention,
-    Dynamics,
-    JointType,
-    Limits,
-    LinkSpec,
-    MeshSpec,
-    Pose,
-    RobotSpec,
-    Row,
-    Units,
-)
+from dh2sim.robot.links import BaseSpec, LinkSpec, MeshSpec, Pose
+from dh2sim.robot.row import ActuatorSpec, ActuatorType, Convention, Dynamics, JointType, Limits, Row
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import Units
 from tests.robot.files import FULL, robot
 
 

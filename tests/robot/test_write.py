@@ -18,19 +18,11 @@ from hypothesis.strategies import DrawFn
 
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.robot.catalog import builtin_robots
+from dh2sim.robot.links import BaseSpec, MeshSpec
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import (
-    ActuatorSpec,
-    ActuatorType,
-    AngleUnit,
-    BaseSpec,
-    JointType,
-    LengthUnit,
-    MeshSpec,
-    RobotSpec,
-    Row,
-    Units,
-)
+from dh2sim.robot.row import ActuatorSpec, ActuatorType, JointType, Row
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 from dh2sim.robot.write import robot_file_text
 from dh2sim.robot.yaml_tree import NOT_PRINTABLE
 from tests.robot.files import FULL, robot

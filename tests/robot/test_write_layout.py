@@ -8,22 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from dh2sim.robot.links import BaseSpec, LinkSpec, MeshSpec, Pose
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import (
-    ActuatorSpec,
-    ActuatorType,
-    AngleUnit,
-    BaseSpec,
-    Convention,
-    JointType,
-    LengthUnit,
-    Limits,
-    LinkSpec,
-    MeshSpec,
-    Pose,
-    RobotSpec,
-    Row,
-)
+from dh2sim.robot.row import ActuatorSpec, ActuatorType, Convention, JointType, Limits, Row
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.robot.write import robot_file_text
 from dh2sim.typing import read_only
 from tests.robot.files import FULL, robot

@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from dh2sim.errors import ModelError
+from dh2sim.robot.links import LinkSpec, MeshSpec
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import Convention, JointType, LinkSpec, MeshSpec, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.robot.write import robot_file_text
 
 

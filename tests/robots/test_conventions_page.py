@@ -14,8 +14,10 @@ import pytest
 
 from dh2sim import build_chain
 from dh2sim.kinematics.table_oracle import row_matrix, table_tool_pose
+from dh2sim.robot.links import ToolSpec
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row, ToolSpec
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 
 DOCS = Path(__file__).parents[2] / "docs"

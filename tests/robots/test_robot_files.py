@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dh2sim import build_chain, frame_poses, geometric_jacobian
-from dh2sim.robot.spec import Convention, JointType
+from dh2sim.robot.row import Convention, JointType
 from tests.sample_robots import NAMES, robot
 
 from .samples import limits, random_configurations

@@ -6,17 +6,9 @@ from types import MappingProxyType
 
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import (
-    ActuatorSpec,
-    ActuatorType,
-    Convention,
-    Dynamics,
-    JointType,
-    Limits,
-    LinkSpec,
-    RobotSpec,
-    Row,
-)
+from dh2sim.robot.links import LinkSpec
+from dh2sim.robot.row import ActuatorSpec, ActuatorType, Convention, Dynamics, JointType, Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import read_only
 
 

@@ -8,7 +8,7 @@ from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
 from dh2sim.model.build import build_model
 from dh2sim.model.variants import with_actuators, with_base_mass
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate import rollout
 from dh2sim.simulate.batch import JointSpace
 from dh2sim.simulate.plant import make_plant

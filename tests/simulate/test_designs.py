@@ -18,7 +18,7 @@ from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate import rollout
 from dh2sim.simulate.block import simulate_block
 from dh2sim.simulate.design_plants import groups

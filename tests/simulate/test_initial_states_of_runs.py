@@ -12,7 +12,7 @@ import pytest
 from dh2sim.errors import SettingsError
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import Limits
+from dh2sim.robot.row import Limits
 from dh2sim.simulate import rollout
 from dh2sim.simulate.randomization import Purpose, generator
 from dh2sim.typing import Array, read_only

@@ -16,7 +16,8 @@ from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import quaternion_from_rotation
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import ActuatorType, RobotSpec
+from dh2sim.robot.row import ActuatorType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.simulate import rollout
 from dh2sim.simulate.options import RECORDABLE
 from tests.sample_robots import model

@@ -7,7 +7,8 @@ import pytest
 from dh2sim.errors import EngineError
 from dh2sim.model.build import build_model
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import ActuatorType, Convention, Limits, RobotSpec, Row
+from dh2sim.robot.row import ActuatorType, Convention, Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.plant import Plant, compile_plant
 from dh2sim.simulate.prepare import prepare

@@ -21,7 +21,7 @@ from dh2sim.errors import SettingsError
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.catalog import builtin_robots
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.block import Job
 from dh2sim.simulate.options import RolloutOptions
 from dh2sim.simulate.prepare import prepare

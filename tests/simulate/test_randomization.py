@@ -8,7 +8,7 @@ import pytest
 
 from dh2sim.errors import SettingsError
 from dh2sim.model.build import build_model
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType
+from dh2sim.robot.row import ActuatorSpec, ActuatorType
 from dh2sim.simulate import rollout
 from dh2sim.simulate.randomization import SCALES, Generators, Purpose, generator
 from tests.sample_robots import model

@@ -17,7 +17,7 @@ from dh2sim.errors import ControllerError, SettingsError
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType
+from dh2sim.robot.row import ActuatorSpec, ActuatorType
 from dh2sim.simulate import rollout
 from dh2sim.simulate.quantities import QUANTITIES, distribution_of
 from dh2sim.typing import Array

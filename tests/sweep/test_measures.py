@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dh2sim.model.build import build_model
+from dh2sim.robot.links import PayloadSpec, ToolSpec
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import PayloadSpec, ToolSpec
 from dh2sim.sweep.measures import MEASURES, Sampled, gravity_torques
 from dh2sim.typing import read_only
 from tests.kinematics.test_table_batch import spec as mixed

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import frame_pose, geometric_jacobian
-from dh2sim.robot.spec import JointType, RobotSpec
+from dh2sim.robot.row import JointType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.symbolic.check import SampledConfigurations, check_form
 from dh2sim.symbolic.expression import evaluated
 from dh2sim.symbolic.request import symbolic_form

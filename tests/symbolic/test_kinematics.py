@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from dh2sim.errors import Dh2simError, MismatchError, UnknownFrameError
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import frame_pose
+from dh2sim.robot.links import BaseSpec, Pose, ToolSpec
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import BaseSpec, Pose, RobotSpec, ToolSpec
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.symbolic.check import SampledConfigurations, check_form
 from dh2sim.symbolic.expression import Factor, Lengths, Style, Sum, Term, evaluated, operation_count
 from dh2sim.symbolic.form import Equation, Form

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dh2sim.kinematics.chain import build_chain
-from dh2sim.robot.spec import JointType, RobotSpec
+from dh2sim.robot.row import JointType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from dh2sim.validate.kinematics import LibraryEngine, check_jacobian, check_poses, table_jacobian
 from dh2sim.validate.report import Check

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.table_oracle import table_frame_poses
-from dh2sim.robot.spec import AngleUnit, Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit
 from dh2sim.typing import Array
 from dh2sim.view.scene.annotations import COLORS, Quantity, row_annotations
 from dh2sim.view.scene.items import Arrow, Item, Label, Placed, Polyline, Scene, Triad, Vector, vector

@@ -11,7 +11,8 @@ from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.forward import joint_poses
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
-from dh2sim.robot.spec import Limits, RobotSpec, Row
+from dh2sim.robot.row import Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from dh2sim.view.scene.ghost import (
     ToolOffset,

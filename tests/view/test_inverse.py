@@ -16,7 +16,8 @@ from dh2sim.kinematics.forward import forward_kinematics
 from dh2sim.kinematics.transforms import identity, pose_from_rpy
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from dh2sim.view.motion.inverse import HandleKinematics, HandleSolution
 from tests import strategies

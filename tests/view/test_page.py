@@ -16,7 +16,7 @@ from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from dh2sim.view.initial_state import folder_of, open_state
 from dh2sim.view.motion import row_animation
 from dh2sim.view.motion.row_animation import STEP_SECONDS, ZERO_SECONDS

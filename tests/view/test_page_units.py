@@ -9,7 +9,8 @@ import pytest
 
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
+from dh2sim.robot.row import Convention
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.view.initial_state import open_state
 from tests.view.on_page import (
     Serve,

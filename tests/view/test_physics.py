@@ -17,8 +17,10 @@ from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian, jo
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators
+from dh2sim.robot.links import LinkSpec
 from dh2sim.robot.read import parse_robot
-from dh2sim.robot.spec import ActuatorType, Convention, Dynamics, JointType, LinkSpec, RobotSpec, Row
+from dh2sim.robot.row import ActuatorType, Convention, Dynamics, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from dh2sim.validate.motion.free_motion import frictionless, without_contacts
 from dh2sim.validate.motion.mechanics import energy

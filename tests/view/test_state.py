@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.robot.edit import PARAMETERS
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import AngleUnit, Convention, JointType, LengthUnit, RobotSpec
+from dh2sim.robot.row import Convention, JointType
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.robot.write import robot_file_text
 from dh2sim.view import events
 from dh2sim.view.initial_state import open_state

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
+from dh2sim.robot.row import Convention
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.view.events import ConvertTable, EditCell, OpenText, SelectRow, SetConvention, SetUnits, Undo
 from dh2sim.view.reduce import MAX_UNDO, MAX_UNDO_LENGTH
 from dh2sim.view.state import Mode

@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 from dh2sim.draw.frame_figure.scene import SAME, Pointer, Scene, Segment, distinct, pointers_of
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import forward_kinematics, frame_poses
-from dh2sim.robot.spec import ClosureType, Convention, JointType, RobotSpec, Row
+from dh2sim.robot.mechanism import ClosureType
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 
 

@@ -16,7 +16,7 @@ from dh2sim.draw.frame_figure.view import best_view
 from dh2sim.draw.labels import Label, place_labels
 from dh2sim.draw.plot_style import GREY, INK
 from dh2sim.draw.projection import ParallelView
-from dh2sim.robot.spec import ClosureType
+from dh2sim.robot.mechanism import ClosureType
 from dh2sim.typing import Array
 
 SIZE = 330.0

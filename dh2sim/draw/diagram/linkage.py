@@ -14,7 +14,9 @@ from dh2sim.draw.frame_figure.scene import SAME, Segment, distinct
 from dh2sim.draw.projection import ParallelView
 from dh2sim.kinematics.loop_motion import actuated_joints, mechanism_configuration, named_configuration
 from dh2sim.kinematics.tree import BASE, KinematicTree, build_tree, tree_frames
-from dh2sim.robot.spec import ClosureType, JointType, RobotSpec, Row
+from dh2sim.robot.mechanism import ClosureType
+from dh2sim.robot.row import JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.robot.yaml_tree import Node, Report, compose
 from dh2sim.typing import Array, read_only
 

@@ -22,7 +22,8 @@ from dh2sim.draw.frame_figure.view import best_view
 from dh2sim.draw.plot_style import GREY, INK, plot_style, require_plot
 from dh2sim.importing.explain import GLUE, degrees, number, pose
 from dh2sim.importing.result import Imported
-from dh2sim.robot.spec import Convention, RobotSpec, Row
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
 
 _LEGEND_SIZE = 8.0
 _MARK = 22.0

@@ -19,7 +19,7 @@ from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.kinematics.trig import sin_cos
 from dh2sim.messages import Notes, shown
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Dynamics, JointType, Limits
+from dh2sim.robot.row import ActuatorSpec, ActuatorType, Dynamics, JointType, Limits
 from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:

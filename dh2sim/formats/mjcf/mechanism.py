@@ -33,7 +33,8 @@ from dh2sim.kinematics.trig import atan2
 from dh2sim.model.mass import LIGHTEST
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import Color
-from dh2sim.robot.spec import ClosureType, JointType
+from dh2sim.robot.mechanism import ClosureType
+from dh2sim.robot.row import JointType
 from dh2sim.typing import Array, read_only
 
 TIMESTEP: Final = 0.0005

@@ -15,7 +15,7 @@ from dh2sim.model.mass import LIGHTEST, MassProperties
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
-from dh2sim.robot.spec import ActuatorType, JointType
+from dh2sim.robot.row import ActuatorType, JointType
 from dh2sim.typing import Array
 
 Written: TypeAlias = RobotModel | MechanismModel

@@ -13,7 +13,7 @@ from dh2sim.formats.table.headers import ANGLE_WORDS, LENGTH_WORDS, UNIT
 from dh2sim.formats.table.notation import LONGEST_CELL, plain
 from dh2sim.messages import shown
 from dh2sim.robot.expressions import CONSTANTS, FUNCTIONS, ExpressionError, evaluate
-from dh2sim.robot.spec import AngleUnit, LengthUnit
+from dh2sim.robot.units import AngleUnit, LengthUnit
 
 Unit: TypeAlias = AngleUnit | LengthUnit
 

@@ -14,7 +14,7 @@ from dh2sim.formats.table.grid import Cell, Grid
 from dh2sim.formats.table.headers import UNIT, read_heading
 from dh2sim.formats.table.notation import LONGEST_CELL, plain
 from dh2sim.robot.expressions import FUNCTIONS
-from dh2sim.robot.spec import AngleUnit, LengthUnit, Units
+from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 
 _MAX_TEXT_LINES: Final = 5000
 """Lines that are searched for constants."""

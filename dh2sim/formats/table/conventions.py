@@ -11,7 +11,7 @@ from typing import Final
 from dh2sim.formats.table.grid import PIPES, Findings
 from dh2sim.formats.table.headers import Columns, Quantity
 from dh2sim.messages import shown
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 
 _ABOVE: Final = 12
 _BELOW: Final = 4

@@ -11,7 +11,7 @@ from dh2sim.formats.table.grid import DELIMITER, MAX_COLUMNS, MAX_ROWS, Cells, G
 from dh2sim.formats.table.headers import UNIT, are_headings, read_heading, variable_in
 from dh2sim.formats.table.notation import plain
 from dh2sim.messages import shown
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 
 _UNIT_CELL: Final = re.compile(rf"[\[({{<]?\s*(?:in\s+)?({UNIT})\.?\s*[\])}}>]?", re.IGNORECASE)
 _NO_UNIT: Final = re.compile(r"[\[({<]?\s*(?:[-–—/1]|units?)?\s*[\])}>]?", re.IGNORECASE)

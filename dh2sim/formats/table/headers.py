@@ -11,7 +11,7 @@ from typing import Final
 from dh2sim.formats.table.grid import Cell, Cells, Findings
 from dh2sim.formats.table.notation import plain
 from dh2sim.messages import closest, listed, shown
-from dh2sim.robot.spec import AngleUnit, LengthUnit
+from dh2sim.robot.units import AngleUnit, LengthUnit
 
 
 class Quantity(StrEnum):

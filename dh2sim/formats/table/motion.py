@@ -13,7 +13,7 @@ from dh2sim.formats.table.headers import Columns, Heading, Quantity
 from dh2sim.formats.table.notation import plain
 from dh2sim.formats.table.units import Kind, Number
 from dh2sim.messages import listed, shown
-from dh2sim.robot.spec import JointType
+from dh2sim.robot.row import JointType
 
 _NONE: Final = (
     "",

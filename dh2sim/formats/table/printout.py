@@ -13,7 +13,9 @@ from dh2sim.formats.table.notation import plain
 from dh2sim.kinematics.transforms import rpy_from_rotation
 from dh2sim.messages import shown
 from dh2sim.robot.fields import name_problem
-from dh2sim.robot.spec import Convention, JointType, LengthUnit, Pose, Row, Units
+from dh2sim.robot.links import Pose
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.units import LengthUnit, Units
 from dh2sim.typing import Array, read_only
 
 _ABOVE: Final = 8

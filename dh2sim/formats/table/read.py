@@ -33,18 +33,10 @@ from dh2sim.formats.table.printout import (
 from dh2sim.formats.table.rows import Body, ResolvedUnits, is_hayati, read_body, to_row
 from dh2sim.messages import loc_of, member, path_of, shown
 from dh2sim.robot.fields import name_problem
-from dh2sim.robot.spec import (
-    AngleUnit,
-    BaseSpec,
-    Convention,
-    JointType,
-    LengthUnit,
-    Pose,
-    RobotSpec,
-    Row,
-    ToolSpec,
-    Units,
-)
+from dh2sim.robot.links import BaseSpec, Pose, ToolSpec
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 from dh2sim.robot.yaml_tree import Report, decode
 
 _COMMA: Final = re.compile(r"\d,\d")

@@ -17,7 +17,7 @@ from dh2sim.formats.table.units import ANGLES, LENGTHS, Kind, Number, to_si
 from dh2sim.messages import shown
 from dh2sim.robot.checks import default_name
 from dh2sim.robot.fields import is_reserved, name_problem
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Convention, JointType, Limits, Row
+from dh2sim.robot.row import ActuatorSpec, ActuatorType, Convention, JointType, Limits, Row
 
 _KINDS: Final = {
     Quantity.THETA: ANGLES,

@@ -13,7 +13,7 @@ from typing import Final, TypeAlias, TypeGuard
 from dh2sim.formats.table.dh_table import Given, Table
 from dh2sim.formats.table.grid import Cell, Grid
 from dh2sim.messages import listed, shown
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 
 MAX_ITEMS: Final = 1000
 """Elements of a list, links of a robot."""

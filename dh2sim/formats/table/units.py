@@ -12,7 +12,7 @@ from dh2sim.formats.table.cells import Reading, Unit
 from dh2sim.formats.table.grid import Findings
 from dh2sim.formats.table.headers import ANGLE_WORDS, LENGTH_WORDS, Heading
 from dh2sim.messages import shown
-from dh2sim.robot.spec import AngleUnit, LengthUnit, Units
+from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 
 _LARGE: Final = 10.0
 """A length from which on metres are not taken for granted."""

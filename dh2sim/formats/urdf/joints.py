@@ -21,7 +21,7 @@ from dh2sim.formats.xml_read import Element, XmlReport
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.messages import Notes, closest, shown
-from dh2sim.robot.spec import Dynamics, JointType, Limits
+from dh2sim.robot.row import Dynamics, JointType, Limits
 from dh2sim.typing import read_only
 
 _LIMITS: Final = ("lower", "upper", "effort", "velocity")

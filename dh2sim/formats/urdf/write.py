@@ -17,7 +17,7 @@ from dh2sim.model.mass import LIGHTEST, MassProperties
 from dh2sim.model.mechanism import BranchModel, MechanismModel
 from dh2sim.model.robot_model import Color, JointModel, LinkModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
-from dh2sim.robot.spec import JointType
+from dh2sim.robot.row import JointType
 from dh2sim.typing import Array, read_only
 
 MASSLESS = MassProperties(mass=0.0, com=read_only([0.0, 0.0, 0.0]), inertia=read_only([[0.0] * 3] * 3))

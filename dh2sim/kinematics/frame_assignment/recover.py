@@ -15,7 +15,9 @@ from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint, serial_link_poses
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors, rpy_from_rotation
-from dh2sim.robot.spec import BaseSpec, Convention, Pose, RobotSpec, Row, ToolSpec
+from dh2sim.robot.links import BaseSpec, Pose, ToolSpec
+from dh2sim.robot.row import Convention, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 
 

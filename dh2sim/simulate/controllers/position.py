@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from dh2sim.errors import ControllerError
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.controllers.options import Within
 from dh2sim.simulate.controllers.protocol import RolloutBatch
 from dh2sim.simulate.controllers.trajectories import (

@@ -17,7 +17,7 @@ from dh2sim.errors import ControllerError, RunError
 from dh2sim.files import open_plain_file
 from dh2sim.input_files import csv_lines, npy_array, read_input, refuse_named_pipe, repeated
 from dh2sim.messages import closest, listed, shown
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.controllers.reference import read_reference
 from dh2sim.simulate.dataset_layout import FORMAT
 from dh2sim.simulate.store.local import LocalStore

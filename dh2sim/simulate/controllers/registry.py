@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from dh2sim.errors import ControllerError
 from dh2sim.messages import did_you_mean, listed
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.controllers.options import Option, join_pairs, options_of, read_options
 from dh2sim.simulate.controllers.position import Hold, RandomSpline, Sine
 from dh2sim.simulate.controllers.protocol import Controller, Prepared, RolloutBatch

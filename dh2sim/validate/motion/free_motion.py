@@ -15,7 +15,7 @@ from dh2sim.model.collision_exclusions import ExcludedPair, Reason
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
 from dh2sim.mujoco_warnings import mujoco_warnings
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.typing import Array
 from dh2sim.validate.motion.mechanics import BaseMotion
 

@@ -16,7 +16,7 @@ from dh2sim.kinematics.loop_motion import actuated_joints, driven_motion
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.variants import with_actuators, without_meshes
 from dh2sim.mujoco_warnings import mujoco_warnings
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.typing import Array, read_only
 from dh2sim.view.motion.motion_source import Recording
 

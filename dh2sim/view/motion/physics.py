@@ -14,7 +14,7 @@ from dh2sim.kinematics.chain import joint_vector
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators
 from dh2sim.mujoco_warnings import mujoco_warnings
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.mujoco_runtime import quiet_engine
 from dh2sim.typing import Array, read_only
 from dh2sim.validate.motion.free_motion import compile_model

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from dh2sim.robot.spec import AngleUnit
+from dh2sim.robot.units import AngleUnit
 from dh2sim.view.branches import Branches, branch_name_of, branches_of
 from dh2sim.view.events import Event, Notify, SetJoints, Show
 from dh2sim.view.panel import markup

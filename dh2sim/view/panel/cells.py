@@ -9,7 +9,8 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from dh2sim.robot.spec import AngleUnit, Convention
+from dh2sim.robot.row import Convention
+from dh2sim.robot.units import AngleUnit
 from dh2sim.view.events import EditCell, SelectRow
 from dh2sim.view.panel import markup
 from dh2sim.view.panel.bound import Bound, Send, bind, on_click

@@ -7,7 +7,7 @@ import secrets
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from dh2sim.robot.spec import AngleUnit
+from dh2sim.robot.units import AngleUnit
 from dh2sim.view.events import Event, MoveJoint, Nudge, RandomConfiguration, SetConfiguration, ShowAngles
 from dh2sim.view.frame_readout import readout_of
 from dh2sim.view.panel import markup

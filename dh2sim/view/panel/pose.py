@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from dh2sim.kinematics.forward import frame_names
 from dh2sim.kinematics.transforms import pose_errors
-from dh2sim.robot.spec import AngleUnit
+from dh2sim.robot.units import AngleUnit
 from dh2sim.typing import Array
 from dh2sim.view.events import ChooseFrame, ChooseReference, Show
 from dh2sim.view.frame_readout import FrameReadout, MujocoPose, readout_of, relative_pose

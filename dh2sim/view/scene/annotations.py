@@ -19,7 +19,9 @@ from numpy.typing import ArrayLike
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import frame_poses
 from dh2sim.kinematics.transforms import compose, joint_part, link_part, second_twist
-from dh2sim.robot.spec import AngleUnit, Convention, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit
 from dh2sim.typing import Array, read_only
 from dh2sim.view.scene.items import ORIGIN, Arrow, Color, Item, Label, Placed, Polyline, Scene, Triad, vector
 from dh2sim.view.scene.solids import orientation_of, position_of

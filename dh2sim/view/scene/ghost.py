@@ -13,7 +13,8 @@ from dh2sim.kinematics.forward import forward_kinematics
 from dh2sim.kinematics.transforms import pose_errors
 from dh2sim.messages import listed
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import Convention, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from dh2sim.view.scene.items import Color, Scene
 from dh2sim.view.scene.solids import robot_solids

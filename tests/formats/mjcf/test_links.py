@@ -11,7 +11,7 @@ import trimesh
 
 from dh2sim.errors import ImportedFileError
 from dh2sim.formats.serial_robot import SerialLink
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.typing import Array
 from tests.formats.mjcf.reading import BALL, arm_text, frame, model_text, read_text, residual
 

@@ -10,7 +10,7 @@ import pytest
 
 from dh2sim.formats.mjcf.read import read_mjcf
 from dh2sim.formats.mjcf.write import to_mjcf
-from dh2sim.robot.spec import ActuatorType, JointType
+from dh2sim.robot.row import ActuatorType, JointType
 from tests.formats.mjcf.reading import BALL, arm_text, model_text, read_text, residual
 from tests.sample_robots import NAMES, model
 

@@ -13,7 +13,9 @@ from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import BaseSpec, JointType, Pose, RobotSpec, Row
+from dh2sim.robot.links import BaseSpec, Pose
+from dh2sim.robot.row import JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.formats.readers import no_mujoco_warnings, parsed
 from tests.sample_robots import NAMES, ODD_ROBOT, REVOLUTE, STANDARD, model

@@ -11,7 +11,8 @@ from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.kinematics.transforms import identity, pose_from_rpy
 from dh2sim.model.build import build_model
 from dh2sim.model.mass import MassProperties
-from dh2sim.robot.spec import RobotSpec, Row
+from dh2sim.robot.row import Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.formats.readers import in_mujoco
 from tests.sample_robots import ODD, REVOLUTE, STANDARD

@@ -14,7 +14,8 @@ from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.shapes import ShapeKind, ShapePart
 from dh2sim.robot.magnitudes import MOST_ROWS
-from dh2sim.robot.spec import Dynamics, RobotSpec, Row
+from dh2sim.robot.row import Dynamics, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import read_only
 from tests.formats.readers import floats, in_mujoco, normal, parsed
 from tests.sample_robots import CONTINUOUS, FIXED, NAMES, ODD_ROBOT, REVOLUTE, STANDARD, model

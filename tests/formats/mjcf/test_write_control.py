@@ -13,7 +13,8 @@ from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Limits, RobotSpec, Row
+from dh2sim.robot.row import ActuatorSpec, ActuatorType, Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import read_only
 from tests.formats.readers import in_mujoco
 from tests.sample_robots import CONTINUOUS, COSTLY_NAMES, MODIFIED, ODD, PRISMATIC, REVOLUTE, STANDARD, model

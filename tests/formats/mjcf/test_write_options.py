@@ -12,7 +12,8 @@ from dh2sim.formats.mjcf.write import EXPORTED, MjcfOptions, to_mjcf
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.variants import with_base_mass
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 from tests.formats.readers import parsed
 from tests.sample_robots import NAMES, in_limits, model

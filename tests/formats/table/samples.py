@@ -12,7 +12,9 @@ from dh2sim.errors import Dh2simError, ImportedFileError
 from dh2sim.formats.table.read import TableImport, read_table
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import forward_kinematics
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit, RobotSpec
+from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.typing import Array
 
 

@@ -11,7 +11,7 @@ from dh2sim.formats.table.cells import CellError, Constant, Reading, read_cell
 from dh2sim.formats.table.grid import Cell
 from dh2sim.formats.table.headers import Quantity
 from dh2sim.formats.table.motion import COORDINATES
-from dh2sim.robot.spec import AngleUnit, LengthUnit
+from dh2sim.robot.units import AngleUnit, LengthUnit
 
 DEG, RAD, M, MM = AngleUnit.DEG, AngleUnit.RAD, LengthUnit.M, LengthUnit.MM
 THETA = COORDINATES[Quantity.THETA]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from tests.formats.table.samples import complaints, imported
 
 ROWS = "|---|---|---|---|\n| θ1 | 0 | 1 | 0 |\n"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dh2sim.robot.magnitudes import MOST_ROWS
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from tests.formats.table.samples import STANDARD, complaints, imported, modified, numbers, tool_poses, types
 
 H = math.pi / 2

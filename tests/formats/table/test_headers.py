@@ -8,7 +8,7 @@ import pytest
 
 from dh2sim.formats.table.grid import Cell
 from dh2sim.formats.table.headers import Quantity, read_heading
-from dh2sim.robot.spec import AngleUnit, LengthUnit
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from tests.formats.table.samples import MODIFIED, STANDARD, complaints, imported
 
 Q = Quantity

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from tests.formats.table.samples import (
     MODIFIED,
     STANDARD,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from tests.formats.table.samples import STANDARD, complaints, imported, modified, numbers, standard, tool_poses, types
 
 H = math.pi / 2

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from dh2sim.robot.spec import Convention, LengthUnit
+from dh2sim.robot.row import Convention
+from dh2sim.robot.units import LengthUnit
 from dh2sim.typing import Array
 from tests.formats.table.samples import complaints, imported, modified, numbers, standard, tool_poses, types
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim.robot.spec import AngleUnit, Convention, LengthUnit
+from dh2sim.robot.row import Convention
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from tests.formats.table.samples import complaints, imported, modified, numbers, standard, tool_poses, types
 
 FOLDER = Path(__file__).parent / "printouts"

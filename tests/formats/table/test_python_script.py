@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dh2sim.robot.spec import Convention
+from dh2sim.robot.row import Convention
 from tests.formats.table.samples import complaints, imported, modified, numbers, standard, tool_poses, types
 from tests.formats.table.test_matlab_script import _shift, _turn
 

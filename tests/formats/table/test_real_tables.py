@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from dh2sim.robot.spec import AngleUnit, Convention, JointType, LengthUnit
+from dh2sim.robot.row import Convention, JointType
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.typing import Array
 from tests.formats.table.samples import STANDARD, complaints, imported, modified, standard, tool_poses, types
 

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from dh2sim.robot.spec import ActuatorType, AngleUnit, Convention, JointType
+from dh2sim.robot.row import ActuatorType, Convention, JointType
+from dh2sim.robot.units import AngleUnit
 from tests.formats.table.samples import STANDARD, complaints, imported, numbers, tool_poses, types
 
 MARK = "mark the joint's coordinate with a star, as in theta1* or d3*, or add a column type with R or P"

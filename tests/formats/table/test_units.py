@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from dh2sim.robot.spec import AngleUnit, LengthUnit
+from dh2sim.robot.units import AngleUnit, LengthUnit
 from tests.formats.table.samples import STANDARD, complaints, imported, numbers
 
 H = math.pi / 2

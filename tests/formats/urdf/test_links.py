@@ -8,7 +8,7 @@ import pytest
 from dh2sim.errors import ImportedFileError
 from dh2sim.formats.serial_robot import SerialLink, SerialRobot
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.robot.spec import Limits
+from dh2sim.robot.row import Limits
 from tests.formats.urdf.samples import joint, links, read, robot
 
 I_OWN = '<inertia ixx="0.2" ixy="0.01" ixz="0" iyy="0.3" iyz="-0.02" izz="0.25"/>'

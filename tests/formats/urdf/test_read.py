@@ -9,7 +9,7 @@ from dh2sim.errors import ImportedFileError
 from dh2sim.formats.urdf.write import to_urdf
 from dh2sim.kinematics.forward import forward_kinematics
 from dh2sim.kinematics.serial_chain import serial_link_poses
-from dh2sim.robot.spec import JointType
+from dh2sim.robot.row import JointType
 from tests.formats.urdf.samples import joint, links, read, robot
 from tests.refusals import refusal
 from tests.sample_robots import NAMES, model

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
-from dh2sim.robot.spec import JointType
+from dh2sim.robot.row import JointType
 from dh2sim.typing import Array
 
 CASES = (

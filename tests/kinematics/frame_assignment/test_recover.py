@@ -17,7 +17,8 @@ from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import compose, invert
 from dh2sim.robot.catalog import builtin_robots
 from dh2sim.robot.read import load_robot
-from dh2sim.robot.spec import Convention, JointType, RobotSpec
+from dh2sim.robot.row import Convention, JointType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 from tests.kinematics.frame_assignment.chains import Axis, chain_of, pose, random_axes, tip_by_exponentials, unit
 from tests.kinematics.perturbed_arms import KINDS, REACHES, perturbed

@@ -10,7 +10,7 @@ import pytest
 from dh2sim.kinematics.frame_assignment.lines import Case
 from dh2sim.kinematics.frame_assignment.recover import recover_table
 from dh2sim.kinematics.frame_assignment.result import Assignment, BaseRule, FootRule, SenseRule, SlideRule, TipRule
-from dh2sim.robot.spec import Convention, JointType, Row
+from dh2sim.robot.row import Convention, JointType, Row
 from dh2sim.typing import Array
 from tests.kinematics.frame_assignment.chains import Axis, chain_of, pose, turn, unit
 

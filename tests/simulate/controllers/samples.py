@@ -12,7 +12,8 @@ import numpy as np
 
 import dh2sim
 from dh2sim.errors import ControllerError
-from dh2sim.robot.spec import ActuatorSpec, ActuatorType, Convention, Dynamics, JointType, Limits, RobotSpec, Row
+from dh2sim.robot.row import ActuatorSpec, ActuatorType, Convention, Dynamics, JointType, Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.simulate.controllers.protocol import Controller, RolloutBatch
 from dh2sim.simulate.controllers.registry import choose
 from dh2sim.simulate.plant import Plant, make_plant

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dh2sim.errors import ControllerError
-from dh2sim.robot.spec import ActuatorType, RobotSpec
+from dh2sim.robot.row import ActuatorType
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.simulate.controllers.position import Hold, RandomSpline, Sine
 from dh2sim.simulate.controllers.protocol import OpenLoop
 from tests.simulate.controllers.samples import arm, driven, make, started

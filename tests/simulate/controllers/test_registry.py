@@ -6,7 +6,7 @@ from functools import partial
 import pytest
 
 from dh2sim.errors import ControllerError
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, OpenLoop
 from dh2sim.simulate.controllers.registry import BUILT_IN, choose, slower
 from tests.refusals import refusal

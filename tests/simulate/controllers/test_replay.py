@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import dh2sim
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate import rollout
 from dh2sim.simulate.controllers.protocol import Controller, Follows, OpenLoop
 from dh2sim.simulate.controllers.registry import choose

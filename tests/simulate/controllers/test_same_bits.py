@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, OpenLoop
 from tests.simulate.controllers.samples import arm, cuts, make, observe
 

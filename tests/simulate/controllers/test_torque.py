@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.controllers.protocol import ClosedLoop, RolloutBatch
 from dh2sim.simulate.controllers.torque import PD, ComputedTorque, GravityCompensation, steady_gains
 from dh2sim.typing import Array, read_only

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate import rollout
 from dh2sim.simulate.controllers.protocol import ClosedLoop, Follows, Observation, OpenLoop, RolloutBatch
 from dh2sim.simulate.controllers.registry import choose

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dh2sim.robot.spec import ActuatorType
+from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.controllers.protocol import Observation, RolloutBatch
 from dh2sim.simulate.controllers.torque import ComputedTorque
 from dh2sim.typing import Array

@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, example, given, settings
 
 from dh2sim import build_model
 from dh2sim.errors import EngineError
-from dh2sim.robot.spec import Convention, JointType, Limits, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Limits, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.validate.motion import run as physics
 from dh2sim.validate.motion.free_motion import compile_model
 from dh2sim.validate.motion.run import check_motion
