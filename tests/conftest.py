@@ -6,9 +6,16 @@
 
 from __future__ import annotations
 
+import os
+import signal
+
 import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
+
+# Each worker of pytest-xdist keeps a processor busy. Threads of OpenBLAS beside them wait for each other, spinning: a
+# calibration of 0.2 s took 10 s. To be set before NumPy is imported; the programs that tests start inherit it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # derandomized: the same robots in every run, so that a failure is one of the code and not of the day
 settings.register_profile(
@@ -30,7 +37,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Choose how many examples property tests try, unless ``--hypothesis-profile thorough`` says it."""
+    """Choose how many examples property tests try, unless ``--hypothesis-profile thorough`` says it.
+
+    What a script starts in the background with ``&`` ignores SIGINT, and so would the programs that tests interrupt.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if config.getoption("hypothesis_profile", None) is None:
         settings.load_profile("quick" if "not slow" in config.getoption("markexpr") else "full")
 
