@@ -20,6 +20,7 @@ from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.tree import DYNAMICS as URDF_DYNAMICS
 from dh2sim.formats.urdf.write import to_urdf
+from dh2sim.input_files import read_input
 from dh2sim.kinematics.loop_closure import constraint_jacobian
 from dh2sim.kinematics.parallelograms import find_couplings
 from dh2sim.kinematics.sampling import scattered_configurations
@@ -405,8 +406,7 @@ def _names(model: RobotModel | MechanismModel, formats: Collection[Format]) -> l
 
 def _origin(path: Path) -> str | None:
     try:
-        with open(path, "rb") as file:
-            found = _ORIGIN.search(file.read(_HEADER))
+        found = _ORIGIN.search(read_input(path, _HEADER))
     except OSError:
         return None
     return None if found is None else found[1].decode("utf-8", "replace")
@@ -436,7 +436,7 @@ def drift(
     for relative, expected in render(model, formats, dh_frames=dh_frames).items():
         path = out / model.name / relative
         try:
-            actual = path.read_bytes()
+            actual = read_input(path, 2 * len(expected))  # every line end may be longer
         except FileNotFoundError:
             found.append(Drift(path=path, what="missing"))
         except OSError as error:
@@ -452,7 +452,7 @@ def drift(
 
 def _holds(path: Path, data: bytes) -> bool:
     try:
-        return path.read_bytes() == data
+        return read_input(path, len(data)) == data
     except OSError:
         return False
 

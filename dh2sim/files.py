@@ -18,17 +18,19 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from io import BufferedReader
-from pathlib import Path
+from pathlib import Path, PurePath, PureWindowsPath
 from types import FrameType
 from typing import Final
 
 from dh2sim.errors import OutputError
 from dh2sim.locks import FolderLock, leftovers, lock_folder, make_hidden
+from dh2sim.messages import shown
 
 PARTIAL: Final = ".partial"
 """Suffix of files and folders that are being written; their names begin with a dot."""
 _JOURNAL: Final = "journal"
 """File in a folder of files that are being moved: what is moved, so that another process can finish the work."""
+_MOST_JOURNAL: Final = 2**20
 
 
 def open_plain_file(path: Path) -> BufferedReader:
@@ -212,10 +214,9 @@ def _finish(out: Path, name: str) -> None:
     """Finish what dead writers began, and remove what they left."""
     for folder, lock in leftovers(out / (name or _SEVERAL), PARTIAL):
         try:
-            if (folder / _JOURNAL).exists():
-                journal = json.loads((folder / _JOURNAL).read_text(encoding="utf-8"))
-                _follow(folder, out / name, **journal)
-        except (OSError, ValueError, TypeError) as error:
+            if os.path.lexists(folder / _JOURNAL):
+                _follow(folder, out / name, *_read_journal(folder / _JOURNAL))
+        except (OSError, ValueError, RecursionError) as error:
             raise OutputError(
                 f"'{out / name}' contains files of two exports, since a process was killed while it wrote them; "
                 f"the rest in '{folder}' cannot be moved: {error}"
@@ -225,9 +226,39 @@ def _finish(out: Path, name: str) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _follow(folder: Path, target: Path, *, take: str, files: list[str]) -> None:
+def _read_journal(path: Path) -> tuple[str, list[str]]:
+    """Return what is to be moved; the folder may be a stranger's.
+
+    Raises:
+        OSError: It cannot be read.
+        ValueError, RecursionError: It is none, or names files elsewhere.
+    """
+    match json.loads(read_plain_file(path, _MOST_JOURNAL)):
+        case {"take": "new" | "old" as take, "files": [*files], **more} if not more:
+            for file in files:
+                if not isinstance(file, str) or not _is_below(PurePath(file)):
+                    raise ValueError(f"its journal names {shown(file)}")
+            return take, files
+    raise ValueError("its journal is damaged")
+
+
+def _is_below(path: PurePath) -> bool:
+    parts = path.parts
+    return bool(parts) and not path.is_absolute() and not PureWindowsPath(path).anchor and ".." not in parts
+
+
+def _require_no_links(folder: Path, file: str) -> None:
+    """Raise an OSError if a file is reached through a link in a folder."""
+    for parent in PurePath(file).parents:
+        if (folder / parent).is_symlink() and parent.parts:
+            raise OSError(errno.EINVAL, "is a link, not a folder", str(folder / parent))
+
+
+def _follow(folder: Path, target: Path, take: str, files: list[str]) -> None:
     """Move files that are still to be moved: new ones, or old ones if the move had failed."""
     for file in files:
+        _require_no_links(folder, f"{take}/{file}")
+        _require_no_links(target, file)
         source = folder / take / file
         if os.path.lexists(source):
             (target / file).parent.mkdir(parents=True, exist_ok=True)

@@ -153,6 +153,8 @@ def leftovers(target: Path, *suffixes: str) -> Iterator[tuple[Path, FolderLock]]
     with suppress(OSError):
         for name in sorted(filter(ours.fullmatch, os.listdir(target.parent))):
             folder = target.with_name(name)
+            if folder.is_symlink():
+                continue
             with suppress(OSError):  # in use, or gone
                 lock = FolderLock(folder)
                 if lock.effective and lock.holds(folder):

@@ -32,7 +32,7 @@ def mujoco_warnings() -> Iterator[list[str]]:
     with _lock:
         if not _collectors:
             _own = mujoco.get_mju_user_warning()
-            mujoco.set_mju_user_warning(_collect)
+            mujoco.set_mju_user_warning(note_warning)
         _collectors.append(collected)
     try:
         yield collected
@@ -43,7 +43,8 @@ def mujoco_warnings() -> Iterator[list[str]]:
                 mujoco.set_mju_user_warning(_own)
 
 
-def _collect(text: str) -> None:
+def note_warning(text: str) -> None:
+    """Add what MuJoCo warned of, here or in another process, to what is collected."""
     with _lock:
         if _collectors and text not in _collectors[-1]:
             _collectors[-1].append(text)

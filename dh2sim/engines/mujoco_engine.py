@@ -23,13 +23,16 @@ class MujocoEngine:
 
     inertia_rounding = 0.0
 
-    def __init__(self, path: Path, joints: Sequence[str], rows: int) -> None:
+    def __init__(
+        self, path: Path, joints: Sequence[str], rows: int, *, compiled: mujoco.MjModel | None = None
+    ) -> None:
         """Compile a file.
 
         Args:
             path: An .xml (MJCF) or .urdf file.
             joints: Names of the moving joints, in the order of a joint vector.
             rows: Number of rows of the table.
+            compiled: The model in the file, where it was compiled already.
 
         Raises:
             EngineError: MuJoCo refuses the file, or frames or joints are missing.
@@ -39,7 +42,7 @@ class MujocoEngine:
         self.name = "mujoco-urdf" if urdf else "mujoco-mjcf"
         self._kind = "body" if urdf else "site"
         try:
-            self._model = mujoco.MjModel.from_xml_path(str(path))
+            self._model = mujoco.MjModel.from_xml_path(str(path)) if compiled is None else compiled
         except ValueError as error:
             raise EngineError(f"{path}: MuJoCo refuses the file: {' '.join(str(error).split())}") from error
         model = self._model

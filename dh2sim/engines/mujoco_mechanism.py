@@ -19,14 +19,18 @@ RANK_TOLERANCE = 1e-8
 class MujocoMechanism:
     """One compiled model file; DH frames are sites in an MJCF and bodies in a URDF."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, compiled: mujoco.MjModel | None = None) -> None:
         """Compile a file.
+
+        Args:
+            path: An .xml (MJCF) or .urdf file.
+            compiled: The model in the file, where it was compiled already.
 
         Raises:
             EngineError: MuJoCo refuses it.
         """
         try:
-            self._model = mujoco.MjModel.from_xml_path(str(path))
+            self._model = mujoco.MjModel.from_xml_path(str(path)) if compiled is None else compiled
         except ValueError as error:
             raise EngineError(f"{path.name}: MuJoCo refuses the file: {' '.join(str(error).split())}") from error
         self._data = mujoco.MjData(self._model)

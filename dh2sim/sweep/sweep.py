@@ -26,8 +26,9 @@ from dh2sim.processors import end_with_parent
 from dh2sim.robot.read import load_robot
 from dh2sim.robot.write import robot_file_text
 from dh2sim.simulate.designs import Designs, draws_of, read_design_table
+from dh2sim.sweep.journal import Journal
 from dh2sim.sweep.measures import MEASURES, UNITS, Sampled, check_measures, load_function, measure
-from dh2sim.sweep.table import Journal, require_table, write_table
+from dh2sim.sweep.table import require_table, write_table
 from dh2sim.typing import Array
 
 CHUNK: Final = 32
@@ -228,8 +229,7 @@ def measure_designs(
         units = dict(zip(parameters, task.designs.variation.units, strict=True)) | {
             column: UNITS.get(column, "") for column in columns
         }
-        rows_of = (row for chunk in chunks for row in journal.rows(chunk)[: sizes[chunk]])
-        seen = summary.watch(rows_of)
+        seen = summary.watch(_checked_rows(journal, task, sizes))
         if path is None:
             table = np.array(list(seen))
             names = (*parameters, *columns)
@@ -374,6 +374,21 @@ def _measured(task: Task, chunks: Iterable[int], jobs: int) -> Iterator[tuple[in
                     yield each.result()
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _checked_rows(journal: Journal, task: Task, sizes: Mapping[int, int]) -> Iterator[list[float]]:
+    """Yield the rows of all designs; those that a journal had must be of these designs.
+
+    Raises:
+        RunDamagedError: They are of others.
+    """
+    width = len(task.designs.names) + len(journal.columns)
+    for chunk, size in sizes.items():
+        for design, row in enumerate(journal.rows(chunk)[:size], start=chunk * CHUNK):
+            values = [*map(float, task.designs.values(design))]
+            if len(row) != width or row[: len(values)] != values:
+                journal.damaged()
+            yield row
 
 
 class _Summary:

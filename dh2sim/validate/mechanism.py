@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from dh2sim.engines.examined import Examined
 from dh2sim.engines.mujoco_mechanism import MujocoMechanism
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.engines.pybullet_engine import PybulletEngine
@@ -53,8 +54,13 @@ def validate_mechanism(
     if folder is None:
         with TemporaryDirectory(prefix="dh2sim-") as temporary:
             export_robot(model, Path(temporary), verified=False)
-            made = Path(temporary) / model.name
-            return validate_mechanism(model, samples=samples, seed=seed, tolerance=tolerance, folder=made)
+            return _validate(model, Path(temporary) / model.name, samples, seed, tolerance, None)
+    return _validate(model, folder, samples, seed, tolerance, Examined())
+
+
+def _validate(
+    model: MechanismModel, folder: Path, samples: int, seed: int, tolerance: float, examined: Examined | None
+) -> RobotReport:
     lower, upper = (np.array([joint.travel[side] for joint in model.moving_joints]) for side in (0, 1))
     q = random_configurations(lower, upper, min(samples, _MOST_SAMPLES), seed)
     table = [table_mechanism_frames(model.spec, vector) for vector in q]
@@ -67,18 +73,20 @@ def validate_mechanism(
             checks.append(Check(engine=engine, quantity=Quantity.FILE, ok=False, reason=reason))
             continue
         try:
-            read = MujocoMechanism(path)
+            read = MujocoMechanism(path, compiled=None if examined is None else examined.model(path))
             poses = [read.frame_poses(dict(zip(names, vector.tolist(), strict=True))) for vector in q]
             checks.append(_poses(engine, model, poses, table, q, tolerance))
             if suffix == "xml" and model.tree.closures:
                 checks += _loops(read, model, tolerance)
         except (EngineError, KeyError) as error:
             checks.append(Check(engine=engine, quantity=Quantity.FILE, ok=False, reason=str(error)))
-    checks += _other_readers(folder / f"{model.name}.urdf", model, q[:_OTHERS_SAMPLES], tolerance)
+    checks += _other_readers(folder / f"{model.name}.urdf", model, q[:_OTHERS_SAMPLES], tolerance, examined)
     return RobotReport(name=model.name, samples=len(q), reach=model.size, checks=tuple(checks))
 
 
-def _other_readers(path: Path, model: MechanismModel, q: Array, tolerance: float) -> list[Check]:
+def _other_readers(
+    path: Path, model: MechanismModel, q: Array, tolerance: float, examined: Examined | None
+) -> list[Check]:
     """Compare the poses of the tree that other programs read from a URDF with the table."""
     names = [joint.name for joint in model.moving_joints]
     couplings = find_couplings(model.spec).joints if model.tree.closures else {}
@@ -101,6 +109,8 @@ def _other_readers(path: Path, model: MechanismModel, q: Array, tolerance: float
             table = [{frame: T for frame, T in poses.items() if frame != "base_link"} for poses in table]
         try:
             with signals_deferred():
+                if examined is not None:
+                    examined.model(path)
                 reader = make(path, [names[k] for k in own], tuple(table[0]))
             poses = reader.frame_poses(np.ascontiguousarray(vectors[:, own]))
         except (ImportError, EngineCapacityError, EngineError) as error:

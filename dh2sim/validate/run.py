@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from dh2sim.arguments import number, whole_number
+from dh2sim.engines.examined import Examined
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
 from dh2sim.engines.pybullet_engine import PybulletEngine
@@ -118,7 +119,7 @@ def validate_robot(
     with mujoco_warnings() as warned:
         if folder is not None:
             finish_interrupted(folder.parent, folder.name)
-            report = _validate(model, folder, samples, seed, tolerance, arm, advance)
+            report = _validate(model, folder, samples, seed, tolerance, arm, advance, made=False)
             mixed = mixture(model, folder)
             if mixed:
                 reason = f"{folder} {mixed}; write them again with 'dh2sim export'"
@@ -128,7 +129,7 @@ def validate_robot(
             with TemporaryDirectory(prefix="dh2sim-") as temporary:
                 export_robot(model, Path(temporary), verified=False)
                 made = Path(temporary) / model.name
-                report = _validate(model, made, samples, seed, tolerance, arm, advance)
+                report = _validate(model, made, samples, seed, tolerance, arm, advance, made=True)
     return replace(report, warnings=warning_sentences(warned, [joint.name for joint in model.moving_joints]))
 
 
@@ -140,12 +141,15 @@ def _validate(
     tolerance: float,
     source: SourceArm | None,
     advance: Advance | None,
+    *,
+    made: bool,
 ) -> RobotReport:
+    """Validate the files in a folder, which were ``made`` here, or may be a stranger's."""
     lower, upper = model.travel
     q = random_configurations(lower, upper, samples, seed)
     library = LibraryEngine(model.chain)
     mjcf, urdf = folder / f"{model.name}.xml", folder / f"{model.name}.urdf"
-    engines, unread = _read(model, mjcf, urdf)
+    engines, unread = _read(model, mjcf, urdf, Examined() if not made else None)
     allowed = max(tolerance, model.angle_rounding)
 
     def poses(engine: Mover | YourdfpyEngine) -> list[Check]:
@@ -182,8 +186,10 @@ def _validate(
     )
 
 
-def _read(model: RobotModel, mjcf: Path, urdf: Path) -> tuple[list[Mover | YourdfpyEngine], list[Check]]:
-    """Return the engines that read their files, and why others did not."""
+def _read(
+    model: RobotModel, mjcf: Path, urdf: Path, examined: Examined | None
+) -> tuple[list[Mover | YourdfpyEngine], list[Check]]:
+    """Return the engines that read their files, and why others did not; files of strangers are ``examined``."""
     engines: list[Mover | YourdfpyEngine] = []
     unread: list[Check] = []
     names = [joint.name for joint in model.moving_joints]
@@ -201,7 +207,11 @@ def _read(model: RobotModel, mjcf: Path, urdf: Path) -> tuple[list[Mover | Yourd
         try:
             # an interrupted import would look like an engine that is not installed
             with signals_deferred(), np.errstate(all="ignore"):
-                engines.append(make(path, names, len(model.joints)))
+                compiled = None if examined is None else examined.model(path)
+                if make is MujocoEngine:
+                    engines.append(MujocoEngine(path, names, len(model.joints), compiled=compiled))
+                else:
+                    engines.append(make(path, names, len(model.joints)))
         except (ImportError, EngineCapacityError, EngineError) as error:
             unread.append(unread_check(name, package, error))
     return engines, unread

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from dh2sim.errors import Dh2simError
 from dh2sim.export import Format, render, verify
+from dh2sim.input_files import read_input
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.catalog import builtin_path, builtin_robots
 from dh2sim.robot.yaml_tree import MAX_BYTES
@@ -93,9 +94,10 @@ def robot_files_in(folder: Path | None) -> tuple[str, ...]:
 
 def _is_robot_file(file: Path) -> bool:
     try:
-        return file.is_file() and file.stat().st_size <= MAX_BYTES and b"\njoints:" in b"\n" + file.read_bytes()
+        data = read_input(file, MAX_BYTES) if file.is_file() else b""
     except OSError:
         return False
+    return len(data) <= MAX_BYTES and b"\njoints:" in b"\n" + data
 
 
 def _builtin_folder() -> Path | None:
@@ -166,7 +168,7 @@ class RobotFiles:
         if path is None:
             raise Dh2simError(f"{robot} is no longer there.")
         try:
-            text = path.read_bytes()
+            text = read_input(path, MAX_BYTES)
         except OSError as error:
             raise Dh2simError(f"{robot}: {error.strerror or error}") from error
         self._open(OpenText(text=text, file=path.name, folder=path.parent))

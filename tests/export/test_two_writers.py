@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -95,3 +96,71 @@ def test_an_export_waits_for_another_or_fails_where_it_is_told_not_to(tmp_path: 
     assert waiting.communicate(timeout=180)[0].startswith(f"small: {folder}\n")
     assert waiting.returncode == 0
     assert contents(out) != before
+
+
+def _forged(out: Path, journal: object) -> Path:
+    """Leave a folder as a killed export does, with a journal that no export writes."""
+    robot = build_model(parse_robot(small()))
+    export_robot(robot, out / "made")
+    hidden = out / "made" / f".small-0123abcd{PARTIAL}"
+    (hidden / "new" / "sub").mkdir(parents=True)
+    (hidden / "new" / "small.xml").write_text("forged")
+    (hidden / "journal").write_text(journal if isinstance(journal, str) else json.dumps(journal))
+    return hidden
+
+
+@pytest.mark.parametrize(
+    "journal",
+    [
+        {"take": "old", "files": ["../../victim"]},
+        {"take": "new", "files": ["../../victim"]},
+        {"take": "new/sub/..", "files": ["small.xml"]},
+        {"take": "..", "files": ["small.xml"]},
+        {"take": "old", "files": [str(ROOT / "no such file")]},
+        {"take": "old", "files": ["sub/../../../victim"]},
+        {"take": "old", "files": [""]},
+        {"take": "old", "files": ["."]},
+        {"take": "old", "files": [7]},
+        {"take": "old", "files": "victim"},
+        {"take": "new", "files": ["small.xml"], "folder": "/"},
+        {"take": "new"},
+        [],
+        "[" * 100_000,
+        "{",
+    ],
+)
+def test_a_forged_journal_moves_and_removes_nothing(tmp_path: Path, journal: object) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    _forged(tmp_path, journal)
+    before = contents(tmp_path)
+    robot = write(tmp_path, small())
+    for words in (["--check"], []):
+        run = dh2sim("export", robot, "--out", tmp_path / "made", *words)
+        assert (run.status, run.err.count("\n")) == (2, 1)
+        assert "cannot be moved: its journal " in run.err or "cannot be moved: " in run.err
+    robot.unlink()
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("part", ["new", "new/sub", "target"])
+def test_a_leftover_with_links_moves_nothing(tmp_path: Path, part: str) -> None:
+    hidden = _forged(tmp_path, {"take": "new", "files": ["sub/key"]})
+    elsewhere = tmp_path / "elsewhere"
+    (elsewhere / "sub").mkdir(parents=True)
+    for key in (elsewhere / "key", elsewhere / "sub" / "key"):
+        key.write_text("mine")
+    shutil.rmtree(hidden / "new")
+    if part == "target":
+        (hidden / "new" / "sub").mkdir(parents=True)
+        (hidden / "new" / "sub" / "key").write_text("forged")
+        (tmp_path / "made" / "small" / "sub").symlink_to(elsewhere)
+    elif part == "new":
+        (hidden / "new").symlink_to(elsewhere)
+    else:
+        (hidden / "new").mkdir()
+        (hidden / "new" / "sub").symlink_to(elsewhere / "sub")
+    run = dh2sim("export", write(tmp_path, small()), "--out", tmp_path / "made", "--check")
+    assert (run.status, run.err.count("\n")) == (2, 1)
+    assert "is a link, not a folder" in run.err or "not a plain" in run.err
+    assert contents(elsewhere) == {"key": b"mine", "sub/key": b"mine"}

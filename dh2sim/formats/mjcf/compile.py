@@ -130,6 +130,24 @@ def compile_text(text: str, included: Mapping[str, str]) -> mujoco.MjModel:
     return model
 
 
+def compile_file(path: Path) -> tuple[mujoco.MjModel, list[str]]:
+    """Compile a URDF or an MJCF as it is, in a process of its own; return what MuJoCo warned of, too.
+
+    Args:
+        path: The file, which names no others that may not be read.
+
+    Raises:
+        ModelError: MuJoCo refuses it, or needs too much time or memory for it.
+    """
+    try:
+        facts, model = _compiled(file=str(path.absolute()))
+    except WorkerError as error:
+        raise ModelError(str(error)) from None
+    if model is None:
+        raise ModelError(" ".join(facts["refused"].split()))
+    return model, facts["warnings"]
+
+
 def _compiled(**request: Any) -> tuple[dict[str, Any], mujoco.MjModel | None]:
     """Return what the worker says of a model, and the model unless it was refused.
 

@@ -186,8 +186,8 @@ def answer(request: bytes) -> bytes:
     """Compile an MJCF; the model comes after a line of JSON that says what MuJoCo does not keep in it.
 
     The request names a file (``path``, ``folders`` from which its meshes are looked for, and those in which they are
-    ``allowed``), or it has the ``text`` of one and
-    the texts of those that it includes (``included``, by name), which is compiled as it is.
+    ``allowed``). Or it has the ``text`` of one and the texts of those that it includes (``included``, by name), or it
+    names a ``file``; these are compiled as they are.
 
     Raises:
         MemoryError: MuJoCo needs too much.
@@ -202,6 +202,8 @@ def answer(request: bytes) -> bytes:
             if "text" in asked:
                 included = {name: text.encode() for name, text in asked["included"].items()}
                 model = mujoco.MjModel.from_xml_string(asked["text"], included)
+            elif "file" in asked:
+                model = mujoco.MjModel.from_xml_path(asked["file"])
             else:
                 model, facts = _compiled_anyhow(
                     asked["path"],

@@ -93,6 +93,8 @@ class MjcfFiles:
     """Number of models: the file itself and those that are attached."""
     places: Mapping[tuple[str, str], Place] = field(repr=False)
     """Of elements, by tag and name."""
+    roots: tuple[Element, ...] = field(repr=False)
+    """Of all files."""
 
     def error(self, message: str, *, path: str = "", element: tuple[str, str] | None = None) -> ImportedFileError:
         """Return an error at an element, given by tag and name, or at the file's beginning."""
@@ -130,6 +132,7 @@ def scan_files(path: Path, *, file: str, root: Path | None) -> MjcfFiles:
         ),
         models=search.models,
         places=search.places,
+        roots=tuple(search.trees.values()),
     )
 
 
