@@ -85,7 +85,8 @@ def check_dynamics(
     diagonal = np.maximum(np.sqrt(np.maximum(np.einsum("kii->ki", reference.mass_matrix), 0.0)), least)
     mass = np.abs(terms.mass_matrix - reference.mass_matrix) / (diagonal[:, :, None] * diagonal[:, None, :])
     weight = model.mass * (1.0 + float(np.linalg.norm(model.spec.gravity)))  # 1 m/s^2 for what the motion makes
-    least_force = max(LEAST_FORCE * weight * lever, ROUNDING * (weight * model.longest_lever + rounded))
+    made_far_out = weight * model.longest_lever + rounded * max(1.0, _rate(model, velocity)) ** 2
+    least_force = max(LEAST_FORCE * weight * lever, ROUNDING * made_far_out)
     force = np.maximum(np.abs(reference.bias).max(axis=0), least_force)
     names = [joint.name for joint in model.moving_joints]
     made = np.maximum(force, _turning_torque(model, velocity)) if engine.inertia_rounding > TOLERANCE else force
@@ -113,10 +114,14 @@ def _turning_torque(model: RobotModel, velocity: Array) -> Array:
     own = [0.0 if body is None else float(np.trace(body.inertia)) for body in model.bodies]
     carried = np.cumsum(own[::-1])[::-1]
     moving = [row for row, joint in enumerate(model.joints) if joint.type.moves]
-    turning = [model.joints[row].type is not JointType.PRISMATIC for row in moving]
-    rate = np.abs(velocity[:, turning]).sum(axis=1).max(initial=0.0)
-    bound: Array = carried[moving] * rate**2
+    bound: Array = carried[moving] * _rate(model, velocity) ** 2
     return bound
+
+
+def _rate(model: RobotModel, velocity: Array) -> float:
+    """Return an upper bound, rad/s, of how fast links turn at these joint velocities, shape (N, n)."""
+    turning = [joint.type is not JointType.PRISMATIC for joint in model.moving_joints]
+    return float(np.abs(velocity[:, turning]).sum(axis=1).max(initial=0.0))
 
 
 def _check(engine: str, quantity: Quantity, error: Array, names: Sequence[str], q: Array, tolerance: float) -> Check:

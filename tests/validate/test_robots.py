@@ -159,3 +159,22 @@ def test_a_rod_of_kilometres_that_turns_about_its_length_is_judged_by_its_inerti
     )
     report = validate_robot(build_model(parse_robot(rod)))
     assert [check for check in report.checks if check.ok is False] == []
+
+
+@pytest.mark.slow
+def test_a_planet_on_a_fast_arm_is_judged_by_the_forces_that_its_motion_makes() -> None:
+    planet = (
+        "name: planet\nconvention: modified\nunits: {angle: deg}\njoints:\n"
+        "  - {type: prismatic, d: -20000.0}\n"
+        "  - {type: revolute, convention: standard, a: 1.0, alpha: 30.0, theta: -946.7104442348875, flip: true}\n"
+        "  - {type: fixed, alpha: -5761.061580087594, d: 4.419700222058943e-06, theta: -90.0}\n"
+        "  - {type: prismatic, a: 36905.07220454905, alpha: 180.0, theta: -57295779.513082325}\n"
+        "  - {type: revolute, a: 1.0, alpha: 180.0, d: 1.5707963267948966}\n"
+        "  - {type: revolute, link: {density: 1e5}}\n"
+        "  - {type: revolute, flip: true}\n"
+        "  - {type: revolute, a: 6.400124965202625e-07, alpha: 90.0, d: -1.5707963267948966,"
+        " theta: -0.003219786678914402, link: {radius: 549248.8797627555,"
+        " inertia: {ixx: 0.50000000000001, iyy: 2.834637082785638e-05, izz: 0.5000283463708178}}}\n"
+    )
+    report = validate_robot(build_model(parse_robot(planet)), samples=50)
+    assert [check for check in report.checks if check.ok is False] == []
