@@ -11,15 +11,20 @@ import csv
 import errno
 import io
 import json
+import math
+import os
 import zipfile
+from array import array
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Final, NoReturn
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, Literal, NoReturn
 
 from dh2sim.messages import shown
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
 
@@ -51,6 +56,10 @@ _LONGEST_INTEGER: Final = 400
 """Digits; Python converts no more than some thousands, and no double holds more than 309."""
 _MOST_COLUMNS: Final = 2000
 """Of a table; a robot has up to 494 joints."""
+_LONGEST_LINE: Final = 200_000
+"""Characters of a CSV file."""
+_MOST_REPORTED: Final = 5
+"""Problems of a CSV file."""
 
 
 def json_content(data: bytes) -> Any:
@@ -107,15 +116,84 @@ def repeated(names: Iterable[str]) -> list[str]:
     return sorted(name for name, count in Counter(names).items() if count > 1)
 
 
-def csv_lines(data: bytes) -> list[tuple[int, list[str]]]:
-    """Return the lines of a CSV file that are not empty, each with its number, from 1; the first names columns."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NumberTable:
+    """A CSV file of numbers, whose first line names the columns."""
+
+    header: tuple[str, ...]
+    """The names; none where the file has no lines."""
+    values: NDArray[np.float64]
+    """Shape (rows, columns); lines that are empty are passed over. Without meaning where there are problems."""
+    problems: tuple[str, ...]
+    """What is wrong with the numbers, with lines and columns; at most some of it."""
+
+
+def csv_numbers(data: bytes) -> NumberTable:
+    """Return the numbers of a CSV file; they take no more memory than eight bytes each, whatever the lines hold."""
+    import numpy as np
+
+    rows = _csv_rows(data)
+    _, names = next(rows, (0, []))
+    header = tuple(cell.strip() for cell in names)
+    values, problems, count = array("d"), list[str](), 0
+    for line, row in rows:
+        if len(row) != len(header):
+            found = [f"line {line} has {len(row)} values; the first line names {len(header)} columns"]
+        else:
+            numbers = [*map(_number, row)]
+            values.extend(numbers)
+            found = [
+                f"line {line}, column '{name}': {shown(cell)} is not a finite number"
+                for name, cell, number in zip(header, row, numbers, strict=True)
+                if not math.isfinite(number)
+            ]
+        count += len(found)
+        problems += found[: _MOST_REPORTED - len(problems)]
+    if not values and not count:
+        problems.append("there are no values below the first line")
+    if count > _MOST_REPORTED:
+        problems.append(f"and {count - _MOST_REPORTED} more")
+    table = np.frombuffer(values, dtype=np.float64).reshape(-1, len(header) or 1)
+    return NumberTable(header=header, values=table, problems=tuple(problems))
+
+
+def _number(text: str) -> float:
     try:
-        reader = csv.reader(io.StringIO(utf8_text(data), newline=""))
-        lines = [(reader.line_num, row) for row in reader if row]
-    except (ValueError, csv.Error) as error:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _csv_rows(data: bytes) -> Iterator[tuple[int, list[str]]]:
+    """Yield the lines of a CSV file that are not blank, each with its number, from 1."""
+    first = True
+    reader = csv.reader(_lines(data))
+    try:
+        for row in reader:
+            if first and row:
+                check_columns(len(row))
+            if any(map(str.strip, row)):
+                first = False
+                yield reader.line_num, row
+    except csv.Error as error:
         raise ValueError(f"is not a CSV file: {error}") from None
-    check_columns(len(lines[0][1]) if lines else 0)
-    return lines
+    except UnicodeDecodeError:
+        try:
+            utf8_text(data)
+        except ValueError as error:
+            raise ValueError(f"is not a CSV file: {error}") from None
+        raise
+
+
+def _lines(data: bytes) -> Iterator[str]:
+    """Yield the lines of a text, with their ends."""
+    stream = io.TextIOWrapper(io.BytesIO(data), "utf-8-sig", newline="")
+    number = 0
+    while line := stream.readline(_LONGEST_LINE + 1):
+        number += 1
+        if len(line) > _LONGEST_LINE:
+            raise ValueError(f"is not a CSV file: line {number} has more than {_LONGEST_LINE} characters")
+        yield line
 
 
 def check_columns(count: int) -> None:
@@ -124,15 +202,50 @@ def check_columns(count: int) -> None:
         raise ValueError(f"has {count} columns; at most {_MOST_COLUMNS} are allowed")
 
 
-def npy_array(path: Path) -> NDArray[Any]:
-    """Return the array in a .npy file, which is read from the file when it is used; not one of Python objects."""
-    import numpy as np
+class NpyFile:
+    """The array in a .npy file, which is not one of Python objects; its numbers are read when they are needed.
 
-    with path.open("rb") as file:
-        shape, order, dtype = _array_header(file, path.stat().st_size)
-        if 0 in shape:
-            return np.empty(shape, dtype)
-        return np.memmap(path, dtype, mode="r", offset=file.tell(), shape=shape, order=order)
+    It is not mapped into memory: a file that shrinks would end the process.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Read what the array is.
+
+        Raises:
+            ValueError: It is none.
+            OSError: The file cannot be read.
+        """
+        with path.open("rb") as file:
+            self.shape, self._order, self.dtype = _array_header(file, os.fstat(file.fileno()).st_size)
+            self._begin = file.tell()
+        self._path = path
+
+    def rows(self, start: int, stop: int) -> NDArray[Any]:
+        """Return some rows, shape (stop - start, ...); all are read to return some where columns are in order.
+
+        Raises:
+            ValueError: The file is shorter than it was.
+            OSError: It cannot be read.
+        """
+        if self._order == "F":
+            return self.all()[start:stop]
+        row = math.prod(self.shape[1:]) * self.dtype.itemsize
+        return self._read((stop - start, *self.shape[1:]), start * row)
+
+    def all(self) -> NDArray[Any]:
+        """Return the whole array; raises as ``rows`` does."""
+        return self._read(self.shape, 0)
+
+    def _read(self, shape: tuple[int, ...], skipped: int) -> NDArray[Any]:
+        import numpy as np
+
+        size = math.prod(shape) * self.dtype.itemsize
+        with self._path.open("rb") as file:
+            file.seek(self._begin + skipped)
+            data = file.read(size)
+        if len(data) < size:
+            raise ValueError("became shorter while it was read")
+        return np.ndarray(shape, self.dtype, data, order=self._order)
 
 
 def npz_arrays(data: bytes, most: int) -> dict[str, NDArray[Any]]:
@@ -158,10 +271,8 @@ def npz_arrays(data: bytes, most: int) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def _array_header(file: BinaryIO, size: int) -> tuple[tuple[int, ...], Any, Any]:
+def _array_header(file: BinaryIO, size: int) -> tuple[tuple[int, ...], Literal["C", "F"], np.dtype[Any]]:
     """Return shape, order and type of the array in a file of ``size`` bytes, and leave it at the array's values."""
-    import math
-
     import numpy as np
 
     try:

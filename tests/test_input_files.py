@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import os
+import tracemalloc
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -10,9 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dh2sim.errors import Dh2simError
-from dh2sim.input_files import csv_lines, json_content, npy_array, npz_arrays, read_input
+from dh2sim.errors import ControllerError, Dh2simError
+from dh2sim.input_files import NpyFile, csv_numbers, json_content, npz_arrays, read_input
 from dh2sim.robot.read import load_robot
+from dh2sim.simulate.controllers.recording import read_recording
 from dh2sim.simulate.run import rollout
 
 
@@ -93,7 +95,7 @@ def test_arrays_come_back_from_files(tmp_path: Path) -> None:
         np.float64(3.0),
     ):
         np.save(tmp_path / "a.npy", array)
-        np.testing.assert_array_equal(npy_array(tmp_path / "a.npy"), array)
+        np.testing.assert_array_equal(NpyFile(tmp_path / "a.npy").all(), array)
 
 
 def header(text: bytes) -> bytes:
@@ -114,7 +116,7 @@ def header(text: bytes) -> bytes:
 def test_a_file_that_is_no_array_is_refused(data: bytes, problem: str, tmp_path: Path) -> None:
     (tmp_path / "a.npy").write_bytes(data)
     with pytest.raises(ValueError, match=f"^is not a NumPy array: {problem}"):
-        npy_array(tmp_path / "a.npy")
+        NpyFile(tmp_path / "a.npy")
     with pytest.raises(ValueError, match=f"^is not a NumPy archive: 'a.npy' is not a NumPy array: {problem}"):
         npz_arrays(zipped("a.npy", data), MOST)
 
@@ -138,17 +140,63 @@ def test_a_damaged_archive_is_refused(data: bytes, problem: str) -> None:
 @pytest.mark.parametrize(
     ("read", "data", "problem"),
     [
-        (csv_lines, b"a,b\n1,\xff\n", "is not a CSV file: line 2 is not UTF-8: byte 0xff"),
-        (csv_lines, b"a\n" + b"1" * 200_000, "is not a CSV file: field larger than field limit"),
-        (csv_lines, b"a," * 30_000, "has 30001 columns; at most 2000 are allowed"),
+        (csv_numbers, b"a,b\n1,\xff\n", "is not a CSV file: line 2 is not UTF-8: byte 0xff"),
+        (csv_numbers, b"a\n" + b"1" * 199_999, "is not a CSV file: field larger than field limit"),
+        (csv_numbers, b"a\n" + b"1," * 200_000, "is not a CSV file: line 2 has more than 200000 characters"),
+        (csv_numbers, b"a," * 30_000, "has 30001 columns; at most 2000 are allowed"),
         (json_content, b"\xff\xfe{\0", "is not a JSON file: line 1 is not UTF-8: byte 0xff; it seems to be UTF-16"),
     ],
-    ids=["bytes", "long cell", "wide", "UTF-16"],
+    ids=["bytes", "long cell", "long line", "wide", "UTF-16"],
 )
 def test_a_text_that_cannot_be_used_is_refused(read: Callable[[bytes], object], data: bytes, problem: str) -> None:
     with pytest.raises(ValueError, match=f"^{problem}"):
         read(data)
 
 
-def test_lines_of_csv_are_numbered_as_in_the_file() -> None:
-    assert csv_lines(b"\xef\xbb\xbfa,b\r\n\r\n1,2\r\n") == [(1, ["a", "b"]), (3, ["1", "2"])]
+def test_numbers_of_csv_come_with_lines_as_in_the_file() -> None:
+    found = csv_numbers(b"\xef\xbb\xbfa, b\r\n\r\n1,2\r\n , \r\n-3e1,nan\r\nx\r\n")
+    assert found.header == ("a", "b")
+    assert found.problems == (
+        "line 5, column 'b': 'nan' is not a finite number",
+        "line 6 has 1 values; the first line names 2 columns",
+    )
+    assert csv_numbers(b"a,b\n1,2\n3,4").values.tolist() == [[1.0, 2.0], [3.0, 4.0]]
+    assert (
+        csv_numbers(b"a,b\n").problems == csv_numbers(b"").problems == ("there are no values below the first line",)
+    )
+
+
+@pytest.mark.parametrize("line", [b"1\n", b"x\n", b"1,1\n", b"\n"])
+def test_a_csv_of_many_short_lines_takes_little_memory(line: bytes) -> None:
+    data = b"a\n" + line * (100_000 // len(line))
+    tracemalloc.start()
+    csv_numbers(data)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 12 * len(data) + 10**6
+
+
+def test_an_array_whose_file_becomes_shorter_is_refused_while_it_is_read(tmp_path: Path) -> None:
+    for array in (np.ones((4, 1000)), np.asfortranarray(np.ones((4, 1000)))):
+        np.save(tmp_path / "a.npy", array)
+        found = NpyFile(tmp_path / "a.npy")
+        np.testing.assert_array_equal(found.rows(1, 3), array[1:3])
+        os.truncate(tmp_path / "a.npy", 20_000)
+        with pytest.raises(ValueError, match="became shorter while it was read"):
+            found.rows(3, 4)
+
+
+@pytest.mark.parametrize("how", ["shorter", "altered", "gone"])
+def test_a_recording_that_changes_while_it_is_replayed_is_refused(how: str, tmp_path: Path) -> None:
+    file = tmp_path / "controls.npy"
+    np.save(file, np.arange(24.0).reshape(4, 3, 2))
+    recording = read_recording(str(file), "ctrl")
+    np.testing.assert_array_equal(recording.read(range(1, 3)), np.arange(24.0).reshape(4, 3, 2)[1:3])
+    if how == "shorter":
+        os.truncate(file, 150)
+    elif how == "altered":
+        np.save(file, np.ones((4, 3, 2)))
+    else:
+        file.unlink()
+    with pytest.raises(ControllerError, match=r"^'.*controls.npy' was changed while it was replayed"):
+        recording.read(range(2, 4))

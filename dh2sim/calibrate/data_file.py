@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -136,20 +137,22 @@ def read_measurements(
 
 
 def _read(text: str, spec: RobotSpec, report: _Report, kind: Kind | None, groups: str | None) -> Measurements:
-    lines = [
+    every = (
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
         if line.strip() and not line.lstrip().startswith("#")
-    ]
+    )
+    lines = list(islice(every, MOST_ROWS + 1))
+    more = sum(1 for _ in every)
     if not lines:
         report(1, 1, "", "the file is empty; the first line must name the columns")
         report.raise_any()
-    if len(lines) - 1 > MOST_ROWS:
+    if more:
         report(
             lines[0][0],
             1,
             "",
-            f"the file has {len(lines) - 1} measurements; at most {MOST_ROWS} are fitted: choose some",
+            f"the file has {len(lines) - 1 + more} measurements; at most {MOST_ROWS} are fitted: choose some",
         )
         report.raise_any()
     number, header = lines[0]

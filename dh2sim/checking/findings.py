@@ -50,7 +50,7 @@ PART_OF_RULE: Final = {
     **dict.fromkeys((kind.value for kind in SlipKind), CheckPart.FILES),
 }
 """The part that finds it; what reading the robot file finds is of every part."""
-MAX_BYTES: Final = 100_000_000
+MAX_BYTES: Final = 10_000_000
 """Of a baseline."""
 _WARNINGS: Final = {kind.value for kind in SlipKind}
 

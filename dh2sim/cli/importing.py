@@ -118,7 +118,7 @@ def import_robot(
       dh2sim import calibration.conf --nominal ur10e
       dh2sim import - --convention standard < table.csv
     """
-    from dh2sim.importing.sources import STDIN, ImportOptions, import_data, read_file
+    from dh2sim.importing.sources import ImportOptions, import_data, read_file
     from dh2sim.robot.row import CONVENTIONS, Convention
     from dh2sim.robot.units import AngleUnit, LengthUnit
 
@@ -140,7 +140,7 @@ def import_robot(
         name=name,
     )
     folder = Path.cwd() if out is None else out.resolve().parent
-    data = sys.stdin.buffer.read() if file == STDIN else read_file(Path(file))
+    data = read_file(Path(file))
     with errors_with_options():
         imported = import_data(data, file, options, folder=folder)
     notes = [*(_with_options(note) for note in imported.notes), *_other_masses(imported)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,7 +52,7 @@ def read_any(
     path = Path(file)
     if file != STDIN and (not path.exists() or path.is_dir()):
         return ReadRobot(spec=serial_spec_of(load_robot(file)))  # a name, or the message for what is not there
-    data = sys.stdin.buffer.read() if file == STDIN else read_file(path)
+    data = read_file(path)
     if not data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(_XML_OR_TABLE) and not is_calibration(data):
         folder = Path.cwd() if file == STDIN else path.parent
         if _JOINTS.search(data):

@@ -6,6 +6,7 @@ import hashlib
 import math
 import os
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -122,13 +123,13 @@ def import_robot(
 
 
 def read_file(path: Path) -> bytes:
-    """Return a file's content.
+    """Return a file's content, or that of standard input for '-'.
 
     Raises:
         Dh2simError: It cannot be read, or is too large.
     """
     try:
-        data = read_input(path, MAX_BYTES)
+        data = sys.stdin.buffer.read(MAX_BYTES + 1) if os.fspath(path) == STDIN else read_input(path, MAX_BYTES)
     except OSError as error:
         raise Dh2simError(f"{path}: cannot be read: {error.strerror or error}") from error
     if len(data) > MAX_BYTES:

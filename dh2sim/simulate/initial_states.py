@@ -12,7 +12,7 @@ from mujoco.batch import Batch
 
 from dh2sim.errors import SettingsError
 from dh2sim.formats.mjcf.mechanism import joint_coordinates
-from dh2sim.input_files import csv_lines, npy_array, read_input, refuse_named_pipe, repeated
+from dh2sim.input_files import NpyFile, csv_numbers, read_input, refuse_named_pipe, repeated
 from dh2sim.messages import did_you_mean, listed
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.simulate.closed_loops import ClosedLoops
@@ -209,11 +209,11 @@ def _read_file(path: Path, joints: tuple[str, ...], rollouts: int) -> Array:
 def _npy(path: Path, joints: tuple[str, ...]) -> Array:
     n = len(joints)
     try:
-        found = npy_array(path)
+        found = NpyFile(path)
+        numbers: Array = found.all().astype(np.float64) if found.dtype.kind in "fiu" else np.zeros(0)
     except ValueError as error:
         raise _refused(f"{path}: {error}") from error
     if found.dtype.kind in "fiu":
-        numbers: Array = np.array(found, dtype=np.float64)
         if numbers.shape == (n,):
             numbers = numbers[None]
         if numbers.ndim == 2 and numbers.shape[1] == n:
@@ -231,10 +231,10 @@ def _csv(path: Path, joints: tuple[str, ...]) -> Array:
     if len(data) > MOST_FILE_BYTES:  # a device
         raise _refused(f"{path}: is larger than {MOST_FILE_BYTES / 2**30:g} GB")
     try:
-        lines = [line for line in csv_lines(data) if any(cell.strip() for cell in line[1])]
+        read = csv_numbers(data)
     except ValueError as error:
         raise _refused(f"{path}: {error}") from error
-    header = [cell.strip() for cell in lines[0][1]] if lines else []
+    header = read.header
     allowed = [*joints, *(f"{joint}_velocity" for joint in joints)]
     problems = [
         f"{path}:1: unknown column '{name}'.{did_you_mean(name, allowed)}" for name in header if name not in allowed
@@ -244,16 +244,12 @@ def _csv(path: Path, joints: tuple[str, ...]) -> Array:
     if problems:
         columns = f"Columns are joints, rad or m, and optionally {allowed[-1]} and so on"
         raise SettingsError([*(("start", problem) for problem in problems), ("", columns)])
-    states = np.zeros((len(lines) - 1, 2, len(joints)))
-    for state, (line, row) in zip(states, lines[1:], strict=True):
-        if len(row) != len(header):
-            raise _refused(f"{path}:{line}: has {len(row)} cells, the header {len(header)}")
-        for name, cell in zip(header, row, strict=True):
-            kind, joint = (0, joints.index(name)) if name in joints else (1, allowed.index(name) - len(joints))
-            try:
-                state[kind, joint] = float(cell)
-            except ValueError:
-                raise _refused(f"{path}:{line}: {name}: '{cell}' is not a number") from None
+    if read.problems:
+        raise SettingsError([("start", f"{path}: {problem}") for problem in read.problems])
+    states = np.zeros((len(read.values), 2, len(joints)))
+    for name, column in zip(header, read.values.T, strict=True):
+        kind, joint = divmod(allowed.index(name), len(joints))
+        states[:, kind, joint] = column
     return states
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from dh2sim.errors import OutputError, SettingsError, TrajectoryError
 from dh2sim.files import atomic_file
-from dh2sim.input_files import csv_lines, npz_arrays, read_input, repeated
+from dh2sim.input_files import csv_numbers, npz_arrays, read_input, repeated
 from dh2sim.messages import listed, shown
 from dh2sim.progress import Advance, Stage, silent
 from dh2sim.trajectory.curves import ORDERS, PiecewisePolynomial, cubic_spline, quintic_hermite
@@ -231,46 +230,20 @@ def read_trajectory(path: str | os.PathLike[str]) -> SampledTrajectory:
 
 def _from_csv(data: bytes, file: str, digest: str) -> SampledTrajectory:
     try:
-        lines = csv_lines(data)
+        read = csv_numbers(data)
     except ValueError as error:
         raise TrajectoryError(f"{file} {error}") from None
-    header = [cell.strip() for cell in lines[0][1]] if lines else []
+    header, table = read.header, read.values
     joints = header[1:]
-    if header[:1] != ["time"] or not joints or "" in joints:
+    if header[:1] != ("time",) or not joints or "" in joints:
         raise TrajectoryError(
             f"{file}: the first line must be 'time' and the names of joints, found {shown(','.join(header))}"
         )
     if twice := repeated(header):
         raise TrajectoryError(f"{file}: the first line names {listed(twice)} more than once")
-    problems: list[str] = []
-    values: list[list[float]] = []
-    for number, row in lines[1:]:
-        if len(row) != len(header):
-            problems.append(f"line {number} has {len(row)} values; the first line names {len(header)} columns")
-            continue
-        numbers = [_number(cell) for cell in row]
-        problems += [
-            f"line {number}, column '{column}': {shown(cell)} is not a finite number"
-            for column, cell, found in zip(header, row, numbers, strict=True)
-            if not math.isfinite(found)
-        ]
-        values.append(numbers)
-    if not values and not problems:
-        problems.append("there are no values below the first line")
-    if not problems:
-        table = np.array(values)
-        problems += _times_problem(table[:, 0])
-    if problems:
-        more = [f"and {len(problems) - _MOST_REPORTED} more"] if len(problems) > _MOST_REPORTED else []
-        raise TrajectoryError("\n  ".join([f"{file} cannot be used:", *problems[:_MOST_REPORTED], *more]))
+    if problems := read.problems or _times_problem(table[:, 0]):
+        raise TrajectoryError("\n  ".join([f"{file} cannot be used:", *problems]))
     return SampledTrajectory.of(joints, table[:, 0], table[:, 1:], digest=digest)
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
 
 
 def _times_problem(time: Array) -> list[str]:

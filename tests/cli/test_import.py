@@ -225,3 +225,11 @@ def test_deltas_without_a_nominal_robot_name_the_option(tmp_path: Path) -> None:
         f"{path}:2:14: missing key 'delta_alpha'",
         f"{path}:2:14: missing key 'delta_d'",
     ]
+
+
+@pytest.mark.parametrize("words", [["import", "-"], ["diff", "-", "planar_2r"]], ids=["import", "diff"])
+def test_standard_input_without_end_is_refused(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    with open("/dev/zero", "rb") as endless:
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(endless))
+        run = dh2sim(*words)
+    assert (run.status, run.err) == (2, "dh2sim: -: more than 50000000 bytes, the most that is read\n")

@@ -158,13 +158,13 @@ def test_every_wrong_column_is_reported(text: str, problems: list[str], csv: Cal
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("joint_1,slide\n1,2\n\n1\n", ":4: has 1 cells, the header 2"),
-        ("joint_1,slide\n1,2\n1,2,3\n", ":3: has 3 cells, the header 2"),
-        ("joint_1,slide\n1,2\n\n1,two\n", ":4: slide: 'two' is not a number"),
-        ("joint_1,slide\n1,\n", ":2: slide: '' is not a number"),
-        ("joint_1,slide\n1,2\ninf,2\n0,0\n", ": state 2, joint_1: must be a finite number"),
-        ("joint_1,slide\n1,nan\n", ": state 1, slide: must be a finite number"),
-        ("joint_1,slide\n", ": must contain 1 state, or one for each of 3 rollouts, got 0"),
+        ("joint_1,slide\n1,2\n\n1\n", ": line 4 has 1 values; the first line names 2 columns"),
+        ("joint_1,slide\n1,2\n1,2,3\n", ": line 3 has 3 values; the first line names 2 columns"),
+        ("joint_1,slide\n1,2\n\n1,two\n", ": line 4, column 'slide': 'two' is not a finite number"),
+        ("joint_1,slide\n1,\n", ": line 2, column 'slide': '' is not a finite number"),
+        ("joint_1,slide\n1,2\ninf,2\n0,0\n", ": line 3, column 'joint_1': 'inf' is not a finite number"),
+        ("joint_1,slide\n1,nan\n", ": line 2, column 'slide': 'nan' is not a finite number"),
+        ("joint_1,slide\n", ": there are no values below the first line"),
         ("joint_1,slide\n1,2\n1,2\n", ": must contain 1 state, or one for each of 3 rollouts, got 2"),
     ],
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import stat
+import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -12,11 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dh2sim.errors import ControllerError, RunError
 from dh2sim.files import open_plain_file
-from dh2sim.input_files import csv_lines, npy_array, read_input, refuse_named_pipe, repeated
-from dh2sim.messages import closest, listed, shown
+from dh2sim.input_files import NpyFile, csv_numbers, read_input, refuse_named_pipe, repeated
+from dh2sim.messages import closest, listed
 from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.controllers.reference import read_reference
 from dh2sim.simulate.dataset_layout import FORMAT
@@ -224,7 +226,6 @@ def _plain_files(path: Path, array: str) -> list[Path]:
 
 _MOST_BYTES = 2**30
 """Of a CSV file."""
-_MOST_REPORTED = 5
 
 
 def read_recording(file: str, kind: str) -> Recording:
@@ -270,10 +271,10 @@ def _read_csv(path: Path, file: str, kind: str) -> Recording:
     if len(raw) > _MOST_BYTES:
         raise ControllerError(f"'{file}' is larger than {_MOST_BYTES // 2**20} MB")
     try:
-        lines = csv_lines(raw)
+        read = csv_numbers(raw)
     except ValueError as error:
         raise ControllerError(f"'{file}' {error}") from error
-    header = [name.strip() for name in lines[0][1]] if lines else []
+    header, table = read.header, read.values
     names = [name for name in header if name != "time"]
     if not names:
         raise ControllerError(
@@ -282,7 +283,8 @@ def _read_csv(path: Path, file: str, kind: str) -> Recording:
     if twice := repeated(header):
         raise ControllerError(f"'{file}' has more than one column {listed(map(repr, twice))}")
     positions, actuation = _meaning(file, names, kind)
-    table = _numbers(file, header, lines[1:])
+    if read.problems:
+        raise ControllerError("\n  ".join([f"'{file}' cannot be used:", *read.problems]))
     times = None
     if "time" in header:
         times = _times(file, table[:, header.index("time")])
@@ -320,28 +322,6 @@ def _meaning(file: str, names: Sequence[str], kind: str) -> tuple[bool, Actuator
     return False, found.pop() if len(found) == 1 else None
 
 
-def _numbers(file: str, header: Sequence[str], lines: Sequence[tuple[int, Sequence[str]]]) -> Array:
-    table = np.empty((len(lines), len(header)))
-    problems = []
-    for i, (line, row) in enumerate(lines):
-        if len(row) != len(header):
-            problems.append(f"line {line} has {len(row)} values; the first line names {len(header)} columns")
-            continue
-        for j, text in enumerate(row):
-            try:
-                table[i, j] = float(text)
-            except ValueError:
-                table[i, j] = np.nan
-            if not np.isfinite(table[i, j]):
-                problems.append(f"line {line}, column '{header[j]}': {shown(text)} is not a finite number")
-    if not lines:
-        problems.append("there are no values below the first line")
-    if problems:
-        more = [f"and {len(problems) - _MOST_REPORTED} more"] if len(problems) > _MOST_REPORTED else []
-        raise ControllerError("\n  ".join([f"'{file}' cannot be used:", *problems[:_MOST_REPORTED], *more]))
-    return table
-
-
 def _times(file: str, times: Array) -> Array:
     if times[0] != 0.0:
         raise ControllerError(f"'{file}': time must start at 0, the start of the rollout, got {float(times[0])!r}")
@@ -377,38 +357,78 @@ def _read_npy(path: Path, file: str, kind: str) -> Recording:
     if kind == "auto":
         raise ControllerError(f"'{file}' does not say what its numbers are: add as=ctrl or as=reference")
     try:
-        array = npy_array(path)
+        array = NpyFile(path)
+        if array.dtype.kind not in "fiu" or len(array.shape) not in (2, 3) or 0 in array.shape:
+            raise ControllerError(
+                f"'{file}' must contain real numbers of shape (time steps, columns) or (rollouts, time steps, "
+                f"columns), got {array.dtype} of shape {array.shape}"
+            )
+        rows = _Rows(array, file)
+        rows.check()
     except ValueError as error:
         raise ControllerError(f"'{file}' {error}") from error
-    if array.dtype.kind not in "fiu" or array.ndim not in (2, 3) or 0 in array.shape:
-        raise ControllerError(
-            f"'{file}' must contain real numbers of shape (time steps, columns) or (rollouts, time steps, columns), "
-            f"got {array.dtype} of shape {array.shape}"
-        )
-    rows = array if array.ndim == 3 else array[None]
-    for i, values in enumerate(rows):
-        if not np.isfinite(values).all():
-            which = f"rollout {i}, " if array.ndim == 3 else ""
-            step, column = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
-            raise ControllerError(
-                f"'{file}': {which}time step {step}, column {column}: "
-                f"{float(values[step, column])} is not a finite number"
-            )
-    with path.open("rb") as stream:
-        digest = hashlib.file_digest(stream, "sha256").hexdigest()
     return Recording(
         file=f"'{file}'",
         positions=kind == "reference",
         actuation=ActuatorType.POSITION if kind == "reference" else None,
         names=None,
-        width=rows.shape[2],
-        length=rows.shape[1],
+        width=array.shape[-1],
+        length=array.shape[-2],
         times=None,
-        rollouts=rows.shape[0] if array.ndim == 3 else None,
-        read=functools.partial(_some_rows, rows),
-        digest=digest,
+        rollouts=array.shape[0] if len(array.shape) == 3 else None,
+        read=rows.read,
+        digest=rows.digest,
     )
 
 
-def _some_rows(rows: Array, rollouts: range) -> Array:
-    return np.array(rows[rollouts.start : rollouts.stop], dtype=np.float64)
+class _Rows:
+    """The rollouts in a .npy file, read when they are needed, and the same whenever they are."""
+
+    def __init__(self, array: NpyFile, file: str) -> None:
+        self._array = array
+        self._file = file
+        self._checksums: list[int] = []
+        self.digest = ""
+
+    def check(self) -> None:
+        """Read all of them once.
+
+        Raises:
+            ControllerError: A number is not finite.
+            ValueError, OSError: The file cannot be read.
+        """
+        digest = hashlib.sha256(f"{self._array.dtype.str} {self._array.shape}".encode())
+        batch = len(self._array.shape) == 3
+        for i in range(self._array.shape[0] if batch else 1):
+            values = self._rollout(i)
+            if not np.isfinite(values).all():
+                which = f"rollout {i}, " if batch else ""
+                step, column = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
+                raise ControllerError(
+                    f"'{self._file}': {which}time step {step}, column {column}: "
+                    f"{float(values[step, column])} is not a finite number"
+                )
+            data = values.tobytes()
+            digest.update(data)
+            self._checksums.append(zlib.crc32(data))
+        self.digest = digest.hexdigest()
+
+    def read(self, rollouts: range) -> Array:
+        """Return some, shape (rollouts, time steps, columns).
+
+        Raises:
+            ControllerError: The file was changed, or cannot be read.
+        """
+        found = np.empty((len(rollouts), *self._array.shape[-2:]))
+        for k, i in enumerate(rollouts):
+            try:
+                values = self._rollout(i)
+            except (OSError, ValueError) as error:
+                raise ControllerError(f"'{self._file}' was changed while it was replayed: {error}") from error
+            if zlib.crc32(values.tobytes()) != self._checksums[i]:
+                raise ControllerError(f"'{self._file}' was changed while it was replayed")
+            found[k] = values
+        return found
+
+    def _rollout(self, i: int) -> NDArray[Any]:
+        return self._array.rows(i, i + 1)[0] if len(self._array.shape) == 3 else self._array.all()
