@@ -31,6 +31,21 @@ ROLLOUTS, STEPS, BLOCK = 60, 200, 3
 CONTROLLER = "pd"
 OPTIONS = ("--rollouts", str(ROLLOUTS), "--steps", str(STEPS), "--controller", CONTROLLER, "--start", "random")
 WAIT = 180.0
+SLOWLY = """
+import time
+from dh2sim.simulate.store.writer import RunWriter
+
+write = RunWriter.write
+
+def write_and_rest(*arguments):
+    write(*arguments)
+    time.sleep(0.25)
+
+RunWriter.write = write_and_rest
+from dh2sim.cli.main import main
+main()
+"""
+"""The program, which rests after each block: however busy the machine is, it is at work when it is interrupted."""
 
 
 def _begin(folder: Path) -> tuple[Path, RunWriter]:
@@ -64,7 +79,7 @@ def _command(run: Path, *more: str) -> list[str]:
 
 def _start(run: Path, *more: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "dh2sim", *_command(run, "--resume", *more)],
+        [sys.executable, "-c", SLOWLY, *_command(run, "--resume", *more)],
         env=environment(),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
