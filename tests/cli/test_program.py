@@ -422,6 +422,23 @@ def test_a_signal_ends_the_program_with_the_status_of_shells(
     assert (done.returncode, done.stderr) == (status, printed)
 
 
+THREADS = """
+import os, sys
+import dh2sim.__main__
+import numpy
+numpy.linalg.lstsq(numpy.ones((2000, 60)), numpy.ones(2000))
+print(len(os.listdir("/proc/self/task")))
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="threads are counted as Linux shows them")
+def test_the_program_leaves_processors_to_others() -> None:
+    variables = {name: value for name, value in environment().items() if not name.endswith("_NUM_THREADS")}
+    command = [sys.executable, "-c", THREADS]
+    done = subprocess.run(command, env=variables, capture_output=True, text=True, timeout=180, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "1\n", "")
+
+
 def test_lists_are_given_with_commas_or_by_repeating_the_option() -> None:
     sweep = ("sweep", "rpr", "--count", "2", "--samples", "20", "--json", "-q")
     commas = dh2sim(*sweep, "--vary", "L2=0.1,a1=normal:0.02", "--measure", "reach,workspace")
