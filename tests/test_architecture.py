@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import dh2sim
 PACKAGE = Path(dh2sim.__file__).parent
 
 
+@cache
 def _modules() -> dict[str, ast.Module]:
     """Every module of the package by its name, parsed."""
     found = {}
@@ -23,22 +25,20 @@ def _modules() -> dict[str, ast.Module]:
     return found
 
 
-MODULES = _modules()
-
-
 def _imports(tree: ast.Module) -> Iterator[str]:
     """Yield the package's modules that a module imports anywhere: at its top, in functions, or for types alone."""
+    modules = _modules()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name in MODULES)
-        elif isinstance(node, ast.ImportFrom) and node.module in MODULES:
+            yield from (alias.name for alias in node.names if alias.name in modules)
+        elif isinstance(node, ast.ImportFrom) and node.module in modules:
             inner = [f"{node.module}.{alias.name}" for alias in node.names]
-            yield from (name if name in MODULES else node.module for name in inner)
+            yield from (name if name in modules else node.module for name in inner)
 
 
 def test_no_modules_import_each_other_in_a_ring() -> None:
     # the package's own __init__ only names where its public names live
-    graph = {name: set(_imports(tree)) - {"dh2sim"} for name, tree in MODULES.items() if name != "dh2sim"}
+    graph = {name: set(_imports(tree)) - {"dh2sim"} for name, tree in _modules().items() if name != "dh2sim"}
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -47,7 +47,7 @@ def test_no_modules_import_each_other_in_a_ring() -> None:
 
 def test_a_name_is_defined_in_one_module_of_a_folder() -> None:
     homes = defaultdict(list)
-    for module, tree in MODULES.items():
+    for module, tree in _modules().items():
         folder = module.rpartition(".")[0]
         for node in tree.body:
             if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("__"):
