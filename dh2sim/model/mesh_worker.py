@@ -34,7 +34,8 @@ def answer(request: bytes) -> bytes:
 
     The request is the suffix of the file's name, on a line of its own, and the file's content. The line of JSON has
     the number of faces (``faces``), and unless it is 0 or too great, the number of different corners (``corners``),
-    the area (``area``), and whether all numbers are finite (``finite``); or what is wrong (``refused``).
+    the area (``area``), the greatest coordinate (``largest``), and whether all numbers are finite (``finite``); or
+    what is wrong (``refused``).
     """
     suffix, _, data = request.partition(b"\n")
     try:
@@ -85,6 +86,7 @@ def _measured(surface: Any) -> tuple[dict[str, Any], bytes]:
         if facts["finite"]:
             facts["corners"] = len(np.unique(corners.astype(np.float32), axis=0))
             facts["area"] = float(surface.area)
+            facts["largest"] = float(np.abs(corners).max())
             stl = bytes(surface.export(file_type="stl"))
     return facts, stl
 

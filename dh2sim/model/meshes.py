@@ -15,12 +15,15 @@ from dh2sim.files import read_plain_file
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.limited_process import WorkerError, ask_worker
 from dh2sim.robot.links import MeshSpec
+from dh2sim.robot.magnitudes import LENGTH, shown_size
 from dh2sim.typing import Array
 
 MAX_BYTES: Final = 100_000_000
 """Of a mesh file."""
 MAX_FACES = 200_000
 """MuJoCo refuses an STL file with more."""
+MAX_COORDINATE = 2.0**30
+"""In a file; MuJoCo refuses one with more."""
 MIN_CORNERS = 4
 """MuJoCo refuses a mesh with fewer."""
 MIN_AREA = 1e-12
@@ -108,6 +111,16 @@ def _check(facts: dict[str, Any], mesh: MeshSpec, place: str) -> None:
         raise MeshError(f"{place}: the mesh '{mesh.file}' has coordinates that are not finite")
     if facts["corners"] < MIN_CORNERS:
         raise MeshError(f"{place}: the mesh '{mesh.file}' has fewer than {MIN_CORNERS} corners; MuJoCo refuses it")
+    if facts["largest"] > MAX_COORDINATE:
+        raise MeshError(
+            f"{place}: the mesh '{mesh.file}' has a coordinate of {facts['largest']:.3g}; MuJoCo reads at most "
+            f"{MAX_COORDINATE:.3g}"
+        )
+    if (largest := facts["largest"] * mesh.scale) > LENGTH.most:
+        raise MeshError(
+            f"{place}: the mesh '{mesh.file}' has a coordinate of {largest:.3g} m with scale {mesh.scale!r}; at most "
+            f"{shown_size(LENGTH.most)} m is allowed"
+        )
     area = facts["area"] * mesh.scale**2
     if not area >= MIN_AREA:
         raise MeshError(

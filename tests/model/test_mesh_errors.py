@@ -178,6 +178,19 @@ def test_coordinates_that_are_no_finite_numbers_are_refused(tmp_path: Path, valu
     assert refused(tmp_path, file.name) == expected
 
 
+@pytest.mark.parametrize(
+    ("value", "reason"),
+    [
+        (3e38, "has a coordinate of 3e+38; MuJoCo reads at most 1.07e+09"),
+        (2e6, "has a coordinate of 2e+06 m with scale 1.0; at most 1e6 m is allowed"),
+    ],
+)
+def test_coordinates_that_are_too_large_are_refused(tmp_path: Path, value: float, reason: str) -> None:
+    file = tmp_path / "part.obj"
+    file.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {value}\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n")
+    assert refused(tmp_path, file.name) == f"{WHERE}: the mesh '{file}' {reason}"
+
+
 def test_a_single_triangle_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "part.stl"
     file.write_bytes(triangles([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 1]]))

@@ -22,7 +22,7 @@ from typing import Any, Final
 from dh2sim.errors import RunDamagedError, RunError
 from dh2sim.messages import listed, shown
 from dh2sim.simulate.dataset_layout import FORMAT as LAYOUT_FORMAT
-from dh2sim.simulate.options import MOST_ROLLOUTS
+from dh2sim.simulate.options import MOST_ROLLOUTS, MOST_STEPS
 from dh2sim.simulate.store.codec import ITEM_SIZES, LARGEST_CHUNK, READABLE_CODECS, is_known
 from dh2sim.simulate.store.storage import Store
 
@@ -39,6 +39,8 @@ _MARK, _STORE_MARK = "dh2sim_run", "dh2sim_store"
 """Attributes of the root group and of ``BLOCKS`` that only runs have: versions of the dataset and of the manifest."""
 MOST_METADATA: Final = 64 * 2**20
 """Bytes of a file of metadata, which holds the MJCF of the robot."""
+MOST_VALUES: Final = 2_000_000
+"""In a file of metadata, each of which takes some hundred bytes of memory; its long texts have few commas."""
 MOST_BLOCKS: Final = 100_000
 _NAME: Final = re.compile("[A-Za-z][A-Za-z0-9_]*")
 _KEYS: Final = {"name": "default", "configuration": {"separator": "."}}
@@ -194,10 +196,13 @@ def read_node(store: Store, key: str) -> dict[str, Any] | None:
     """Return zarr's metadata of a group or an array, or None if they cannot be parsed.
 
     Raises:
-        RunError: The file may not be read.
+        RunError: The file may not be read, or has too many values.
     """
     try:
-        node = json.loads(store.get(key, most=MOST_METADATA))
+        data = store.get(key, most=MOST_METADATA)
+        if sum(map(data.count, (b",", b"[", b"{"))) > MOST_VALUES:
+            raise RunError(f"'{store.file(key)}' has more than {MOST_VALUES} values")
+        node = json.loads(data)
     except PermissionError as error:
         raise RunError(f"cannot read '{store.file(key)}': {error.strerror}") from error
     except (OSError, ValueError, RecursionError):
@@ -353,7 +358,7 @@ def _attribute_problem(attributes: Mapping[str, Any]) -> str | None:
         if not isinstance(value, kind) or isinstance(value, bool):
             return f"its attribute '{path}' is {shown(value)}"
     settings, timestep = attributes["settings"], attributes["timestep"]
-    if not (0.0 < timestep <= 1.0 and settings["steps"] >= 0 and settings["every"] >= 1):
+    if not (0.0 < timestep <= 1.0 and 0 <= settings["steps"] <= MOST_STEPS and settings["every"] >= 1):
         return "its time steps are impossible"
     if not all(isinstance(version, str) for version in attributes["versions"].values()):
         return "its attribute 'versions' does not hold text"

@@ -114,6 +114,7 @@ def setting(path: str, value: object) -> Change:
         (setting("settings", 3), "its attribute 'settings' is 3"),
         (setting("settings.steps", "many"), "its attribute 'settings.steps' is 'many'"),
         (setting("settings.steps", -4), "its time steps are impossible"),
+        (setting("settings.steps", 10**400), "its time steps are impossible"),
         (setting("timestep", None), "its attribute 'timestep' is nothing"),
         (setting("timestep", float("nan")), "its time steps are impossible"),
         (setting("versions", {"mujoco": [1]}), "its attribute 'versions' does not hold text"),
@@ -152,6 +153,13 @@ class Canary:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return os.mkdir, (self.path,)
+
+
+def test_metadata_of_very_many_values_are_refused_before_they_take_memory(tmp_path: Path) -> None:
+    path = make(tmp_path / "run.zarr", SMALL)
+    (path / "zarr.json").write_text('{"attributes": [' + ",".join(["[]"] * 2_000_000) + "]}")
+    with pytest.raises(RunError, match=r"zarr\.json' has more than 2000000 values$"):
+        describe(path)
 
 
 def test_a_pickle_in_metadata_of_the_old_format_is_never_executed(tmp_path: Path) -> None:
