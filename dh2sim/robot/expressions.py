@@ -43,6 +43,10 @@ _TOKEN: Final = re.compile(
 )
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _NOT_A_NUMBER: Final = re.compile(r"[A-Za-z0-9_.]+")
+_NUMBER: Final = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][0-9]+)?")
+_LIKE_DIGITS: Final = str.maketrans("OoIl", "0011")
+_SYMBOL: Final = re.compile(r"[Il]|[OoIl][1-9][0-9]*")
+"""A name that is likely meant as one, such as l1."""
 _HINTS: Final = {
     "^": "use ** for powers",
     "\N{MINUS SIGN}": "write -",
@@ -122,6 +126,8 @@ def evaluate(text: str, names: Mapping[str, float]) -> float:
     try:
         value = _Parser(_tokens(text), doubles, names).whole()
     except ExpressionError as error:
+        if hint := digit_hint(text, names):
+            raise ExpressionError(f"{shown(text)} is not a number.{hint}") from None
         raise (error if _NAME.fullmatch(text.strip()) else _within(text, error)) from None
     except ZeroDivisionError:
         raise _within(text, "division by zero") from None
@@ -177,6 +183,21 @@ def names_in(text: str) -> tuple[str, ...]:
     except ExpressionError:
         return ()
     return tuple(dict.fromkeys(t.text for t in tokens if t.kind == "name" and t.text not in FUNCTIONS))
+
+
+def digit_hint(text: str, names: Collection[str]) -> str:
+    """Return a guess, to follow a full stop, at the number in which a letter is in a digit's place; else nothing.
+
+    Args:
+        text: What was found, such as ``O.5``.
+        names: Names that stand for something.
+    """
+    for word in _NOT_A_NUMBER.findall(text):
+        number = word.translate(_LIKE_DIGITS)
+        if number != word and word not in names and _NUMBER.fullmatch(number) and not _SYMBOL.fullmatch(word):
+            letter = next(a for a, b in zip(word, number, strict=True) if a != b)
+            return f" Did you mean {number}? It has the letter {letter} in place of a digit"
+    return ""
 
 
 def is_name(text: str) -> bool:

@@ -12,7 +12,7 @@ from dh2sim.formats.table.grid import Cell
 from dh2sim.formats.table.headers import ANGLE_WORDS, LENGTH_WORDS, UNIT
 from dh2sim.formats.table.notation import LONGEST_CELL, plain
 from dh2sim.messages import shown
-from dh2sim.robot.expressions import CONSTANTS, FUNCTIONS, ExpressionError, evaluate
+from dh2sim.robot.expressions import CONSTANTS, FUNCTIONS, ExpressionError, digit_hint, evaluate
 from dh2sim.robot.units import AngleUnit, LengthUnit
 
 Unit: TypeAlias = AngleUnit | LengthUnit
@@ -111,7 +111,7 @@ def read_cell(
     if len(symbols) > 1:
         symbols = [name for name in symbols if name not in constants] or symbols
     known = {name: constants[name] for name in names if name in constants and name not in symbols}
-    _check_names(names, {*symbols, *known}, symbols)
+    _check_names(cell, names, {*symbols, *known}, symbols)
     if problem := next((constant.problem for constant in known.values() if constant.problem), None):
         raise CellError(problem)
     own, symbol = unit, symbols[0] if symbols else None
@@ -182,10 +182,11 @@ def _expression(text: str) -> tuple[str, list[str]]:
     return " ".join(tokens), [*names, *(["pi"] if "pi" in tokens else [])]
 
 
-def _check_names(names: Iterable[str], known: set[str], symbols: list[str]) -> None:
+def _check_names(cell: Cell, names: Iterable[str], known: set[str], symbols: list[str]) -> None:
     for name in names:
         if name not in known and name != "pi":
-            raise CellError(no_value(name))
+            hint = digit_hint(cell.text, known)
+            raise CellError(f"{no_value(name)}.{hint}" if hint else no_value(name))
     if len(symbols) > 1:
         which = " and ".join(map(shown, symbols[:2]))
         message = f"two joint coordinates, {which}, in one cell; a row takes one"

@@ -105,7 +105,10 @@ def decide_unit(
     marked = {unit for number in numbers if isinstance(unit := number.reading.unit, kind.units)}
     unmarked = [number for number in numbers if number.reading.bare and number.heading_unit is None]
     if option or stated or not unmarked:
-        return option or stated or min(over | marked, default=None)
+        unit = option or stated or min(over | marked, default=None)
+        if unit is None and numbers and kind is ANGLES:
+            findings.note(f"all angles are 0, in any unit: the robot file is in rad, unless you pass {kind.arguments}")
+        return unit
     if len(over) == 1:
         (unit,) = over
         findings.note(f"{kind.what} without a unit was read in {unit}, the unit of other columns")

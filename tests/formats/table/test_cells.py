@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from dh2sim.formats.table.cells import CellError, Constant, Reading, read_cell
+from dh2sim.formats.table.cells import CellError, Constant, Reading, no_value, read_cell
 from dh2sim.formats.table.grid import Cell
 from dh2sim.formats.table.headers import Quantity
 from dh2sim.formats.table.motion import COORDINATES
@@ -105,6 +105,10 @@ def test_a_comma_is_a_decimal_point_only_where_the_table_says_so() -> None:
         ("sin(q1)", "the coordinate 'q1' may only be added or subtracted, as in 'q1 + 1' or '1 - q1'; "
                     "found 'sin(q1)'"),
         ("q1*-1", "'q1*-1' may mean '-q1' or, with a star that marks the variable, 'q1 - 1'; write that"),
+        ("O.5", f"{no_value('O')}. Did you mean 0.5? It has the letter O in place of a digit"),
+        ("1.O°", f"{no_value('O')}. Did you mean 1.0? It has the letter O in place of a digit"),
+        ("l0", f"{no_value('l0')}. Did you mean 10? It has the letter l in place of a digit"),
+        ("l2", no_value("l2")),
         ("90° + 1 rad", "two units in one cell: deg and rad; write one"),
         ("0.4 m + 20 mm", "two units in one cell: m and mm; write one"),
         ("pi/2 °", "'pi/2 °' is written with pi and in degrees; write one of them"),

@@ -12,6 +12,7 @@ from tests.formats.table.samples import STANDARD, complaints, imported, numbers
 H = math.pi / 2
 DEG, RAD, M, MM = AngleUnit.DEG, AngleUnit.RAD, LengthUnit.M, LengthUnit.MM
 IN_M = "no unit of lengths is given: they were read in m"
+ZERO = "all angles are 0, in any unit: the robot file is in rad, unless you pass angle='deg' or angle='rad'"
 
 
 def _table(alpha: str, a: str = "0", *, alpha_heading: str = "α", a_heading: str = "a", theta: str = "θ1") -> str:
@@ -23,12 +24,12 @@ def _table(alpha: str, a: str = "0", *, alpha_heading: str = "α", a_heading: st
     [
         ("90°", "0", (0, H), ()),
         ("π/2", "0", (0, H), ()),
-        ("0", "0", (0, 0), ()),
-        ("0", "0.4", (0.4, 0), (IN_M,)),
-        ("0", "-9.9", (-9.9, 0), (IN_M,)),
-        ("0", "400 mm", (0.4, 0), ()),
-        ("0", "40 cm", (0.4, 0), ()),
-        ("0", "400 mm - 100", (0.3, 0), ()),
+        ("0", "0", (0, 0), (ZERO,)),
+        ("0", "0.4", (0.4, 0), (ZERO, IN_M)),
+        ("0", "-9.9", (-9.9, 0), (ZERO, IN_M)),
+        ("0", "400 mm", (0.4, 0), (ZERO,)),
+        ("0", "40 cm", (0.4, 0), (ZERO,)),
+        ("0", "400 mm - 100", (0.3, 0), (ZERO,)),
     ],
 )
 def test_cells_say_their_unit(alpha: str, a: str, expected: tuple[float, float], notes: tuple[str, ...]) -> None:
@@ -60,6 +61,17 @@ def test_pi_in_decimals_can_only_be_radians(alpha: str) -> None:
     found = imported(_table(alpha), **STANDARD)
     assert found.spec.rows[0].alpha == float(alpha)
     assert found.notes == ("angles without a unit were read in rad: they are multiples of pi/4 to the last digit",)
+
+
+def test_where_all_angles_are_zero_the_unit_of_the_robot_file_is_noted_unless_something_gives_it() -> None:
+    assert imported(_table("0", "1 m"), **STANDARD).notes == (ZERO,)
+    for text, options in (
+        (_table("0", "1 m"), {"angle": DEG}),
+        (_table("0", "1 m", alpha_heading="α (deg)"), {}),
+        (_table("0°", "1 m"), {}),
+    ):
+        found = imported(text, **STANDARD, **options)
+        assert (found.units.angle, found.notes) == (DEG, ())
 
 
 def test_options_say_the_unit() -> None:
