@@ -122,7 +122,8 @@ def atomic_file(path: Path) -> Iterator[Path]:
         except OSError as error:
             raise OutputError(f"cannot write '{path}': {_reason(error)}") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # of a read-only file system, on which there is none
+            temporary.unlink()
 
 
 @contextmanager

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 
 import pytest
@@ -59,3 +60,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.browser)
             if config.pluginmanager.hasplugin("rerunfailures"):
                 item.add_marker(pytest.mark.flaky(reruns=2))
+
+
+@pytest.fixture(scope="session")
+def own_mounts(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The command that runs another with mounts of its own; skips where that is not allowed."""
+    from tests.program import shell
+
+    command = "unshare -m" if os.geteuid() == 0 else "unshare -rm"
+    probe = f"""{command} sh -c 'mount -t tmpfs -o size=16k none "$OUT"'"""
+    if shutil.which("unshare") is None or shell(probe, OUT=str(tmp_path_factory.mktemp("probe"))).status != 0:
+        pytest.skip("needs the right to mount a small file system (unshare and mount)")
+    return command

@@ -42,12 +42,19 @@ def journal_path(out: Path) -> Path:
 class Journal:
     """What was measured so far, by chunk."""
 
-    def __init__(self, settings: Mapping[str, Any], path: Path | None, stream: BinaryIO | None) -> None:
-        """Begin with nothing; without a stream it is kept in memory."""
+    def __init__(
+        self,
+        settings: Mapping[str, Any],
+        path: Path | None,
+        stream: BinaryIO | None,
+        refusal: OSError | None = None,
+    ) -> None:
+        """Begin with nothing; without a stream it is kept in memory, with a refusal it can only be read."""
         self.settings = dict(settings)
         self.columns: list[str] = []
         self._path = path
         self._stream = stream
+        self._refusal = refusal
         self._settings_digest = ""
         self._kept: dict[int, list[list[float]]] = {}
         self._places: dict[int, tuple[int, int]] = {}
@@ -68,14 +75,15 @@ class Journal:
             return
         path = journal_path(out)
         try:
-            with _opened(path) as stream:
+            with _opened(path) as (stream, refusal):
                 try:
                     lock_handle(stream.fileno())
                 except BlockingIOError:
                     raise OutputError(f"another process is measuring '{out}'") from None
+                journal = cls(settings, path, stream, refusal)
                 if overwrite:
+                    journal._require_writable()
                     stream.truncate(0)
-                journal = cls(settings, path, stream)
                 journal._read(out)
                 yield journal
         except OSError as error:
@@ -135,8 +143,13 @@ class Journal:
             )
         self.columns = columns
 
+    def _require_writable(self) -> None:
+        if self._refusal is not None:
+            raise self._refusal
+
     def _write(self, value: Mapping[str, Any]) -> None:
         assert self._stream is not None
+        self._require_writable()
         line = self._line(json.dumps(value).encode())
         if len(line) > MOST_LINE:
             raise OutputError(f"cannot write '{self._path}': designs have too many measures")
@@ -170,6 +183,7 @@ class Journal:
         first = self._line(json.dumps({"dh2sim_sweep": FORMAT, "settings": self.settings}).encode())
         line = stream.readline(MOST_LINE + 1)
         if first.startswith(line) and line != first:  # nothing, or cut off
+            self._require_writable()
             stream.truncate(0)
             stream.write(first)
             stream.flush()
@@ -194,20 +208,30 @@ class Journal:
                 place += len(line)
         except (ValueError, KeyError, TypeError, RecursionError):
             self.damaged()
-        stream.truncate(place)
+        if self._refusal is None:
+            stream.truncate(place)
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[BinaryIO]:
-    """Open a file to be read and appended to, which is made if it is missing; no link, pipe or device."""
-    flags = os.O_RDWR | os.O_CREAT | os.O_APPEND
-    flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+def _opened(path: Path) -> Iterator[tuple[BinaryIO, OSError | None]]:
+    """Open a file to be read and appended to, which is made if it is missing; no link, pipe or device.
+
+    One that may only be read is opened for that, and the reason returned: a sweep that is complete adds nothing.
+    """
+    flags = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     if path.is_symlink():
         raise OSError(errno.EINVAL, "is a link, not a file", str(path))
-    with open(os.open(path, flags, 0o666), "a+b") as stream:
+    refusal = None
+    try:
+        handle = os.open(path, flags | os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+    except OSError as error:
+        if not path.is_file():
+            raise
+        handle, refusal = os.open(path, flags | os.O_RDONLY), error
+    with open(handle, "a+b" if refusal is None else "rb") as stream:
         if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
             raise OSError(errno.EINVAL, "is not a plain file", str(path))
-        yield stream
+        yield stream, refusal
 
 
 def _are_names(columns: object) -> bool:

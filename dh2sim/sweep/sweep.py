@@ -18,7 +18,7 @@ from typing import Any, Final, SupportsIndex, TypedDict
 import numpy as np
 
 from dh2sim import arguments
-from dh2sim.errors import Dh2simError, MeasureError, Problem, RobotError, SettingsError
+from dh2sim.errors import Dh2simError, MeasureError, OutputError, Problem, RobotError, SettingsError
 from dh2sim.messages import counted, listed
 from dh2sim.model.build import ModelLike, build_model, model_of
 from dh2sim.model.robot_model import RobotModel
@@ -28,7 +28,7 @@ from dh2sim.robot.write import robot_file_text
 from dh2sim.simulate.designs import Designs, draws_of, read_design_table
 from dh2sim.sweep.journal import Journal
 from dh2sim.sweep.measures import MEASURES, UNITS, Sampled, check_measures, load_function, measure
-from dh2sim.sweep.table import require_table, write_table
+from dh2sim.sweep.table import is_table, require_table, write_table
 from dh2sim.typing import Array
 
 CHUNK: Final = 32
@@ -224,20 +224,29 @@ def measure_designs(
             journal.add(chunk, columns, rows)
             report(len(rows))
         columns = journal.columns
-        summary = _Summary(task, columns)
         parameters = task.designs.names
         units = dict(zip(parameters, task.designs.variation.units, strict=True)) | {
             column: UNITS.get(column, "") for column in columns
         }
-        seen = summary.watch(_checked_rows(journal, task, sizes))
+        names = (*parameters, *columns)
+
+        def watched() -> tuple[_Summary, Iterator[list[float]]]:
+            summary = _Summary(task, columns)
+            return summary, summary.watch(_checked_rows(journal, task, sizes))
+
+        summary, seen = watched()
         if path is None:
             table = np.array(list(seen))
-            names = (*parameters, *columns)
             found = {"design": np.arange(total, dtype=np.float64)} | {
                 name: table[:, i] for i, name in enumerate(names)
             }
         else:
-            write_table(path, (*parameters, *columns), units, seen, journal.settings)
+            try:
+                write_table(path, names, units, seen, journal.settings)
+            except OutputError:  # nothing needs to be written where the whole table is there
+                summary, seen = watched()
+                if pending or not is_table(path, names, units, seen, journal.settings):
+                    raise
             found = {}
     return Sweep(
         robot=model.name,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import filecmp
 import json
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -56,6 +58,24 @@ def write_table(
                     writer.writerow([design, *map(repr, row)])
             return
         _write_parquet(draft, columns, units, rows, settings)
+
+
+def is_table(
+    out: Path,
+    columns: Sequence[str],
+    units: Mapping[str, str],
+    rows: Iterable[list[float]],
+    settings: Mapping[str, Any],
+) -> bool:
+    """Whether a file is, byte for byte, the table that ``write_table`` would write.
+
+    Raises:
+        OutputError: There is no room for temporary files.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        other = Path(folder, out.name)
+        write_table(other, columns, units, rows, settings)
+        return out.is_file() and filecmp.cmp(out, other, shallow=False)
 
 
 def _write_parquet(

@@ -1,10 +1,6 @@
 from __future__ import annotations
 
-import os
-import shutil
 from pathlib import Path
-
-import pytest
 
 from tests.program import Outcome, contents, dh2sim, shell
 from tests.robot_files import small, write
@@ -78,16 +74,6 @@ def test_a_disk_that_takes_no_more_leaves_old_files_untouched(tmp_path: Path) ->
     run = shell(script, ROBOT=str(robot), OUT=str(tmp_path / "fresh" / "deep"))
     assert run.status == 2
     assert not (tmp_path / "fresh").exists()
-
-
-@pytest.fixture(scope="module")
-def own_mounts(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The command that runs another with mounts of its own; skips where that is not allowed."""
-    command = "unshare -m" if os.geteuid() == 0 else "unshare -rm"
-    probe = f"""{command} sh -c 'mount -t tmpfs -o size=16k none "$OUT"'"""
-    if shutil.which("unshare") is None or shell(probe, OUT=str(tmp_path_factory.mktemp("probe"))).status != 0:
-        pytest.skip("needs the right to mount a small file system (unshare and mount)")
-    return command
 
 
 def test_a_full_file_system_leaves_old_files_untouched(tmp_path: Path, own_mounts: str) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from dh2sim import Robot
 from dh2sim.errors import DesignFileError, MeasureError, OutputError, RunDiffersError, SettingsError
-from tests.program import dh2sim
+from tests.program import dh2sim, shell
 
 VARY = {"a1": "uniform:0.3:0.6", "a2": 0.2}
 QUICK = {"measure": "reach,manipulability", "samples": 50}
@@ -114,3 +114,25 @@ def test_the_command_prints_the_best_designs(tmp_path: Path, monkeypatch: pytest
     run = dh2sim(*words)
     assert run.out.startswith("planar_2r: 2 designs measured, 2 of them before\n")
     assert max(map(len, run.out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+def test_a_complete_sweep_is_reported_where_nothing_can_be_written(
+    tmp_path: Path, own_mounts: str, ending: str
+) -> None:
+    folder = tmp_path / "done"
+    folder.mkdir()
+    words = f"sweep planar_2r --vary a1=0.1 --measure reach --samples 9 -o {folder}/arms{ending}"
+    assert dh2sim(*words.split(), "--count", "40", "-q").status == 0
+    script = f"""{own_mounts} sh -c 'mount --bind -o ro "$OUT" "$OUT" && exec $DH2SIM {words} --count $COUNT'"""
+    again = shell(script, OUT=str(folder), COUNT="40")
+    assert (again.status, again.err) == (0, "")
+    assert again.out.startswith("planar_2r: 40 designs measured, 40 of them before\n")
+    refused = f"dh2sim: cannot write '{folder}/arms{ending}"
+    more = shell(script, OUT=str(folder), COUNT="41")
+    assert (more.status, more.out) == (2, "")
+    assert more.err.startswith(refused)
+    (folder / f"arms{ending}").write_text("of somebody else")
+    stale = shell(script, OUT=str(folder), COUNT="40")
+    assert (stale.status, stale.out) == (2, "")
+    assert stale.err.startswith(refused)

@@ -107,7 +107,9 @@ def decide_unit(
     if option or stated or not unmarked:
         unit = option or stated or min(over | marked, default=None)
         if unit is None and numbers and kind is ANGLES:
-            findings.note(f"all angles are 0, in any unit: the robot file is in rad, unless you pass {kind.arguments}")
+            findings.note(
+                f"all angles are 0, in any unit: the robot file is in rad, unless you pass {kind.arguments}"
+            )
         return unit
     if len(over) == 1:
         (unit,) = over
