@@ -181,11 +181,12 @@ def rollout(
     """
     model = build_any([robot])[0]
     from dh2sim.simulate.description import describe
-    from dh2sim.simulate.options import DEFAULT_RECORD, RolloutOptions
-    from dh2sim.simulate.prepare import prepare
+    from dh2sim.simulate.options import DEFAULT_RECORD
+    from dh2sim.simulate.prepare import options_for, prepare
     from dh2sim.simulate.run import check_share, choose_blocks, fill, open_run, with_block_size, workers_of
 
-    options = RolloutOptions(
+    options = options_for(
+        model,
         rollouts=rollouts,  # type: ignore[arg-type]  # None is as if it were not given
         steps=steps,
         duration=duration,

@@ -139,12 +139,16 @@ def draws_of(spec: RobotSpec, given: Mapping[str, Any]) -> Mapping[str, Draw]:
     try:
         return read_draws(given)
     except SettingsError as error:
-        problems = [*error.problems]
+        raise SettingsError([*error.problems, *unknown_names(spec, given)]) from None
+
+
+def unknown_names(spec: RobotSpec, given: object) -> list[tuple[str, str]]:
+    """Return problems for a ``SettingsError``: names in ``vary`` that are not of numbers of the robot."""
     try:
-        Variation(spec, [str(name) for name in given])
+        Variation(spec, [str(name) for name in given] if isinstance(given, Mapping) else [])
     except RobotError as error:
-        problems += [("vary", str(each)) for each in error.problems]
-    raise SettingsError(problems)
+        return [("vary", str(each)) for each in error.problems]
+    return []
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

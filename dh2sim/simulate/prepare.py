@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, Unpack
 
 import mujoco
 import numpy as np
@@ -24,10 +24,10 @@ from dh2sim.simulate.block import Job, rehearse
 from dh2sim.simulate.controllers.registry import ControllerChoice, choose
 from dh2sim.simulate.dataset_layout import FORMAT, TAKEN, design_variables, rollout_bytes, run_layout
 from dh2sim.simulate.design_plants import DesignPlants, PlantRecipe
-from dh2sim.simulate.designs import Designs
+from dh2sim.simulate.designs import Designs, unknown_names
 from dh2sim.simulate.initial_states import InitialStates, read_initial_states, reference_start
 from dh2sim.simulate.mujoco_runtime import mujoco_package
-from dh2sim.simulate.options import AUTO, ENGINES, REFERENCE, WARP, RolloutOptions
+from dh2sim.simulate.options import AUTO, ENGINES, REFERENCE, WARP, RolloutKeywords, RolloutOptions
 from dh2sim.simulate.plant import Plant, compile_plant
 from dh2sim.simulate.quantities import randomized, unknown_labels
 from dh2sim.simulate.randomization import owners, push_time
@@ -48,6 +48,18 @@ TIME_BYTES = 16
 """Of the times of every record."""
 
 T = TypeVar("T")
+
+
+def options_for(model: RobotModel | MechanismModel, **given: Unpack[RolloutKeywords]) -> RolloutOptions:
+    """Return options of a robot's run.
+
+    Raises:
+        SettingsError: Options are wrong; the error reports the names in ``vary`` that the robot does not have, too.
+    """
+    try:
+        return RolloutOptions(**given)
+    except SettingsError as error:
+        raise SettingsError([*error.problems, *unknown_names(model.spec, given.get("vary"))]) from None
 
 
 def prepare(

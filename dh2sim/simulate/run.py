@@ -21,8 +21,8 @@ from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import load_robot
 from dh2sim.simulate.block import Block, Job, simulate_block
 from dh2sim.simulate.dataset_layout import Layout
-from dh2sim.simulate.options import WARP, RolloutKeywords, RolloutOptions
-from dh2sim.simulate.prepare import prepare
+from dh2sim.simulate.options import WARP, RolloutKeywords
+from dh2sim.simulate.prepare import options_for, prepare
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -112,8 +112,8 @@ def rollout(
         MissingExtraError: xarray is not installed, or what a place or an executor needs.
     """
     require_extra("data", "xarray", what="a run as an xarray dataset")
-    checked = RolloutOptions(**options)
-    job = with_block_size(prepare(_model_of(robot), checked), block_size)
+    model = _model_of(robot)
+    job = with_block_size(prepare(model, options_for(model, **options)), block_size)
     if out is None:
         if share is not None or blocks is not None:
             raise SettingsError([("share" if blocks is None else "blocks", "must be given together with out")])

@@ -242,6 +242,10 @@ def test_cells_are_plain_numbers_or_expressions(tmp_path: Path) -> None:
             {"vary": {"b1": 0.1}},
             "b1: is not the name of a number of planar_2r. Names: a1, a2, alpha1, d1, theta1",
         ),
+        (
+            {"vary": {"b1": 0.1, "a1": "often"}, "every": 0},
+            r"(?s)every must be .*\nvary a1: must be X .*\nvary b1: is not the name of a number of planar_2r",
+        ),
         ({"per_design": 2}, "per_design must be given together with vary or designs"),
         ({"designs": {"a1": [1, 2]}, "rollouts": 3}, "rollouts must be a multiple of the 2 designs, got 3"),
         ({"designs": {"a1": [1]}, "vary": {"a1": 0.1}}, "vary must not contain a1, which the designs have too"),
