@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import fcntl
 import io
 import os
+import pty
+import struct
 import subprocess
 import sys
-from contextlib import redirect_stderr, redirect_stdout
+import termios
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,6 +79,22 @@ def shell(script: str, **variables: str) -> Outcome:
         check=False,
     )
     return Outcome(status=done.returncode, out=done.stdout, err=done.stderr)
+
+
+def on_terminal(*arguments: object, columns: int) -> str:
+    """Run the program on a terminal of so many columns, and return what it prints there."""
+    master, slave = pty.openpty()
+    fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
+    with os.fdopen(master, "rb", buffering=0) as screen:
+        command = [sys.executable, "-m", "dh2sim", *map(str, arguments)]
+        variables = {name: value for name, value in environment().items() if name != "COLUMNS"}
+        with subprocess.Popen(command, env=variables, stdin=slave, stdout=slave, stderr=slave):
+            os.close(slave)
+            text = b""
+            with suppress(OSError):  # as Linux reports the end of it
+                while part := screen.read(4096):
+                    text += part
+    return text.decode().replace("\r\n", "\n")
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -36,6 +36,9 @@ UsageError: Any = typer.BadParameter.__base__
 NEGATIVE_NUMBERS: Final = {"ignore_unknown_options": True}
 """A negative number is an argument, not an option."""
 
+_NO_NUMBER: Final = re.compile(r"--.*|-(?!pi$)[A-Za-z]+", re.DOTALL)
+"""An option rather than a coordinate, such as -1.5 or -pi/2."""
+
 COMMANDS: Final = {
     "new": Command("new", "new", "Write a robot file to start from."),
     "export": Command("export", "export", "Write URDF and MJCF, verified against the table."),
@@ -197,7 +200,7 @@ class PlainCommand(PlainValues, TyperCommand):
             rest = super().parse_args(ctx, args)
         if ctx.ignore_unknown_options and not ctx.resilient_parsing:
             for word in (word for value in ctx.params.values() if isinstance(value, list) for word in value):
-                if isinstance(word, str) and word.startswith("--") and word in typed:
+                if isinstance(word, str) and _NO_NUMBER.fullmatch(word) and word in typed:
                     from dh2sim.cli.usage import unknown_option
 
                     raise SystemExit(complain(unknown_option(word, ctx)))
@@ -212,7 +215,7 @@ def _taking_many(options: tuple[str, ...], bare: tuple[str, ...] = ()) -> type[T
     """Return the class of a command some of whose options take all words up to the next option.
 
     Negative numbers among them are no options; those of ``bare`` may stand alone. The command gets the words of an
-    option as one text, with MANY between them.
+    option as one text, with MANY between them; that alone, where there are none.
     """
 
     class TakingMany(PlainCommand):
@@ -222,7 +225,7 @@ def _taking_many(options: tuple[str, ...], bare: tuple[str, ...] = ()) -> type[T
                 if given[start] in options:
                     words = list(takewhile(_is_value, given[start + 1 :]))
                     given[start + 1 : start + 1 + len(words)] = (
-                        [MANY.join(words)] if words or given[start] in bare else []
+                        [MANY.join(words)] if words else [MANY] if given[start] in bare else []
                     )
             return super().parse_args(ctx, given)
 

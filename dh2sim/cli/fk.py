@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +20,7 @@ from dh2sim.cli.joint_vector import (
     read_joint_vector,
     warn_open_loops,
 )
-from dh2sim.cli.output import json_text
+from dh2sim.cli.output import json_text, terminal_width
 from dh2sim.errors import ConfigurationError, Dh2simError
 
 if TYPE_CHECKING:
@@ -219,7 +220,7 @@ def jacobian(
     print(f"{spec.name}: Jacobian of {frame} in base_link")
     _print_q(vector)
     _print_jacobian(J, columns)
-    print(f"singular values  {' '.join(f'{value:.6g}' for value in values) or 'none'}")
+    _print_items("singular values  ", [f"{value:.6g}" for value in values] or ["none"])
     print(f"manipulability   {float(manipulability(J)):.6g}  (product of the singular values)")
     most = min(J.shape)
     singular = rank(J) < most
@@ -228,7 +229,7 @@ def jacobian(
         title = f"joint motions that leave {frame} still" if singular else "self-motions"
         print(f"{title}, {_rates(columns)}:")
         for motion in still:
-            print(f"  {_combination(motion, names)}")
+            _print_items("  ", re.split(" (?=[-+] )", _combination(motion, names)))
     if singular:
         print(f"velocities that {frame} cannot have, m/s and rad/s:")
         for direction in lost:
@@ -244,9 +245,23 @@ def _print_jacobian(J: Array, vector: JointVector) -> None:
         label = f"{name}, {'m' if i < 3 else 'rad'}/s"
         lines.append((label, *(f"{round(float(value), 6) + 0.0:.6f}" for value in row)))
     widths = [max(len(line[k]) for line in lines) for k in range(len(names) + 1)]
-    for label, *cells in lines:
-        text = "  ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths[1:], strict=True))
-        print(f"  {label:{widths[0]}}  {text}".rstrip())
+    for number, columns in enumerate(_fitting(widths)):
+        if number:
+            print()
+        for line in lines:
+            text = "".join(f"  {line[k]:>{widths[k]}}" for k in columns)
+            print(f"  {line[0]:{widths[0]}}{text}".rstrip())
+
+
+def _fitting(widths: Sequence[int]) -> list[range]:
+    """Return the columns of a table, but the first, in groups that fit beside that on the terminal."""
+    room, groups, start, used = terminal_width() or math.inf, [], 1, 0
+    for k, width in enumerate(widths[1:], start=1):
+        used += 2 + width
+        if used + 2 + widths[0] > room and k > start:
+            groups.append(range(start, k))
+            start, used = k, 2 + width
+    return [*groups, range(start, len(widths))]
 
 
 def _rates(vector: JointVector) -> str:
@@ -265,7 +280,19 @@ def _combination(values: Any, names: Any) -> str:
 
 
 def _print_q(vector: JointVector) -> None:
-    print(f"q           {vector}".rstrip())
+    _print_items("q           ", re.split("(?<=,) ", str(vector)))
+
+
+def _print_items(label: str, items: Sequence[str]) -> None:
+    """Print a label and items; where a terminal is too narrow for them, lines end between items."""
+    width, line = terminal_width() or math.inf, label + items[0]
+    for item in items[1:]:
+        if len(line) + 1 + len(item) > width:
+            print(line)
+            line = " " * len(label) + item
+        else:
+            line += f" {item}"
+    print(line.rstrip())
 
 
 def _print_matrix(T: Array) -> None:

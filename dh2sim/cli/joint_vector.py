@@ -154,9 +154,6 @@ def _wrong_count(spec: RobotSpec, words: Sequence[str], parts: Sequence[str], un
     rows = spec.moving_rows
     if len(words) == 1 and words[0].isidentifier():
         spec.configuration(words[0])  # refuses the name
-    for word in words:
-        if re.fullmatch(r"-[A-Za-z]+", word) and word != "-pi":
-            return f"unknown option '{word}'"
     names = ", ".join(f"{row.name} ({_unit(row, units)})" for row in rows)
     count = "1 joint coordinate" if len(rows) == 1 else f"{len(rows) or 'no'} joint coordinates"
     return f"{spec.name} has {count}, got {len(parts)}" + (f": {names}" if names else "")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+import shutil
 import sys
 import textwrap
 import time
@@ -18,7 +20,8 @@ from dh2sim.messages import printable
 from dh2sim.progress import Advance
 
 WIDTH: Final = 80
-"""Columns of what is printed, unless the terminal is asked."""
+"""Columns of lines of text, at most."""
+_NARROWEST: Final = 40
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -41,21 +44,45 @@ def make_console(width: int | None = None) -> Console:
     return RaisingConsole(highlight=False, width=width)
 
 
-def wrapped(text: str, *, first: str = "", rest: str = "  ", width: int = WIDTH) -> list[str]:
-    """Return the lines of a text for a terminal; the first begins with ``first``, the others with ``rest``."""
-    return textwrap.wrap(
-        printable(text),
-        width,
+def terminal_width() -> int | None:
+    """Return the columns of the terminal that is standard output; None where that is a file or a pipe."""
+    return max(shutil.get_terminal_size().columns, _NARROWEST) if sys.stdout.isatty() else None
+
+
+def wrapped(
+    text: str, *, first: str = "", rest: str = "  ", width: int | None = None, commas: bool = False
+) -> list[str]:
+    """Return the lines of a text for a terminal.
+
+    Args:
+        text: The text.
+        first: What the first line begins with.
+        rest: What the others do.
+        width: Columns; by default the terminal's, at most ``WIDTH``.
+        commas: Whether a word that is too long for a line, such as a controller's options, may end after a comma.
+    """
+    wrapper = _Wrapper if commas else textwrap.TextWrapper
+    return wrapper(
+        width=width or min(terminal_width() or WIDTH, WIDTH),
         initial_indent=first,
         subsequent_indent=rest,
         break_long_words=False,
         break_on_hyphens=False,
-    )
+    ).wrap(printable(text))
 
 
-def print_wrapped(text: str, *, first: str = "", rest: str = "  ", width: int = WIDTH) -> None:
+class _Wrapper(textwrap.TextWrapper):
+    """Breaks words after commas where they are too long for a line."""
+
+    def _split(self, text: str) -> list[str]:
+        room = self.width - max(len(self.initial_indent), len(self.subsequent_indent))
+        parts = (re.split("(?<=,)", word) if len(word) > room else [word] for word in super()._split(text))
+        return [part for word in parts for part in word if part]
+
+
+def print_wrapped(text: str, *, first: str = "", rest: str = "  ", commas: bool = False) -> None:
     """Print a text as ``wrapped`` returns it."""
-    print("\n".join(wrapped(text, first=first, rest=rest, width=width)))
+    print("\n".join(wrapped(text, first=first, rest=rest, commas=commas)))
 
 
 def print_whole(table: Table) -> None:

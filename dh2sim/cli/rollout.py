@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dh2sim.cli.common import INTERRUPTED, QuietOption, RobotArgument, build_any, named_values
-from dh2sim.cli.output import json_text, make_console, print_wrapped, progress_bar, size_text
+from dh2sim.cli.output import json_text, print_wrapped, progress_bar, size_text
 from dh2sim.cli.runs import clipped_controls, contacts, loops
 from dh2sim.messages import counted, printable
 
@@ -338,8 +338,8 @@ def _print_part(job: Job, progress: Progress, out: str, *, which: str, rollouts:
     """Print what became of a part of a run, without reading what others have written."""
     from dh2sim.simulate.store.reader import open_run
 
-    robot, controller = job.layout.attributes["robot"], printable(str(job.options.controller))
-    print(f"{robot}: {which}, {rollouts:,} rollouts, {controller}, in {printable(out)}")
+    robot, controller = job.layout.attributes["robot"], str(job.options.controller)
+    print_wrapped(f"{robot}: {which}, {rollouts:,} rollouts, {controller}, in {out}", commas=True)
     if rollouts:
         _print_speed(job, progress)
     run = open_run(out)
@@ -358,13 +358,14 @@ def _print_speed(job: Job, progress: Progress) -> None:
 
 def _print_summary(job: Job, summary: RunDescription, progress: Progress, out: str) -> None:
     options = job.options
-    print(
+    print_wrapped(
         f"{summary.robot}: {counted(summary.rollouts, 'rollout')} of {counted(summary.steps, 'step')} "
-        f"({summary.duration:g} s), {printable(str(options.controller))}, in {printable(out)}"
+        f"({summary.duration:g} s), {options.controller}, in {out}",
+        commas=True,
     )
     _print_speed(job, progress)
     recorded = [each.name for each in job.layout.variables if {"step", "interval"} & {*each.dimensions}]
-    print(f"  recorded {', '.join(recorded)}: {size_text(summary.bytes_on_disk)}")
+    print_wrapped(f"recorded {', '.join(recorded)}: {size_text(summary.bytes_on_disk)}", first="  ", rest="    ")
     counts = [f"finished {summary.finished:,}"]
     if summary.unstable:
         reasons = ", ".join(f"{reason} {count:,}" for reason, count in summary.reasons.items())
@@ -372,4 +373,4 @@ def _print_summary(job: Job, summary: RunDescription, progress: Progress, out: s
     if summary.not_run:
         counts.append(f"not run {summary.not_run:,}")
     counts += [*contacts(summary), *loops(summary), *clipped_controls(summary)]
-    print_wrapped(", ".join(counts), first="  ", rest="    ", width=make_console().width)
+    print_wrapped(", ".join(counts), first="  ", rest="    ", commas=True)

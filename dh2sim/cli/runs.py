@@ -170,7 +170,7 @@ def _print(description: RunDescription, *, verified: bool) -> None:
     for title, lines in _sections(description, verified=verified):
         for number, line in enumerate(lines):
             first = f"  {title if number == 0 else '':<11} "
-            text = wrapped(line, first=first, rest=" " * 14, width=max(console.width, 40))
+            text = wrapped(line, first=first, rest=" " * 14, width=max(console.width, 40), commas=title != "command")
             console.print(Text("\n".join(text)), soft_wrap=True)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import ForceOption, JsonOption, RobotArgument, build_any, words_of
+from dh2sim.cli.common import MANY, ForceOption, JsonOption, RobotArgument, build_any, words_of
 from dh2sim.cli.output import json_text, progress_bar, require_free, table_lines, wrapped
 from dh2sim.errors import ConfigurationError, SettingsError, TrajectoryError
 from dh2sim.messages import did_you_mean, listed, printable, shown
@@ -220,7 +220,7 @@ def _limits(model: RobotModel, texts: Sequence[str] | None) -> dict[str, Any]:
     problems: list[tuple[str, str]] = []
     found: dict[str, Any] = {}
     joints = [joint.name for joint in model.moving_joints]
-    for word in words_of([text for text in texts or () if text], "--limits"):  # alone: the robot's own
+    for word in words_of([text for text in texts or () if text != MANY], "--limits"):  # alone: the robot's own
         name, equals, value = word.partition("=")
         joint, _, quantity = name.rpartition(".")
         quantity = quantity.replace("-", "_")

@@ -108,23 +108,29 @@ def view(
 
 def _require_robot(robot: str, run: Path | None) -> None:
     """Refuse a run or a trajectory file in the place of its robot, and say how it is played."""
-    from dh2sim.trajectory.files import is_trajectory_file
-
-    path, owner = Path(robot), "ROBOT" if run is None else str(run)
-    if (path / "zarr.json").is_file():
+    what = _motion_kind(Path(robot))
+    if what is None:
+        return
+    owner = "ROBOT" if run is None or _motion_kind(run) is not None else str(run)
+    if owner == "ROBOT" and what == "run":
         from dh2sim.robot.catalog import builtin_path
         from dh2sim.simulate.description import describe
 
-        what = "run"
         with contextlib.suppress(Dh2simError):
-            recorded = describe(path).robot
-            if run is None and builtin_path(recorded) is not None:
-                owner = recorded
-    elif path.is_file() and is_trajectory_file(path) and (path.suffix.lower() != ".csv" or _begins_with_time(path)):
-        what = "trajectory file"
-    else:
-        return
+            recorded = describe(robot).robot
+            owner = owner if builtin_path(recorded) is None else recorded
     raise Dh2simError(f"{robot}: is a {what}, not a robot; 'dh2sim view {owner} {robot}' plays it")
+
+
+def _motion_kind(path: Path) -> str | None:
+    """Return what a file is that can be played: a run or a trajectory file; else None."""
+    from dh2sim.trajectory.files import is_trajectory_file
+
+    if (path / "zarr.json").is_file():
+        return "run"
+    if path.is_file() and is_trajectory_file(path) and (path.suffix.lower() != ".csv" or _begins_with_time(path)):
+        return "trajectory file"
+    return None
 
 
 def _begins_with_time(path: Path) -> bool:

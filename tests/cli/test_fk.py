@@ -223,8 +223,10 @@ JOINTS = "joint_1 (deg), joint_2 (deg), joint_3 (m), joint_4 (deg), joint_5 (deg
         ("[1,2,3]", f"stanford has 6 joint coordinates, got 3: {JOINTS}"),
         ("1 2 3 4 5 6 7", f"stanford has 6 joint coordinates, got 7: {JOINTS}"),
         ("1 2 3 4 5 x", "joint_6: unknown name 'x'. Known names: pi"),
-        ("-q 1", "unknown option '-q'"),
-        ("1 2 3 4 5 -j", "joint_6: in '-j': unknown name 'j'. Known names: pi"),
+        ("-q 1", "unknown option '-q'. 'dh2sim fk --help' lists them all"),
+        ("1 -q", "unknown option '-q'. 'dh2sim fk --help' lists them all"),
+        ("1 2 3 4 5 -j", "unknown option '-j'. 'dh2sim fk --help' lists them all"),
+        ("-- 1 2 3 4 5 -j", "joint_6: in '-j': unknown name 'j'. Known names: pi"),
         ("1 2 3 4 5 1/0", "joint_6: in '1/0': division by zero"),
         (
             "hom",

@@ -14,7 +14,7 @@ import pytest
 from dh2sim.cli.common import complain
 from dh2sim.cli.output import json_text
 from dh2sim.errors import NotFiniteError
-from tests.program import dh2sim
+from tests.program import dh2sim, on_terminal
 
 
 def test_json_reads_back() -> None:
@@ -66,4 +66,28 @@ def test_an_error_is_wrapped_between_words_on_a_terminal_and_stays_one_line_else
     assert lines == [
         "dh2sim: a long word a long word a long word a long word a long word a long word",
         "  a long word and 'dh2sim import arm.urdf -o arm.yaml'",
+    ]
+
+
+def test_long_lines_end_between_items_on_a_terminal_and_the_jacobian_goes_on_below() -> None:
+    narrow, wide = on_terminal("jacobian", "franka_panda", columns=60), dh2sim("jacobian", "franka_panda").out
+    assert max(map(len, narrow.splitlines())) <= 60
+    words = [line.split() for line in wide.splitlines() if line.startswith(("  v", "  w"))]
+    found = [line.split() for line in narrow.splitlines() if line.startswith(("  v", "  w"))]
+    assert [first + rest[2:] for first, rest in zip(found[:6], found[6:], strict=True)] == words
+    assert narrow.splitlines()[1:3] == [
+        "q           home: 0.3 rad, -0.6 rad, 0.2 rad, -2.2 rad,",
+        "            0.25 rad, 1.8 rad, 0.7 rad",
+    ]
+    assert on_terminal("jacobian", "franka_panda", columns=120) == wide
+
+
+def test_a_long_controller_is_wrapped_after_a_comma(tmp_path: Path) -> None:
+    controller = "computed-torque:bandwidth=25.123456,period=0.712345,amplitude=0.512345,reference=none"
+    how = ("rollout", "planar_2r", "--rollouts", "2", "--steps", "2", "--controller", controller)
+    lines = dh2sim(*how, "--out", tmp_path / "run.zarr").out.splitlines()
+    assert lines[:3] == [
+        "planar_2r: 2 rollouts of 2 steps (0.004 s), computed-torque:bandwidth=25.123456,",
+        "  period=0.712345,amplitude=0.512345,reference=none, in",
+        f"  {tmp_path / 'run.zarr'}",
     ]

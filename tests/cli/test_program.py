@@ -457,6 +457,7 @@ def test_lists_are_given_with_commas_or_by_repeating_the_option() -> None:
         ("check", "{robot}", "--only"),
         ("symbolic", "rpr", "--what"),
         ("export", "rpr", "--format", "urdf", "--format"),
+        ("trajectory", "rpr", "0,0,0", "0.1,0.1,0.1", "--limits"),
         ("ik", "rpr", "--xyz", "0.1", "0.2", "0.3", "--lock"),
         ("calibrate", "rpr", "data.csv", "--prior"),
         ("calibrate", "rpr", "data.csv", "--unknown"),

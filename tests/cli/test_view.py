@@ -350,6 +350,11 @@ def test_a_run_in_the_place_of_its_robot_is_refused_with_how_to_play_it(
     Path("table.csv").write_text("theta,d,a,alpha\nq1,0,1,0\n", encoding="utf-8")
     for arguments, refusal in (
         (["run.zarr"], "run.zarr: is a run, not a robot; 'dh2sim view stanford run.zarr' plays it"),
+        (["run.zarr", "run.zarr"], "run.zarr: is a run, not a robot; 'dh2sim view stanford run.zarr' plays it"),
+        (
+            ["motion.csv", "run.zarr"],
+            "motion.csv: is a trajectory file, not a robot; 'dh2sim view ROBOT motion.csv' plays it",
+        ),
         (["run.zarr", "scara"], "run.zarr: is a run, not a robot; 'dh2sim view scara run.zarr' plays it"),
         (["motion.csv"], "motion.csv: is a trajectory file, not a robot; 'dh2sim view ROBOT motion.csv' plays it"),
     ):
