@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from functools import cache
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -21,6 +22,20 @@ Column: TypeAlias = tuple[Component, Component, Component]
 
 BLOCK = 8192
 """Configurations in a block: many enough to hide the cost of a call, few enough for the processor's cache."""
+_KEPT: Final = 2**25 - 2**16
+"""Size of an array, bytes: just below the largest that glibc learns from."""
+
+
+@cache
+def keep_freed_memory() -> None:
+    """Let the C library keep memory that blocks free, once for this process.
+
+    A block's components come and go at the end of the heap. glibc gives that end back to the system when 128 kB are
+    free, and each block then pays for fresh pages what it pays for its computation, or twice as much. When a larger
+    array is freed, glibc raises that limit to twice its size: mallopt(3), M_MMAP_THRESHOLD. Nothing is written to the
+    array, so that it takes no memory; with other C libraries it has no effect.
+    """
+    np.empty(_KEPT, dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -5,20 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import repeat
 from typing import Final, Literal, TypeAlias, TypedDict
 
 import numpy as np
 
 from dh2sim.errors import ConfigurationError
-from dh2sim.kinematics.batch_frame import BLOCK
+from dh2sim.kinematics.batch_frame import BLOCK, keep_freed_memory
 from dh2sim.kinematics.numba_kernels import Kernel
 from dh2sim.kinematics.straight_line import JACOBIAN, Kind
 from dh2sim.messages import did_you_mean, listed, shown
 from dh2sim.processors import available_processors
 from dh2sim.typing import Array
 
-THREADED: Final = 20_000
-"""Joint vectors from which on threads are started; for fewer, handing over costs more than is gained."""
+THREADED: Final = 200_000
+"""Joint vectors from which on threads are started; for fewer, starting them costs more than is gained."""
+_BLOCKS: Final = 8
+"""Blocks that a thread computes at once. Python runs one thread at a time, between the calls of NumPy; calls for one
+block are so short that two threads which wait for each other take twice as long as one."""
+_FEW_BLOCKS: Final = 4
+"""Blocks at once for which NumPy's calls are too short for threads."""
+_JOINTS: Final = 64
+"""Blocks at once times joints: bounds the memory of a thread."""
 Fill: TypeAlias = Callable[[Array, Array], None]
 """Fills the results of a block, shape (N, *shape of one), from its joint coordinates."""
 
@@ -29,10 +37,10 @@ class JacobianOptions(TypedDict, total=False):
     out: Array | None
     """Takes the result: an array of doubles of the result's shape, which is returned; by default a new one."""
     threads: int
-    """Number of threads for 20 000 joint vectors and more; 0: as many as there are processors for this process. The
-    bits do not depend on it. Default 1."""
+    """Number of threads for 200 000 joint vectors and more; 0: as many as there are processors for this process. The
+    bits do not depend on it. NumPy takes one for robots of more than 16 joints. Default 1."""
     backend: Literal["numpy", "numba"]
-    """numba: batches are computed by code that is compiled for the robot, about ten times as fast; the last bits
+    """numba: batches are computed by code that is compiled for the robot, about seven times as fast; the last bits
     differ. Needs the extra ``fast``. Default numpy."""
 
 
@@ -127,21 +135,29 @@ def in_blocks(
     direct = out is not None and out.flags.c_contiguous
     results = out.reshape(count, *shape) if out is not None and direct else np.empty((count, *shape))
 
-    def compute(start: int) -> None:
-        block = slice(start, start + BLOCK)
+    def compute(start: int, blocks: int = 1) -> None:
+        part = slice(start, min(start + blocks * BLOCK, count))
         if kernel is not None:
-            flat = results[block].reshape(-1, math.prod(shape))
-            if kernel(np.ascontiguousarray(vectors[block]), flat):
+            flat = results[part].reshape(-1, math.prod(shape))
+            if kernel(np.ascontiguousarray(vectors[part]), flat):
                 return
-        fill(results[block], np.ascontiguousarray(vectors[block].T))
+            if blocks > 1:  # as for one thread: only the blocks with a large coordinate are left to NumPy
+                for first in range(start, part.stop, BLOCK):
+                    compute(first)
+                return
+        fill(results[part], np.ascontiguousarray(vectors[part].T))
 
-    starts = range(0, count, BLOCK)
-    if threads == 1 or count < THREADED:
-        for start in starts:
+    keep_freed_memory()
+    at_once = max(1, min(_BLOCKS, _JOINTS // max(1, vectors.shape[1])))
+    if threads == 1 or count < THREADED or (kernel is None and at_once < _FEW_BLOCKS):
+        for start in range(0, count, BLOCK):
             compute(start)
     else:
+        blocks = math.ceil(count / BLOCK)
+        at_once = math.ceil(blocks / math.ceil(blocks / at_once))  # all alike
+        starts = range(0, count, at_once * BLOCK)
         with ThreadPoolExecutor(min(threads, len(starts))) as pool:
-            list(pool.map(compute, starts))
+            list(pool.map(compute, starts, repeat(at_once)))
     if out is None:
         return results.reshape(*batch, *shape)
     if not direct:

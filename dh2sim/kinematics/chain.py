@@ -39,7 +39,7 @@ class Joint:
 class CodeCache:
     """Functions that were made for a chain, by the name of the frame that they are of; not copied, nor pickled."""
 
-    __slots__ = ("_calls", "compiled", "jacobian", "pose")
+    __slots__ = ("_calls", "compiled", "jacobian", "places", "pose")
 
     def __init__(self) -> None:
         self.pose: dict[str, Callable[[object], Array | None]] = {}
@@ -47,6 +47,8 @@ class CodeCache:
         self.jacobian: dict[str, Callable[[object], Array | None]] = {}
         self.compiled: dict[object, Callable[[Array, Array], bool] | None] = {}
         """Take a batch; of the numba backend."""
+        self.places: dict[str, tuple[int, Array]] = {}
+        """How many joints carry a frame, and its pose in the last of them."""
         self._calls: Counter[object] = Counter()
 
     def __reduce__(self) -> tuple[type[CodeCache], tuple[()]]:

@@ -32,7 +32,7 @@ from dh2sim.kinematics.straight_line import JACOBIAN, POSE, Kind, of_one
 from dh2sim.kinematics.transforms import compose, identity, joint_part
 from dh2sim.kinematics.trig import sin_cos
 from dh2sim.messages import did_you_mean, shown
-from dh2sim.typing import Array
+from dh2sim.typing import Array, read_only
 
 
 def forward_kinematics(chain: ChainLike, q: ArrayLike, **options: Unpack[BatchOptions]) -> Array:
@@ -337,16 +337,23 @@ def _computed(
 
 def frame_place(chain: KinematicChain, frame: str) -> tuple[int, Array]:
     """Return how many joints carry a named frame, and its pose in the last of them, or in base_link."""
-    require_frame(chain, frame)
+    known = chain.code.places
+    if not isinstance(frame, str) or frame not in known:
+        require_frame(chain, frame)
+        known[frame] = _frame_place(chain, frame)
+    return known[frame]
+
+
+def _frame_place(chain: KinematicChain, frame: str) -> tuple[int, Array]:
     n = len(chain.joints)
     if frame == "tool0":
-        return n, compose(chain.joints[-1].T_joint_dh, chain.T_dhn_tool0)
+        return n, read_only(compose(chain.joints[-1].T_joint_dh, chain.T_dhn_tool0))
     if frame == "dh_0":
         return 0, chain.T_base_link_dh0
     kind, _, index = frame.partition("_")
     if kind == "dh":
         return int(index), chain.joints[int(index) - 1].T_joint_dh
-    return (int(index) if kind == "link" else 0), identity()
+    return (int(index) if kind == "link" else 0), read_only(identity())
 
 
 def _write(out: Array, frame: BlockFrame, tool: BlockFrame, *, turns: bool, sign: float) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError
+from dh2sim.kinematics.batch_frame import keep_freed_memory
 from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.trig import sin_cos
 from dh2sim.robot.row import Convention, JointType
@@ -261,6 +262,7 @@ class TableBatch:
     def _blocks(self, vectors: Array) -> Iterator[tuple[slice, _Numbers, Array]]:
         """Yield parts of all configurations, (T, k, n), with the numbers of their tables and coordinates (n, N)."""
         count, poses, n = vectors.shape
+        keep_freed_memory()
         tables = max(1, BLOCK // max(1, poses))
         for first in range(0, count, tables):
             part = slice(first, min(first + tables, count))

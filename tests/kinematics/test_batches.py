@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import platform
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -7,7 +10,9 @@ import pytest
 
 from dh2sim import Robot
 from dh2sim.errors import ConfigurationError
-from dh2sim.kinematics.batches import THREADED, thread_count
+from dh2sim.kinematics import batches
+from dh2sim.kinematics.batch_frame import BLOCK
+from dh2sim.kinematics.batches import thread_count
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import forward_kinematics, frame_poses, geometric_jacobian
 from tests.sample_robots import ODD_ROBOT, STANFORD
@@ -38,9 +43,33 @@ def test_out_may_overlap_the_joint_vectors() -> None:
 
 @pytest.mark.parametrize("function", FUNCTIONS)
 @pytest.mark.parametrize("threads", [0, 2, 3])
-def test_any_number_of_threads_gives_the_same_bits(function: Any, threads: int) -> None:
-    q = np.random.default_rng(0).uniform(-3, 3, (THREADED + 777, 5))
+def test_any_number_of_threads_gives_the_same_bits(
+    function: Any, threads: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(batches, "THREADED", 1)
+    q = np.random.default_rng(0).uniform(-3, 3, (9 * BLOCK + 777, 5))
     assert function(ODD, q, threads=threads).tobytes() == function(ODD, q).tobytes()
+
+
+REPEATED = """
+import resource
+import numpy as np
+from dh2sim import forward_kinematics, geometric_jacobian, load_robot, build_chain
+chain, q = build_chain(load_robot("stanford")), np.zeros((8192, 6))
+for function, shape in ((forward_kinematics, (4, 4)), (geometric_jacobian, (6, 6))):
+    out = np.empty((8192, *shape))
+    for count in (5, 20):
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        for _ in range(count):
+            function(chain, q, out=out)
+    print((resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before) / count)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="it is glibc that gives memory back to the system")
+def test_blocks_use_the_memory_of_those_before() -> None:
+    done = subprocess.run([sys.executable, "-c", REPEATED], capture_output=True, text=True, check=True)
+    assert max(map(float, done.stdout.split())) < 20  # pages a block; of its 700 all would be fresh
 
 
 @pytest.mark.parametrize("batch", [(), (0,), (2, 3)])

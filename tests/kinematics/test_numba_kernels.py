@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from dh2sim.errors import ConfigurationError, MissingExtraError
-from dh2sim.kinematics import numba_kernels
+from dh2sim.kinematics import batches, numba_kernels
+from dh2sim.kinematics.batch_frame import BLOCK
 from dh2sim.kinematics.chain import KinematicChain, build_chain
 from dh2sim.kinematics.forward import forward_kinematics, frame_pose, geometric_jacobian
 from dh2sim.kinematics.numba_kernels import LARGEST, cache_folder
@@ -95,6 +96,19 @@ def test_numpy_computes_what_is_too_large_and_code_is_kept_on_disk(monkeypatch: 
     monkeypatch.setattr(numba_kernels, "cache_folder", lambda: Path("/dev/null/kernels"))
     here = forward_kinematics(build_chain(TURNTABLE), q[:1], backend="numba")
     np.testing.assert_array_equal(here, again)
+
+
+@needs_numba
+@pytest.mark.slow
+def test_with_any_number_of_threads_numpy_computes_the_same_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(batches, "THREADED", 1)
+    chain, q = build_chain(TURNTABLE), np.random.default_rng(0).uniform(-3, 3, (11 * BLOCK + 9, 1))
+    q[3 * BLOCK] = 2.0 * LARGEST
+    alone = forward_kinematics(chain, q, backend="numba")
+    assert forward_kinematics(chain, q, backend="numba", threads=3).tobytes() == alone.tobytes()
+    by_numpy = (alone == forward_kinematics(chain, q)).all(axis=(1, 2))
+    assert by_numpy[3 * BLOCK : 4 * BLOCK].all()
+    assert not by_numpy[: 3 * BLOCK].all()
 
 
 @pytest.mark.parametrize("function", [forward_kinematics, geometric_jacobian])
