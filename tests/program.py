@@ -22,6 +22,21 @@ from dh2sim.cli.main import main
 main()
 """
 """The program, which reports when Python has started."""
+SLOWLY = """
+import time
+from dh2sim.simulate.store.writer import RunWriter
+
+write = RunWriter.write
+
+def write_and_rest(*arguments):
+    write(*arguments)
+    time.sleep(0.25)
+
+RunWriter.write = write_and_rest
+from dh2sim.cli.main import main
+main()
+"""
+"""The program, which rests after each block of a run: it is still at work when it is killed or interrupted then."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

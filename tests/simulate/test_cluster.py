@@ -156,6 +156,11 @@ from pathlib import Path
 from distributed import Client, LocalCluster
 from dh2sim.simulate import rollout
 
+def rest():  # after each block, so that there are some left when the worker is killed
+    from dh2sim.simulate.store.writer import RunWriter
+    write = RunWriter.write
+    RunWriter.write = lambda *arguments: (write(*arguments), time.sleep(0.1))
+
 def kill(client, run):
     records = run / "blocks" / "record"
     while not records.exists() or len(list(records.glob("c.*"))) < 3:
@@ -168,6 +173,7 @@ if __name__ == "__main__":
     with LocalCluster(
         n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
     ) as cluster, Client(cluster) as client:
+        client.run(rest)
         thread = threading.Thread(target=kill, args=(client, run))
         thread.start()
         rollout("planar_2r", rollouts=120, steps=500, block_size=4, controller="pd", out=run, executor=client)

@@ -24,28 +24,13 @@ from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.run import fill
 from dh2sim.simulate.store.reader import open_dataset
 from dh2sim.simulate.store.writer import RunWriter
-from tests.program import Outcome, contents, dh2sim, dh2sim_process, environment
+from tests.program import SLOWLY, Outcome, contents, dh2sim, dh2sim_process, environment
 from tests.robot_files import small
 
 ROLLOUTS, STEPS, BLOCK = 60, 200, 3
 CONTROLLER = "pd"
 OPTIONS = ("--rollouts", str(ROLLOUTS), "--steps", str(STEPS), "--controller", CONTROLLER, "--start", "random")
 WAIT = 180.0
-SLOWLY = """
-import time
-from dh2sim.simulate.store.writer import RunWriter
-
-write = RunWriter.write
-
-def write_and_rest(*arguments):
-    write(*arguments)
-    time.sleep(0.25)
-
-RunWriter.write = write_and_rest
-from dh2sim.cli.main import main
-main()
-"""
-"""The program, which rests after each block: however busy the machine is, it is at work when it is interrupted."""
 
 
 def _begin(folder: Path) -> tuple[Path, RunWriter]:

@@ -57,16 +57,16 @@ def test_threads_share_it() -> None:
 
     def work() -> None:
         with quiet_engine():
-            inside.wait(10)
+            inside.wait(60)
             seen.append(timer())
-            outside.wait(10)
+            outside.wait(60)
 
     threads = [threading.Thread(target=work) for _ in range(4)]
     for thread in threads:
         thread.start()
-    inside.wait(10)
+    inside.wait(60)
     assert timer() is None
-    outside.wait(10)
+    outside.wait(60)
     for thread in threads:
         thread.join()
     assert seen == [None] * 4

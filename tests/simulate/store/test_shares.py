@@ -20,7 +20,7 @@ from dh2sim.errors import RunBusyError, RunDiffersError, RunError
 from dh2sim.simulate.store import directory
 from dh2sim.simulate.store.reader import damaged_blocks
 from dh2sim.simulate.store.writer import RunWriter
-from tests.program import contents, dh2sim, environment
+from tests.program import SLOWLY, contents, dh2sim, environment
 from tests.simulate.store.runs import SECONDS, block_of, copy, finish, lasting, layout, make, resume
 
 OF = layout(rollouts=8, block=2)
@@ -182,8 +182,8 @@ def test_a_run_that_another_process_has_made_meanwhile_is_joined_and_not_replace
 RUN = "rollout planar_2r --controller random --rollouts 192 --steps 2000 --every 100 --block-size 4 --threads 1 -q -o"
 
 
-def _share(folder: Path, share: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "dh2sim", *RUN.split(), "run.zarr", "--share", share]
+def _share(folder: Path, share: str, *program: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, *(program or ("-m", "dh2sim")), *RUN.split(), "run.zarr", "--share", share]
     return subprocess.Popen(command, cwd=folder, env=environment())
 
 
@@ -198,7 +198,7 @@ def _made_of(run: Path) -> dict[str, bytes]:
 
 @pytest.mark.slow
 def test_four_shares_of_which_one_is_killed_and_started_again_make_the_run_of_one_process(tmp_path: Path) -> None:
-    shares = [_share(tmp_path, f"{i}/4") for i in (1, 2, 3, 4)]
+    shares = [_share(tmp_path, f"{i}/4", *(["-c", SLOWLY] if i == 2 else [])) for i in (1, 2, 3, 4)]
     records, end = tmp_path / "run.zarr" / "blocks" / "record", time.monotonic() + 180
     while not list(records.glob("c.*")) and time.monotonic() < end:
         time.sleep(0.005)
