@@ -213,7 +213,7 @@ def _kind(value: dict[str, Any], schema: dict[str, Any]) -> str:
         return text + _default(value)
     if kind == "array":
         least, most = value.get("minItems"), value.get("maxItems")
-        count = f"{least}" if least == most else f"{least} to {most}" if most else ""
+        count = f"{least} to {most}" if least != most else f"{least}" if most else ""
         items = value.get("items", {})
         item = "mappings" if "$ref" in items else "names" if items.get("type") == "string" else "numbers"
         return f"list of {count} {item}".replace("  ", " ") + _default(value)

@@ -12,14 +12,17 @@ They are read as text; nothing is run.
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
-from dh2sim.formats.table.dh_table import Table
+from dh2sim.formats.table.dh_table import Given, Table
 from dh2sim.formats.table.grid import MAX_COLUMNS, MAX_ROWS, Cell, Cells, Grid, TextPlaces
-from dh2sim.formats.table.headers import PARAMETERS, Quantity, are_headings, read_heading
+from dh2sim.formats.table.headers import PARAMETERS, Quantity, are_headings, parameters_in, read_heading
 from dh2sim.formats.table.notation import LONGEST_CELL
+from dh2sim.robot.row import Convention
 
 _MODULES: Final = r"(?:(?:np|numpy|math|sp|sympy|sym|torch|cmath|std)\s*(?:\.|::)\s*)?"
 _LIST: Final = re.compile(
@@ -53,6 +56,23 @@ _MAX_PROBLEMS: Final = 20
 """Brackets that are looked at; one that is never closed counts for many."""
 _BLOCKS: Final = (".yaml", ".yml", ".toml", ".ini", ".cfg")
 _FIXED_TRANSFORM: Final = re.compile(r"setFixedTransform\s*\([^;\n]*[\"'](m?dh)[\"']")
+_FIXED_ROW: Final = re.compile(r"setFixedTransform\s*\(\s*([^\W\d]\w*)[^,\n]*,\s*(?=\[)")
+_BODY_JOINT: Final = re.compile(
+    r"([^\W\d]\w*)[^=\n]{0,20}=\s*rigidBodyJoint\s*\([^;\n]*[\"'](revolute|prismatic|fixed)[\"']", re.IGNORECASE
+)
+_MATLAB_COLUMNS: Final = ("a", "alpha", "d", "theta")
+"""Of MATLAB's ``setFixedTransform``, as its reference page has them."""
+_MATLAB_CONVENTIONS: Final = {"dh": Convention.STANDARD, "mdh": Convention.MODIFIED}
+_MATLAB_THETA: Final = "MATLAB's setFixedTransform ignores theta of a joint that turns; here it is the joint's offset"
+_TOOLBOX: Final = re.compile(r"(?:Revolute|Prismatic)M?DH|DHLink|Link|Revolute|Prismatic")
+"""Constructors that the readers of scripts follow; what they cannot follow is no record."""
+_CONVENTIONS: Final = r"(?:m?dh|standard|modified|classic\w*|craig|distal|proximal)"
+_COORDINATE: Final = re.compile(
+    r"(?<![\w.])(?:self\.)?(?:q|theta|th|q_?vec|joints?|(?:joint_?)?angles?|joint_?(?:positions?|coordinates?)|thetas|qs)"
+    r"\s*(?:\[\s*(\d{1,3})\s*\]|\(\s*(\d{1,3})\s*\))",
+    re.IGNORECASE,
+)
+"""An element of a joint vector, from 0 or from 1."""
 _NAMED_DH: Final = re.compile(r"dh|denavit", re.IGNORECASE)
 
 
@@ -71,6 +91,7 @@ def data_tables(lines: Sequence[str], suffix: str) -> tuple[list[Table], list[tu
     found = [
         *_lists(text, places),
         *_matrices(text, lines, places, problems),
+        *_fixed_transforms(text, places),
         *_numbered(text, places),
         *_records(text, places),
     ]
@@ -143,6 +164,7 @@ def _plainer(raw: str) -> str:
     text = re.sub(r"\b(?:np|numpy|math|sp|sympy|std)\s*(?:\.|::)\s*(?=[a-z])", "", text)
     text = re.sub(r"(?<=[\d.])\s*\*\s*(?:deg|DEG|d2r|D2R|(?i:deg2rad|to_rad))\b", "°", text)
     text = re.sub(r"(?<=[\d.])[fF]\b", "", text)
+    text = _COORDINATE.sub(lambda found: f"q{found[1] or found[2]}", text)
     return "" if text in ("None", "null", "nan", "np.nan") else " ".join(text.split())
 
 
@@ -243,15 +265,12 @@ def _matrices(
             continue
         line, column = places.at(found.start(1))
         names = _named_columns(lines, line, rows[0][0].line, width)
-        if names is None and fixed is not None and width == 4:
-            names = (
-                ["a_{i-1}", "alpha_{i-1}", "d_i", "theta_i"]
-                if fixed[1] == "mdh"
-                else ["a_i", "alpha_i", "d_i", "theta_i"]
-            )
         if names is not None:
             header = tuple(Cell(text=name, line=line, column=column) for name in names)
             yield _table(header, rows)
+        elif fixed is not None and width == 4:
+            header = tuple(Cell(text=name, line=line, column=column) for name in _MATLAB_COLUMNS)
+            yield _of_matlab(header, rows, fixed[1])
         elif _NAMED_DH.search(found[1]):
             how = "write a comment above it, such as '# theta d a alpha'"
             message = f"this may be a DH table, and nothing says which column is what; {how}"
@@ -294,13 +313,48 @@ def _named_columns(lines: Sequence[str], name: int, first: int, width: int) -> l
         if sign is None:
             continue
         comment = line[sign.end() :].strip(" #%/*;")
-        for words in (re.split(r"\s*[,|;&]\s*|\t+|\s{2,}", comment), re.split(r"[\s,|;&\[\](){}]+", comment)):
-            names = [word.strip(" []{}()*:") for word in words if word.strip(" []{}()*:")]
-            cells = [Cell(text=word, line=1, column=1) for word in names]
-            for skip in (0, 1):
-                if len(cells) - skip == width and are_headings(cells[skip:]):
-                    return names[skip:]
+        best = max(_headings_of_comment(comment, width), key=parameters_in, default=())
+        if are_headings(best):
+            return [cell.text for cell in best]
     return None
+
+
+def _headings_of_comment(comment: str, width: int) -> Iterator[Cells]:
+    """Yield what may be headings in a comment: of ``DH = [theta d a alpha]``, of ``rows are theta, d, a, alpha``."""
+    comment = re.sub(rf"\([^()]*\b{_CONVENTIONS}\b[^()]*\)", "", comment, flags=re.IGNORECASE)
+    for text in (comment, *re.findall(r"\[([^\[\]]{5,})\]", comment), *re.findall(r"[:=]([^:=]*)$", comment)):
+        for words in (re.split(r"\s*[,|;&]\s*|\t+|\s{2,}", text), re.split(r"[\s,|;&\[\](){}]+", text)):
+            cells = [Cell(text=name, line=1, column=1) for word in words if (name := word.strip(" []{}()*:"))]
+            yield from (
+                tuple(cells[skip:][:width]) for skip in {0, 1, len(cells) - width} if len(cells) - skip == width
+            )
+
+
+def _fixed_transforms(text: str, places: TextPlaces) -> Iterator[Table]:
+    """Yield the table of MATLAB's ``setFixedTransform(joint, [a alpha d theta], 'dh')``, a call a row."""
+    types = {found[1]: found[2] for found in _BODY_JOINT.finditer(text)}
+    rows: dict[str, list[Cells]] = {}
+    for found in itertools.islice(_FIXED_ROW.finditer(text), _MAX_FOUND):
+        end = _closing(text, found.end(), _LONGEST_RECORD)
+        kind = re.match(r"\s*,\s*[\"'](m?dh)[\"']", text[end + 1 : end + 20]) if end is not None else None
+        if kind is None or end is None:
+            continue
+        cells = tuple(_cell(text, *span, places) for span in _items(text, found.end() + 1, end))
+        if len(cells) == 4 and len(rows.setdefault(kind[1], [])) <= MAX_ROWS:
+            moves = replace(cells[0], text=types.get(found[1], ""))
+            rows[kind[1]].append((*cells, moves))
+    for name, of_kind in rows.items():
+        first = of_kind[0][0]
+        header = tuple(replace(first, text=column) for column in (*_MATLAB_COLUMNS, "type"))
+        typed = all(row[-1].text for row in of_kind)
+        yield _of_matlab(header if typed else header[:-1], [row if typed else row[:-1] for row in of_kind], name)
+
+
+def _of_matlab(header: Cells, rows: Sequence[Cells], name: str) -> Table:
+    """Return the table of ``setFixedTransform(…, name)``."""
+    offset = any(row[3].text.strip("0.") for row in rows)
+    given = Given(by=f"setFixedTransform(…, '{name}')", convention=_MATLAB_CONVENTIONS[name])
+    return replace(_table(header, rows), given=given, notes=(_MATLAB_THETA,) if offset else ())
 
 
 def _records(text: str, places: TextPlaces) -> Iterator[Table]:
@@ -308,7 +362,7 @@ def _records(text: str, places: TextPlaces) -> Iterator[Table]:
     last = 0
     count = 0
     for found in _CALL.finditer(text):
-        if found.start() < last:
+        if found.start() < last or _TOOLBOX.fullmatch(found.group().rstrip("( \t\n").rpartition(".")[2]):
             continue
         opened = found.end() - 1
         end = _closing(text, opened, _LONGEST_RECORD)

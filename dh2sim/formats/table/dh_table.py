@@ -89,6 +89,13 @@ def make_table(header: Cells, rows: Sequence[Cells], grid: Grid) -> Table:
         if rows and len(rows[0]) == len(header) and (merged := _merged(header, rows[0])):
             header, rows = merged, rows[1:]
     notes: list[str] = []
+    if grid.separator in "&<" and len(header) > 2:
+        notes += [
+            f"line {row[0].line} is one cell across all columns, and was not read: {shown(plain(row[0].text))}"
+            for row in rows
+            if len(row) == 1
+        ]
+        rows = [row for row in rows if len(row) > 1]
     if delimited or grid.filled:
         rows = [_fitted(row, len(header), number, notes) for number, row in enumerate(rows, start=1)]
     return Table(header=header, rows=tuple(rows), grid=grid, notes=tuple(notes))

@@ -45,7 +45,9 @@ PARAMETERS: Final = (Quantity.THETA, Quantity.D, Quantity.A, Quantity.ALPHA, Qua
 """The columns by which a table of Denavit-Hartenberg parameters is recognised."""
 
 ANGLE_WORDS: Final = {
-    **dict.fromkeys(("°", "deg", "degs", "degree", "degrees"), AngleUnit.DEG),
+    **dict.fromkeys(
+        ("°", "deg", "degs", "degree", "degrees", "grad", "grados", "gradi", "degré", "degrés"), AngleUnit.DEG
+    ),
     **dict.fromkeys(("rad", "rads", "radian", "radians"), AngleUnit.RAD),
 }
 LENGTH_WORDS: Final = {

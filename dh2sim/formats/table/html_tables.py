@@ -124,4 +124,6 @@ def _number(text: str | None) -> int:
 
 def _whole(row: Sequence[Cell | None]) -> Cells:
     known = next(cell for cell in row if cell is not None)
+    if len(row) > 2 and len({(cell.line, cell.column) for cell in row if cell is not None}) == 1:
+        return (known,)  # a title or a remark, across all columns
     return tuple(Cell(text="", line=known.line, column=known.column) if cell is None else cell for cell in row)

@@ -87,7 +87,10 @@ def _cells(text: str, start: int, end: int, places: TextPlaces) -> Cells:
         inner = _SEVERAL_LINES.sub("", _TALL.sub("", body))
         line, column = places.at(begin + len(raw) - len(raw.lstrip()))
         cells.append(Cell(text=" ".join(_unwrapped(inner.strip()).split()), line=line, column=column))
-        cells += [Cell(text="", line=line, column=column)] * (min(int(spanned[1]), MAX_COLUMNS) - 1 if spanned else 0)
+        width = min(int(spanned[1]), MAX_COLUMNS) if spanned else 1
+        if (begin, stop) == (start, end) and width > 2:  # a remark under the table, and no row of it
+            break
+        cells += [Cell(text="", line=line, column=column)] * (width - 1)
         if len(cells) > 2 * MAX_COLUMNS:
             break
     return tuple(cells)

@@ -38,6 +38,14 @@ EXPECTED = [(0, 0.4, 0, H), (math.pi, 0, 0.3, math.radians(-37.3))]
         ("arm.m", "%  theta   d     a     alpha\ndhparams = [0  0.4  0  pi/2;\n  pi 0 0.3 -37.3*deg];\n"),
         ("arm.cpp", "// a alpha d theta\ndouble dh[2][4] = {{0, M_PI/2, 0.4, 0}, {0.3, -37.3*DEG, 0, M_PI}};"),
         ("arm.m", "dhparams = [0 pi/2 0.4 0\n 0.3 -37.3*deg 0 pi];\nsetFixedTransform(jnt1,dhparams(1,:),'dh');\n"),
+        ("arm.m", "j1 = rigidBodyJoint('j1','revolute');\nsetFixedTransform(j1,[0 pi/2 0.4 0],'dh');\n"
+         "j2 = rigidBodyJoint('j2', 'revolute');\nsetFixedTransform(j2, [0.3, -37.3*deg, 0, pi], \"dh\");\n"),
+        ("arm.m", "% DH = [theta d a alpha]\nDH = [q(1) 0.4 0 pi/2; q(2)+pi 0 0.3 -37.3*deg];\n"),
+        ("arm.m", "% columns are theta, d, a, alpha\nDH = [q1 0.4 0 pi/2; q2+pi 0 0.3 -37.3*deg];\n"),
+        ("arm.cpp", "// SI units: theta, d, a, alpha\nL = {{0, 0.4, 0, M_PI/2}, {M_PI, 0, 0.3, -37.3*deg}};\n"),
+        ("arm.py", "# a, alpha, d, theta (standard)\nT = [(0, pi/2, 0.4, q1), (0.3, -37.3*deg, 0, q2 + pi)]\n"),
+        ("arm.py", "def fk(q):\n    # theta, d, a, alpha\n    table = [[q[0], 0.4, 0, np.pi/2],\n"
+                   "             [self.q[1] + np.pi, 0, 0.3, np.deg2rad(-37.3)]]\n"),
         ("arm.json", '{"links": [{"a": 0, "alpha": "90 deg", "d": 0.4, "theta": 0, "limits": [-1, 1]},\n'
                      '{"a": 0.3, "alpha": "-37.3 deg", "d": 0, "theta": "pi"}]}'),
         ("arm.py", "table = [dict(theta=0, d=0.4, a=0, alpha=math.pi/2),\n    {'theta': np.pi, 'a': 0.3, 'd': None, "
@@ -62,6 +70,21 @@ EXPECTED = [(0, 0.4, 0, H), (math.pi, 0, 0.3, math.radians(-37.3))]
 def test_lists_matrices_and_records_are_read(file: str, text: str) -> None:
     found = numbers(imported(text, file, **STANDARD).spec)
     assert found == [pytest.approx(row, rel=1e-15) for row in EXPECTED]
+
+
+def test_matlabs_fixed_transforms_say_convention_and_types() -> None:
+    text = "t = rigidBodyJoint('t','revolute');\nsetFixedTransform(t,[0 0 0.4 0],'mdh');\n"
+    text += "s = rigidBodyJoint('s','prismatic');\nsetFixedTransform(s,[0.3 pi/2 0 pi],'mdh');\n"
+    found = imported(text, "arm.m")
+    assert (found.spec.convention, types(found.spec)) == (Convention.MODIFIED, "rp")
+    assert numbers(found.spec) == [(0, 0.4, 0, 0), (math.pi, 0, 0.3, H)]
+    assert any("setFixedTransform ignores theta" in note for note in found.notes)
+
+
+def test_constructors_of_a_toolbox_in_a_loop_are_no_records() -> None:
+    text = "links = []\nfor d, a, alpha in rows:\n    links.append(RevoluteDH(d=d, a=a, alpha=alpha))\n"
+    text += "arm = DHRobot(links)\n"
+    assert "not read: write them one after the other" in complaints(text, "arm.py")[0]
 
 
 def test_values_of_a_list_may_be_symbols_and_types_have_a_list_of_their_own() -> None:

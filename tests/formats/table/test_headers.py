@@ -60,6 +60,7 @@ def test_a_heading_is_known(text: str, quantity: Quantity | None, index: int | N
         ("d / m", Q.D, None, LengthUnit.M), ("θ (°)", Q.THETA, None, AngleUnit.DEG),
         ("a_i, mm", Q.A, 0, LengthUnit.MM),
         ("$\\alpha_{i-1}$ [rad]", Q.ALPHA, -1, AngleUnit.RAD), ("d_mm", Q.D, None, LengthUnit.MM),
+        ("Theta_i (Grad)", Q.THETA, 0, AngleUnit.DEG), ("alpha [grados]", Q.ALPHA, None, AngleUnit.DEG),
         ("theta in degrees", Q.THETA, None, AngleUnit.DEG), ("a (in mm)", Q.A, None, LengthUnit.MM),
         ("a [in]", Q.A, None, LengthUnit.IN), ("Link length (mm)", Q.A, None, LengthUnit.MM),
         ("α°", Q.ALPHA, None, AngleUnit.DEG),

@@ -81,6 +81,16 @@ def test_an_array_in_a_formula_and_rows_without_surroundings_are_read(text: str)
     assert numbers(imported(text, "arm.md").spec) == expected
 
 
+def test_a_cell_across_all_columns_is_no_row() -> None:
+    remark = "\\multicolumn{5}{l}{$^\\star$ variable}\n\\end{tabular}"
+    found = imported(TABULAR.replace("\\end{tabular}", remark), "arm.tex")
+    assert types(found.spec) == "rr"
+    assert "line 7 is one cell across all columns, and was not read: '*variable'" in found.notes
+    html = "<table><tr><th>theta<th>d (m)<th>a (m)<th>alpha (deg)<tr><td>q1<td>0.4<td>0<td>90"
+    html += "<tr><td colspan=4>all angles in degrees</table>"
+    assert types(imported(html, "arm.html", **STANDARD).spec) == "r"
+
+
 def test_a_wrong_cell_of_a_tabular_has_its_place() -> None:
     assert complaints(TABULAR.replace("0.333", "0.3.33"), "arm.tex") == [
         "arm.tex:5:17: row 1, d: '$0.3.33$' cannot be read: in '0.3 .33': unexpected '.33' after '0.3'"
