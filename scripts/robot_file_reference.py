@@ -105,8 +105,10 @@ assembly: {q: [70, -50, 110]}
 ```
 
 The frames of a branch are `rocker/dh_0`, `rocker/dh_1` …, `rocker/link_1` …; its joints are `rocker_joint_1` … unless
-they have names. Joint vectors hold the coordinates of the main chain, then those of the branches in their order.
-The axis of a closure is the z axis of both frames; what must coincide is in the table of `closures` below.
+they have names. `dh_i` is where row i of the table leads, in a standard table the far end of link i; `link_i` moves
+with it, and has its origin on the axis of joint i. Joint vectors hold the coordinates of the main chain, then those
+of the branches in their order. The axis of a closure is the z axis of both frames;
+[what must coincide](mechanisms.md#assembly) depends on its type.
 `assembly` is a guess from which the loops are closed, to 1e-12, when the robot is read; where there is none, `home`
 is. Where that fails, the error says which closure stays open, and by how much. With `actuated`, all other joints are
 passive: they have no actuator. [Mechanisms](mechanisms.md) says what is done with them.
