@@ -117,13 +117,26 @@ def require_plot(out: Path, *, what: str = "plotting") -> None:
     require_extra("plot", "matplotlib", what=what)
 
 
-def save(figure: Any, out: Path, *, dpi: float) -> None:
+def _without_formulas(figure: Any) -> None:
+    """Let dollar signs be dollar signs: names of robots, joints and files may have them, and may be a stranger's.
+
+    Texts of ticks, which matplotlib typesets, are made later.
+    """
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        if text.get_text():
+            text.set_parse_math(False)
+
+
+def save(figure: Any, out: Path, *, dpi: float, formulas: bool = False) -> None:
     """Write a figure, whole or not at all.
 
     Args:
         figure: ``matplotlib.figure.Figure``, drawn within ``plot_style``.
         out: .png, .svg or .pdf.
         dpi: pixels an inch, of .png.
+        formulas: Whether texts between dollar signs are formulas.
 
     Raises:
         OutputError: it cannot be written, or is too small for its labels.
@@ -134,8 +147,11 @@ def save(figure: Any, out: Path, *, dpi: float) -> None:
         ".png": {"Software": "dh2sim"},
     }
     ending = out.suffix.lower()
+    if not formulas:
+        _without_formulas(figure)
     with atomic_file(out) as draft, warnings.catch_warnings():
         warnings.filterwarnings("error", message="constrained_layout not applied")
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")  # of a name, which may be a stranger's
         try:
             figure.savefig(draft, dpi=dpi, format=ending[1:], metadata=dates[ending])
         except UserWarning as warning:

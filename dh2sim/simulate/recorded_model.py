@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from dh2sim.errors import Dh2simError, ModelError, RunError
 from dh2sim.formats.mjcf.compile import compile_text
+from dh2sim.formats.mjcf.includes import MAX_ELEMENTS
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import MjcfOptions
 from dh2sim.messages import shown
@@ -116,6 +117,9 @@ def _problems(text: str, *, included: str) -> Iterator[str]:
         root = ET.fromstring(text)
     except ET.ParseError as error:
         yield f"is not XML: {error}"
+        return
+    if sum(1 for _ in root.iter()) > MAX_ELEMENTS:
+        yield f"has more than {MAX_ELEMENTS} elements"
         return
     for element in root.iter():
         if element.tag not in _ELEMENTS:

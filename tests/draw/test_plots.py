@@ -279,3 +279,11 @@ def test_an_axis_of_what_hardly_changes_does_not_show_noise() -> None:
     low, high = value_range(0.5 + 1e-5 * np.arange(3))
     assert high - low < 3e-5, "what does change fills the axis"
     assert value_range(np.array([np.nan])) == value_range(np.zeros(1))
+
+
+def test_names_are_no_formulas(tmp_path: Path) -> None:
+    run = swinging(without=("ctrl", "torque")).assign_attrs(robot="$\\bad{$ \x1b")
+    strange = run.assign_coords(joint=[f"$\\frac{{{name}$" for name in run["joint"].values])
+    for kind in ("joints", "tool", "tracking"):
+        write_plot(tmp_path / f"{kind}.svg", rollout(strange, 1), kind)
+        assert (tmp_path / f"{kind}.svg").stat().st_size > 1000

@@ -96,7 +96,7 @@ class RobotDrawing:
             return
         require_extra("plot", "matplotlib", what=f"a drawing as {kind.value.upper()}")
         with plot_style():
-            save(_figure(self.sheet), file, dpi=_DPI)
+            save(_figure(self.sheet), file, dpi=_DPI, formulas=True)
 
     def _repr_svg_(self) -> str:
         return self.svg

@@ -96,7 +96,7 @@ class Paper:
         self.axes.set_xlim(left - border, right + border)
         self.axes.set_ylim(bottom - border, top + border)
         self.figure.set_size_inches((right - left + 2 * border) / 72, (top - bottom + 2 * border) / 72)
-        save(self.figure, out, dpi=_DPI)
+        save(self.figure, out, dpi=_DPI, formulas=True)
 
     def _remember(self, points: Array) -> None:
         for start, end in itertools.pairwise(points):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import os
 import stat
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -22,13 +23,16 @@ from dh2sim.messages import closest, listed
 from dh2sim.robot.row import ActuatorType
 from dh2sim.simulate.controllers.reference import read_reference
 from dh2sim.simulate.dataset_layout import FORMAT
+from dh2sim.simulate.store.codec import chunk_problem
 from dh2sim.simulate.store.local import LocalStore
-from dh2sim.simulate.store.manifest import METADATA, check_array, read_node
+from dh2sim.simulate.store.manifest import METADATA, ForeignArray, check_array, read_node
 from dh2sim.typing import Array, read_only
 
 MOST_LABELS = 10_000
 """Joints or actuators of a run that is replayed."""
 MOST_INSTANTS = 10**8
+_HEAD = 32
+"""Bytes of a chunk that say how large it becomes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -150,10 +154,10 @@ def read_run(path: Path, file: str, kind: str) -> Recording:
         if not (path / variable).is_dir():
             what = "positions" if positions else "controls"
             raise ControllerError(f"'{file}' has recorded no {what}; run it again with '{variable}' in record")
-        check_array(store, variable)
-        for array, most in ((labels, MOST_LABELS), ("joint", MOST_LABELS), (instants, MOST_INSTANTS)):
-            check_array(store, array, most=most)
-        _plain_files(path, "joint")
+        limits = {variable: None, labels: MOST_LABELS, "joint": MOST_LABELS, instants: MOST_INSTANTS}
+        arrays = {name: check_array(store, name, most=most) for name, most in limits.items()}
+        for name, array in arrays.items():
+            _check_chunks(path, name, array)
         digest = _digest(path, (variable, labels, instants))
         # without consolidated metadata, so that arrays are what was checked
         run: Any = zarr.open_group(path, mode="r", zarr_format=3, use_consolidated=False)
@@ -200,6 +204,20 @@ def _actuation(names: tuple[str, ...], joints: int) -> ActuatorType | None:
 def _some_of_run(variable: Any, file: str, rollouts: range) -> Array:
     with _readable(file):
         return np.asarray(variable[rollouts.start : rollouts.stop], dtype=np.float64)
+
+
+def _check_chunks(path: Path, name: str, array: ForeignArray) -> None:
+    """Refuse chunks that take more memory than their array says."""
+    for file in _plain_files(path, name):
+        if file.name == METADATA:
+            continue
+        with open_plain_file(file) as stream:
+            problem = "it is larger than a chunk"
+            if os.fstat(stream.fileno()).st_size <= array.largest_file:
+                head = stream.peek(_HEAD)[:_HEAD]
+                problem = chunk_problem(head, stream, array.codecs, array.largest_file) or ""
+        if problem:
+            raise ControllerError(f"'{file}' cannot be read: {problem}")
 
 
 def _digest(path: Path, arrays: tuple[str, ...]) -> str:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import struct
-from typing import Any, Final
+import zlib
+from collections.abc import Sequence
+from typing import Any, BinaryIO, Final
 
 import google_crc32c
 import numpy as np
@@ -23,6 +26,65 @@ ITEM_SIZES: Final = {"int8": 1, "int32": 4, "int64": 8, "float32": 4, "float64":
 """Bytes of an item of every type that arrays of a run have; of text those that lengths take, twice."""
 READABLE_CODECS: Final = frozenset(("bytes", "blosc", "zstd", "gzip", "crc32c", "vlen-utf8"))
 """Codecs of arrays that others may have written, such as xarray; none of them executes anything."""
+
+
+_COMPRESSORS: Final = frozenset(("blosc", "zstd", "gzip"))
+MOST_TEXT: Final = 2**24
+"""Bytes of the texts in a chunk."""
+
+
+def largest_chunk_file(chunk: Sequence[int], kind: str) -> int:
+    """Return the bytes that a chunk's file may have: what cannot be compressed becomes a little larger."""
+    size = MOST_TEXT if kind == "string" else math.prod(chunk) * ITEM_SIZES[kind]
+    return size + size // 64 + 2**12
+
+
+def chunk_problem(head: bytes, rest: BinaryIO, codecs: Sequence[str], most: int) -> str | None:
+    """Return why a chunk that somebody else wrote is not given to its codecs, or None.
+
+    Args:
+        head: The first bytes of its file, 18 or more if it has them.
+        rest: Reads the file from its beginning.
+        codecs: Names of its codecs, in the order in which they were applied.
+        most: Bytes that it may have once it is decompressed.
+    """
+    compressors = [name for name in codecs if name in _COMPRESSORS]
+    if len(compressors) > 1:
+        return "it is compressed more than once"
+    match compressors:
+        case ["blosc"]:
+            size: int | None = int.from_bytes(head[4:8], "little")
+        case ["zstd"]:
+            size = _zstd_size(head)
+        case ["gzip"]:
+            size = _gzip_size(rest, most)
+        case _:
+            size = 0
+    return "it becomes larger than a chunk" if size is None or size > most else None
+
+
+def _zstd_size(head: bytes) -> int | None:
+    """Return the size that a frame of Zstandard says it has (RFC 8878, section 3.1.1); None if it does not say."""
+    if head[:4] != b"\x28\xb5\x2f\xfd" or len(head) < 5:
+        return None
+    kind, single, dictionary = head[4] >> 6, head[4] >> 5 & 1, (0, 1, 2, 4)[head[4] & 3]
+    length = (single, 2, 4, 8)[kind]
+    begin = 5 + (1 - single) + dictionary
+    found = head[begin : begin + length]
+    return int.from_bytes(found, "little") + 256 * (kind == 1) if found else None
+
+
+def _gzip_size(file: BinaryIO, most: int) -> int | None:
+    """Return the size of what is compressed with gzip; None if it is more than ``most`` bytes, or damaged."""
+    total, stream = 0, zlib.decompressobj(31)
+    try:
+        while data := stream.unconsumed_tail or file.read(2**16):
+            total += len(stream.decompress(data, 2**20))
+            if total > most or stream.unused_data:
+                return None
+    except zlib.error:
+        return None
+    return total
 
 
 def is_known(kind: str, codecs: object) -> bool:

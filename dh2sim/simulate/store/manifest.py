@@ -23,7 +23,7 @@ from dh2sim.errors import RunDamagedError, RunError
 from dh2sim.messages import listed, shown
 from dh2sim.simulate.dataset_layout import FORMAT as LAYOUT_FORMAT
 from dh2sim.simulate.options import MOST_ROLLOUTS, MOST_STEPS
-from dh2sim.simulate.store.codec import ITEM_SIZES, LARGEST_CHUNK, READABLE_CODECS, is_known
+from dh2sim.simulate.store.codec import ITEM_SIZES, LARGEST_CHUNK, READABLE_CODECS, is_known, largest_chunk_file
 from dh2sim.simulate.store.storage import Store
 
 FORMAT: Final = 2
@@ -79,6 +79,11 @@ class StoredArray:
     def empty(self) -> bool:
         """Whether it has no elements, and so no chunks."""
         return 0 in self.shape
+
+    @property
+    def largest_file(self) -> int:
+        """Bytes that the file of a chunk may have."""
+        return largest_chunk_file(self.chunk, self.dtype)
 
     def chunk_name(self, block: int) -> str:
         """Return the name of the file with a block's elements."""
@@ -321,8 +326,19 @@ def _shape_problem(node: Any) -> str | None:
     return None
 
 
-def check_array(store: Store, name: str, *, most: int | None = None) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForeignArray:
+    """How an array that dh2sim or xarray wrote is stored."""
+
+    codecs: tuple[str, ...]
+    largest_file: int
+    """Bytes that the file of a chunk may have."""
+
+
+def check_array(store: Store, name: str, *, most: int | None = None) -> ForeignArray:
     """Check an array that dh2sim or xarray wrote, before zarr opens it; its numbers are read by the slice.
+
+    Its chunks are to be checked, too.
 
     Args:
         store: Of the run.
@@ -341,8 +357,10 @@ def check_array(store: Store, name: str, *, most: int | None = None) -> None:
             problem = "its codecs are not among those that are read"
         elif most is not None and math.prod(node["shape"]) > most:
             problem = "it is too large"
-    if problem is not None:
+    if problem is not None or node is None:
         raise RunError(f"'{store.file(name)}' cannot be read: {problem}")
+    chunk, kind = node["chunk_grid"]["configuration"]["chunk_shape"], node["data_type"]
+    return ForeignArray(codecs=tuple(map(str, names)), largest_file=largest_chunk_file(chunk, kind))
 
 
 def _whole_numbers(value: Any, least: int) -> bool:

@@ -17,6 +17,7 @@ from dh2sim.simulate.store.codec import CHECKSUM_BYTES, ITEM_SIZES, decode_text,
 from dh2sim.simulate.store.manifest import (
     BLOCKS,
     METADATA,
+    MOST_METADATA,
     RECORD,
     BlockRecord,
     Manifest,
@@ -147,15 +148,18 @@ class StoredRun:
     def check_chunks(self) -> None:
         """Check that no chunk of a committed block is missing, without opening any; zarr would read it as blank.
 
+        None is larger than a chunk can be, either: zarr reads files whole.
+
         Raises:
-            RunDamagedError: A chunk or a folder is missing.
+            RunDamagedError: A chunk or a folder is missing, or too large.
         """
         with reading(self.store.name):
             blocks = self.recorded_blocks()
             for name, variable in self.manifest.variables.items():
                 files = self.store.list(name)
                 missing = any(variable.chunk_name(block) not in files for block in blocks)
-                if (missing and not variable.empty) or -1 in files.values():
+                strange = any(not 0 <= size <= max(variable.largest_file, MOST_METADATA) for size in files.values())
+                if (missing and not variable.empty) or strange:
                     raise RunDamagedError(damaged_run(self.store.name))
 
     def recorded_blocks(self) -> list[int]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import copy
+import gzip
 import hashlib
+import io
 import json
 import os
 import pickle
@@ -15,10 +17,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from numcodecs.blosc import Blosc  # type: ignore[import-untyped]
+from numcodecs.zstd import Zstd  # type: ignore[import-untyped]
 
-from dh2sim.errors import PictureError, RunError
+from dh2sim.errors import ControllerError, PictureError, RunError
+from dh2sim.simulate.controllers.recording import read_recording
 from dh2sim.simulate.description import describe
-from dh2sim.simulate.store.codec import decode_text, encode_text
+from dh2sim.simulate.store.codec import chunk_problem, decode_text, encode_text
 from dh2sim.simulate.store.reader import open_dataset
 from tests.program import dh2sim
 from tests.simulate.store.runs import layout, make
@@ -160,6 +165,43 @@ def test_metadata_of_very_many_values_are_refused_before_they_take_memory(tmp_pa
     (path / "zarr.json").write_text('{"attributes": [' + ",".join(["[]"] * 2_000_000) + "]}")
     with pytest.raises(RunError, match=r"zarr\.json' has more than 2000000 values$"):
         describe(path)
+
+
+def test_a_chunk_that_is_larger_than_it_can_be_is_not_read(tmp_path: Path) -> None:
+    path = make(tmp_path / "run.zarr", SMALL)
+    chunk = next((path / "qpos").glob("c.*"))
+    with chunk.open("r+b") as stream:
+        stream.truncate(50 * 10**9)  # with holes, which take no room
+    for read in (describe, lambda path: open_dataset(path).load()):
+        with pytest.raises(RunError, match=r"run\.zarr' is damaged"):
+            read(path)
+    with pytest.raises(ControllerError, match=r"qpos/c.*cannot be read: it is larger than a chunk"):
+        read_recording(str(path), "reference")
+
+
+@pytest.mark.parametrize(
+    ("codec", "encode"),
+    [
+        ("gzip", gzip.compress),
+        ("gzip", lambda data: gzip.compress(data[: len(data) // 2]) * 2),
+        ("zstd", Zstd().encode),
+        ("blosc", Blosc().encode),
+    ],
+    ids=["gzip", "gzip twice", "zstd", "blosc"],
+)
+def test_a_chunk_that_would_become_larger_than_it_can_be_is_not_decompressed(
+    codec: str, encode: Callable[[bytes], bytes]
+) -> None:
+    def problem(data: bytes, most: int, *more: str) -> str | None:
+        return chunk_problem(data[:32], io.BytesIO(data), ["bytes", codec, *more, "crc32c"], most)
+
+    for size in (1_000_000, 1000, 300, 256, 200):
+        data = encode(bytes(size))
+        assert problem(data, size - 1) == "it becomes larger than a chunk"
+        if data.count(b"\x1f\x8b\x08") < 2:  # zarr writes one stream
+            assert problem(data, size) is None
+    assert problem(encode(bytes(1000)), 1000, "zstd", "gzip") == "it is compressed more than once"
+    assert problem(b"", 1000) in (None, "it becomes larger than a chunk")
 
 
 def test_a_pickle_in_metadata_of_the_old_format_is_never_executed(tmp_path: Path) -> None:
