@@ -19,6 +19,7 @@ from dh2sim.simulate.plant import Plant
 from dh2sim.simulate.randomization import Draws
 from dh2sim.simulate.randomized_models import apply_draws, motors
 from dh2sim.simulate.records import Recorder
+from dh2sim.simulate.turns import Turns
 from dh2sim.typing import Array
 
 BASE = 6
@@ -284,9 +285,18 @@ class MonitoredBatch:
     """Simulations that run together; one that MuJoCo warns of or fails on stops alone."""
 
     def __init__(
-        self, plant: Plant, batch: Batch, recorder: Recorder, steps: int, effort: Array | None = None
+        self, plant: Plant, batch: Batch, recorder: Recorder, steps: int, turns: Turns, effort: Array | None = None
     ) -> None:
-        """Take over a batch at its start; ``effort`` has factors of actuators' limits, shape (batch, actuators)."""
+        """Take over a batch at its start.
+
+        Args:
+            plant: The robot.
+            batch: Simulations of it.
+            recorder: Takes what is recorded.
+            steps: Time steps of the run.
+            turns: Those of the threads that simulate such batches.
+            effort: Factors of actuators' limits, shape (batch, actuators).
+        """
         self.plant = plant
         self._lower, self._upper = plant.control_lower, plant.control_upper
         if effort is not None:
@@ -296,6 +306,7 @@ class MonitoredBatch:
         self.batch = batch
         self.recorder = recorder
         self.steps = steps
+        self._turns = turns
         self.alive: NDArray[np.bool_] = np.ones(batch.nsim, dtype=bool)
         self.ids: NDArray[np.int32] | None = None
         """The simulations that still run, or None if all do."""
@@ -334,7 +345,7 @@ class MonitoredBatch:
         if wanted.ndim > lower.ndim > 1:
             lower, upper = lower[:, None], upper[:, None]
         outside = (wanted < lower) | (wanted > upper)
-        if not outside.any():
+        if not np.count_nonzero(outside):
             return wanted, None
         return np.clip(wanted, lower, upper), outside
 
@@ -359,10 +370,11 @@ class MonitoredBatch:
         """Call a method of the batch and return the simulations that MuJoCo warned of or failed on."""
         raised = self._none
         try:
-            function(*args, **kwargs)
+            with self._turns:
+                function(*args, **kwargs)
         except SimulationError as error:
             raised = error.ids
-        if not len(raised) and not self.batch.warning.any():
+        if not len(raised) and not np.count_nonzero(self.batch.warning):
             return self._none
         failed = self.batch.warning[:, :, 1].any(axis=1)
         failed[raised] = True
@@ -380,8 +392,13 @@ class MonitoredBatch:
             self.gaps[simulations, k] = np.fmax(self.gaps[simulations, k], now)
 
     def put_back(self, simulations: NDArray[np.intp], before: Array) -> None:
-        """Give simulations the states they had, of which ``before`` has those of all, and no warnings."""
-        self.batch.state[simulations] = before[simulations]
+        """Give simulations the states they had, of which ``before`` has those of all, and no warnings.
+
+        Args:
+            simulations: Which of them.
+            before: Rows of states or their beginnings, shape (batch, …).
+        """
+        self.batch.state[simulations, : before.shape[1]] = before[simulations]
         self.batch.warning[simulations] = 0
 
     def look(self, step: int, simulations: NDArray[np.intp] | None = None) -> None:

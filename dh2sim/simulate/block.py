@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,13 +40,16 @@ from dh2sim.simulate.plant import Plant, batch_plant
 from dh2sim.simulate.randomization import Draws, Generators, Purpose, draw, push_time
 from dh2sim.simulate.randomized_models import apply_draws
 from dh2sim.simulate.records import Recorder
+from dh2sim.simulate.turns import Turns
 from dh2sim.simulate.warp_batch import TOLERANCE, WarpBatch
 from dh2sim.typing import Array, read_only
 
 BATCH_SIZE = 128
-"""Rollouts that are simulated together: enough that Python's share of the time is small, and few enough that what a
-closed loop keeps of each between its steps stays in the processor's caches, those of addresses among them: MjData
-takes some ten pages, and twice as many rollouts took a third longer a step where other programs ran."""
+"""Most rollouts that are simulated together: enough that Python's share of the time is small, and few enough that
+what a closed loop keeps of each between its steps stays in the processor's caches, those of addresses among them:
+MjData takes some ten pages, and twice as many rollouts took a third longer a step where other programs ran."""
+LEAST_SIZE = 32
+"""Fewest for which a thread of their own is worth while."""
 REFERENCE_STEPS = 512
 """Time steps of references computed at a time."""
 
@@ -85,16 +90,29 @@ def simulate_block(job: Job, rollouts: range, *, threads: int = 0, advance: Adva
     arrays = _empty(job, rollouts)
     made: dict[int, DesignPlant] = {}
     threads = whole_number("threads", threads) or available_processors()
-    with quiet_engine():
-        size = len(rollouts) if job.options.engine == WARP else BATCH_SIZE  # a device is to be filled
-        for first in range(rollouts.start, rollouts.stop, size):
-            part = range(first, min(first + size, rollouts.stop))
-            rows = slice(part.start - rollouts.start, part.stop - rollouts.start)
-            own = {name: array[rows] for name, array in arrays.items()}
-            _simulate(job, part, threads, own, job.options.steps, made)
+    parts = [rollouts] if job.options.engine == WARP else _divided(rollouts, threads)  # a device is to be filled
+    workers = max(1, min(threads, len(parts)))
+    turns = Turns(workers)
+
+    def simulate(part: range) -> None:
+        rows = slice(part.start - rollouts.start, part.stop - rollouts.start)
+        own = {name: array[rows] for name, array in arrays.items()}
+        _simulate(job, part, threads // workers, own, job.options.steps, made, turns)
+
+    with quiet_engine(), closing(turns.run([partial(simulate, part) for part in parts])) as done:
+        for part, _ in zip(parts, done, strict=True):
             if advance is not None:
                 advance(len(part))
     return arrays
+
+
+def _divided(rollouts: range, threads: int) -> list[range]:
+    """Return the rollouts that are simulated together: as many groups as all threads can take turns with."""
+    total = len(rollouts)
+    count = max(-(-total // BATCH_SIZE), min(threads, total // LEAST_SIZE))
+    workers = min(threads, count) or 1
+    count = min(-(-count // workers) * workers, total)
+    return [rollouts[total * k // count : total * (k + 1) // count] for k in range(count)]
 
 
 def rehearse(job: Job) -> None:
@@ -118,7 +136,7 @@ def rehearse(job: Job) -> None:
 def _first_positions(short: Job, first: range, run_steps: int) -> Array:
     """Return positions after a step, shape (rollouts, n); NaN for rollouts whose links touch in it."""
     arrays = {**_empty(short, first), "qpos": np.empty((len(first), 2, short.plant.n))}
-    _simulate(short, first, 1, arrays, run_steps, {})
+    _simulate(short, first, 1, arrays, run_steps, {}, Turns(1))
     return np.where((arrays["contact_step"] == 0)[:, None], np.nan, arrays["qpos"][:, 1])
 
 
@@ -142,14 +160,20 @@ def _empty(job: Job, rollouts: range) -> dict[str, NDArray[Any]]:
 
 
 def _simulate(
-    job: Job, rollouts: range, threads: int, arrays: Block, run_steps: int, made: dict[int, DesignPlant]
+    job: Job,
+    rollouts: range,
+    threads: int,
+    arrays: Block,
+    run_steps: int,
+    made: dict[int, DesignPlant],
+    turns: Turns,
 ) -> None:
     """Simulate some rollouts into their part of the block's arrays, in one batch, or one for each layout of models.
 
     The controller is made for ``run_steps`` time steps; ``made`` has designs that were made before.
     """
     if job.designs is None:
-        _simulate_batch(job, job.plant, None, rollouts, threads, arrays, run_steps)
+        _simulate_batch(job, job.plant, None, rollouts, threads, arrays, run_steps, turns)
         return
     designs = job.designs.of(rollouts, made)
     _note_designs(job.designs, designs, rollouts, arrays)
@@ -160,7 +184,7 @@ def _simulate(
         which: Sequence[int] = rollouts if whole else [rollouts[position] for position in group]
         start = read_only([design.start for design in own])
         plant = batch_plant([design.plant for design in own])
-        _simulate_batch(job, plant, start, which, threads, parts, run_steps)
+        _simulate_batch(job, plant, start, which, threads, parts, run_steps, turns)
         if not whole:
             for name, array in arrays.items():
                 array[group] = parts[name]
@@ -186,6 +210,7 @@ def _simulate_batch(
     threads: int,
     arrays: Block,
     run_steps: int,
+    turns: Turns,
 ) -> None:
     """Simulate rollouts in one batch; ``start`` has the named configuration of each where they have designs."""
     options, name = job.options, job.controller.name
@@ -221,7 +246,7 @@ def _simulate_batch(
         apply_draws(batch, plant, drawn)
     batch.bind("qpos")[:] = qpos0
     batch.bind("qvel")[:] = qvel0
-    monitored = MonitoredBatch(plant, batch, recorder, options.steps, drawn.get("effort_scale"))
+    monitored = MonitoredBatch(plant, batch, recorder, options.steps, turns, drawn.get("effort_scale"))
     pushes = None
     if "push_force" in drawn:
         times = [push_time(options, name) for name in ("push_interval", "push_duration")]

@@ -179,7 +179,7 @@ class Pushes:
         self._interval, self._duration = interval, duration
         tool = plant.model.site("tool0").id
         self._body = int(plant.model.site_bodyid[tool])
-        self._applied = batch.bind("xfrc_applied")
+        self._applied, self._wrench = batch.bind("xfrc_applied"), np.zeros((batch.nsim, 6))
         self._tool, self._com = batch.bind("site_xpos"), batch.bind("xipos")
         self._tool_id = tool
 
@@ -196,5 +196,9 @@ class Pushes:
         for k in range(start.shape[1]):  # one by one: the same order of additions for any batch
             force += np.where(on[:, k, None], self._force[:, these][:, k], 0.0)
         arm = self._tool[:, self._tool_id] - self._com[:, self._body]
-        self._applied[:, self._body, :3] = force
-        self._applied[:, self._body, 3:] = np.cross(arm, force)
+        self._wrench = np.hstack([force, np.cross(arm, force)])
+        self._applied[:, self._body] = self._wrench
+
+    def apply_again(self, simulations: NDArray[np.intp]) -> None:
+        """Apply the forces of the same time step to simulations that are put back to its beginning."""
+        self._applied[simulations, self._body] = self._wrench[simulations]

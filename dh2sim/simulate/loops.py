@@ -233,6 +233,10 @@ class Applied(Protocol):
         """Act in a time step."""
         ...
 
+    def apply_again(self, simulations: NDArray[np.intp]) -> None:
+        """Act on some simulations that are put back, as before."""
+        ...
+
 
 PAGE_STEPS = 64
 """Time steps that are kept before they are recorded together."""
@@ -267,12 +271,12 @@ def simulate_closed_loop(
     derived = {field: batch.bind(field) for field in recorder.derived_fields}
     contacts, qpos = batch.bind("ncon"), batch.bind("qpos")
     sensors = batch.bind("sensordata") if monitored.plant.gaps else None
-    pages, before = _Pages(monitored), np.empty_like(batch.state)
+    pages = _Pages(monitored)
     monitored.look(0)
     for step in range(monitored.steps):
         if not monitored.running:
             break
-        if contacts.any():
+        if np.count_nonzero(contacts):
             rows = monitored.rows
             monitored.contacts.see(np.flatnonzero(monitored.alive), step, contacts[rows], qpos[rows])
         if sensors is not None:
@@ -283,12 +287,15 @@ def simulate_closed_loop(
         wanted = control_of(controller, observation, controls.shape, name)
         if pushes is not None:
             pushes.apply(step)
-        controls[:], outside = monitored.clipped(wanted)
-        np.copyto(before, batch.state)
+        given, outside = monitored.clipped(wanted)
+        controls[:] = given
         # step and look at once: what is kept of a simulation is in the processor's cache then
         failed = in_step = monitored.call(batch.step, monitored.ids, stage=VELOCITY_STAGE)
         if len(failed):  # again, one after the other, to tell which of them fails
-            monitored.put_back(failed, before)
+            monitored.put_back(failed, pages.before)
+            controls[failed] = given[failed]
+            if pushes is not None:
+                pushes.apply_again(failed)
             in_step = monitored.call(batch.step, failed.astype(np.int32))
         for field in ("qacc", "sensordata"):
             if field in derived:
@@ -319,32 +326,40 @@ class _Pages:
         starts = [mujoco.mj_stateSize(model, int(part) - 1) for part in parts]
         ends = [start + mujoco.mj_stateSize(model, int(part)) for start, part in zip(starts, parts, strict=True)]
         self._qpos, self._qvel, self._ctrl = map(slice, starts, ends)
-        self._rows = np.empty((monitored.batch.nsim, PAGE_STEPS, ends[-1]))
-        """Beginnings of the rows of states after each step, with the controls of that step."""
+        self._rows = np.empty((1 + PAGE_STEPS, monitored.batch.nsim, ends[-1]))
+        """Beginnings of the rows of states: before the page, and after each step with the controls of that step."""
+        self._rows[0] = self._state[:, : ends[-1]]
         self._kept: dict[tuple[str, tuple[str, ...]], NDArray[Any]] = {}
         self._first = self._count = 0
+
+    @property
+    def before(self) -> Array:
+        """All of the states before the current step that a step changes, as the beginnings of their rows."""
+        before: Array = self._rows[self._count]
+        return before
 
     def note(self, field: str, values: NDArray[Any], variables: tuple[str, ...]) -> None:
         """Keep a copy of a field in the current step, shape (batch, …), for some variables."""
         key = field, variables
         if key not in self._kept:
-            self._kept[key] = np.empty((len(values), PAGE_STEPS, *values.shape[1:]), values.dtype)
-        self._kept[key][:, self._count] = values
+            self._kept[key] = np.empty((PAGE_STEPS, *values.shape), values.dtype)
+        self._kept[key][self._count] = values
 
     def turn(self) -> None:
         """Keep states and controls after a step, and proceed to the next one."""
-        self._rows[:, self._count] = self._state[:, : self._rows.shape[2]]
         self._count += 1
+        self._rows[self._count] = self._state[:, : self._rows.shape[2]]
         if self._count == PAGE_STEPS:
             self.flush()
 
     def flush(self) -> None:
         """Record what was kept."""
-        rows, recorder = self._rows[:, : self._count], self._recorder
+        rows, recorder = self._rows[1 : 1 + self._count].swapaxes(0, 1), self._recorder
         recorder.put("ctrl", self._first, rows[..., self._ctrl])
         recorder.put_field("qpos", self._first + 1, rows[..., self._qpos])
         recorder.put_field("qvel", self._first + 1, rows[..., self._qvel])
         for (field, variables), values in self._kept.items():
-            recorder.put_field(field, self._first, values[:, : self._count], only=variables)
+            recorder.put_field(field, self._first, values[: self._count].swapaxes(0, 1), only=variables)
+        self._rows[0] = self._rows[self._count]
         self._first += self._count
         self._count = 0

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 import xarray as xr
+from mujoco.batch import Batch
 
 from dh2sim import Continuous, Prismatic, Revolute, Robot
 from dh2sim.errors import ControllerError, SettingsError
@@ -19,6 +20,9 @@ from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.row import ActuatorSpec, ActuatorType
 from dh2sim.simulate import rollout
+from dh2sim.simulate.disturbances import Pushes
+from dh2sim.simulate.options import RolloutOptions
+from dh2sim.simulate.prepare import prepare
 from dh2sim.simulate.quantities import QUANTITIES, distribution_of
 from dh2sim.typing import Array
 from tests.simulate import robots
@@ -244,6 +248,23 @@ def test_pushes_come_at_intervals_at_the_tool() -> None:
             mujoco.mj_step(model, data)
             np.testing.assert_allclose(run.qpos.values[i, step + 1], data.qpos, rtol=0, atol=1e-9)
         assert pushed in range(3, 7)
+
+
+def test_a_simulation_that_is_put_back_is_pushed_as_before() -> None:
+    plant = prepare(odd(), RolloutOptions(rollouts=3)).plant
+    batch = Batch(plant.model, 3, 1)
+    drawn = {"push_force": np.arange(9.0).reshape(3, 1, 3), "push_start": np.zeros((3, 1))}
+    pushes, forces = Pushes(plant, batch, drawn, 1.0, 1.0), batch.bind("xfrc_applied")
+    batch.bind("qpos")[:] = [[0.1], [0.2], [0.3]]
+    batch.forward()
+    pushes.apply(0)
+    before = forces.copy()
+    assert len(np.unique(before)) > 9, "forces and moments of each"
+    batch.bind("qpos")[:] = 0.0
+    batch.forward()
+    forces[1:] = 0.0
+    pushes.apply_again(np.array([1, 2]))
+    np.testing.assert_array_equal(forces, before)
 
 
 def test_draws_do_not_depend_on_what_else_is_drawn_nor_on_how_rollouts_are_divided() -> None:

@@ -53,11 +53,13 @@ def assert_same(
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
-def test_any_number_of_threads_gives_the_same_bits(controller: str) -> None:
+def test_any_number_of_threads_gives_the_same_bits(controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
     made = job(controller)
     alone = simulated(made, range(ROLLOUTS))
-    for threads in (0, 2, 5, 999):
-        assert_same(simulated(made, range(ROLLOUTS), threads), alone)
+    for least in (block.LEAST_SIZE, 1):  # of one group, or of several at the same time
+        monkeypatch.setattr(block, "LEAST_SIZE", least)
+        for threads in (0, 2, 5, 999):
+            assert_same(simulated(made, range(ROLLOUTS), threads), alone)
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
@@ -84,6 +86,7 @@ def test_groups_of_any_size_give_the_same_bits(controller: str, monkeypatch: pyt
     for size in (1, 2, 4):
         monkeypatch.setattr(block, "BATCH_SIZE", size)
         assert_same(simulated(made, range(ROLLOUTS)), together)
+        assert_same(simulated(made, range(ROLLOUTS), threads=3), together)
 
 
 @pytest.mark.parametrize("every", [1, 5])

@@ -353,27 +353,29 @@ class SmoothReference:
             )
         self._period = period
         self._motions = math.floor(batch.steps * plant.timestep / period) + 1
-        self._lower, self._upper = widened(batch)
+        lower, upper = widened(batch)
         reach = INSIDE * amplitude * half_ranges(plant.lower, plant.upper, plant.free_half_ranges)
         center = centers(batch.q0, reach, plant.lower, plant.upper)
         targets = center + reach * uniform(batch.generators, self._motions, plant.n)
         # no joint exceeds its velocity limit, even where a start outside the limits makes the way longer
         most = INSIDE * plant.velocity * period / MINIMUM_JERK_PEAK
-        self._waypoints = _reachable(batch, targets, center, reach, most)
+        # rollouts next to each other, as in what is observed of them
+        self._waypoints = np.ascontiguousarray(_reachable(batch, targets, center, reach, most).transpose(0, 2, 1))
+        self._lower, self._upper = np.ascontiguousarray(lower.T), np.ascontiguousarray(upper.T)
         self.at = StepByStep(self.motion)
 
     def motion(self, first: int, count: int) -> Motion:
         """Return the motion at the beginning of time steps ``first`` to ``first + count - 1``."""
         piece, s = pieces(first, count, self._timestep, self._period, self._motions)
-        position, speed, acceleration = minimum_jerk(s)
+        position, speed, acceleration = (factor[:, None, None] for factor in minimum_jerk(s))
         speed, acceleration = speed / self._period, acceleration / (self._period * self._period)
-        weights = np.stack((1.0 - position, position))
-        # rollouts next to each other, as in what is observed of them
-        _, batch, n = self._waypoints.shape
-        q, v, a = np.empty((3, count, n, batch)).transpose(0, 3, 1, 2)
+        q, v, a = np.empty((3, count, *self._lower.shape))
         for i, part in runs_of(piece):
             start, end = self._waypoints[i], self._waypoints[i + 1]
-            weighted_sum(weights[:, part], [start, end], q[:, part])
-            weighted_sum(speed[None, part], [end - start], v[:, part])
-            weighted_sum(acceleration[None, part], [end - start], a[:, part])
-        return Motion(q=np.clip(q, self._lower[:, None], self._upper[:, None], out=q), v=v, a=a)
+            np.multiply(1.0 - position[part], start, out=q[part])
+            q[part] += position[part] * end
+            np.multiply(speed[part], end - start, out=v[part])
+            np.multiply(acceleration[part], end - start, out=a[part])
+        np.clip(q, self._lower, self._upper, out=q)
+        q, v, a = (array.transpose(2, 0, 1) for array in (q, v, a))
+        return Motion(q=q, v=v, a=a)
