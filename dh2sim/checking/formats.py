@@ -122,8 +122,8 @@ def _count(robot: RobotCheck) -> str:
 
 
 def _cell(text: str) -> str:
-    """Return a text that stays in its cell, and in its code span."""
-    return printable(text).replace("|", "\\|").replace("`", "'")
+    """Return a text that stays in its line, in its cell, and in its code span."""
+    return printable(text).replace("\n", "\\n").replace("|", "\\|").replace("`", "'")
 
 
 def _prose(text: str) -> str:

@@ -101,6 +101,13 @@ def test_markdown_is_a_table_that_names_cannot_break() -> None:
     assert "\\[31m\\| \\`\\_\\*" in lines[-1]
 
 
+def test_a_line_end_in_a_file_name_ends_no_line_of_markdown() -> None:
+    report = report_of(replace(WRONG, file="robots/a\n# b.yaml"))
+    lines = report_text(report, ReportFormat.MARKDOWN).splitlines()
+    assert not any(line.startswith("# b") for line in lines)
+    assert sum("robots/a\\n# b.yaml" in line for line in lines) >= 1
+
+
 def test_json_lists_robots_with_their_findings() -> None:
     data = json.loads(report_text(report_of(WRONG), ReportFormat.JSON))
     assert (data["ok"], data["passed"], data["failed"]) == (False, 1, 1)
