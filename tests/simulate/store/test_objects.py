@@ -61,8 +61,8 @@ def _bucket(server: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AWS_ENDPOINT_URL", server)
     client = boto3.client("s3", endpoint_url=server, region_name="us-east-1")
     if "rollouts" in [bucket["Name"] for bucket in client.list_buckets()["Buckets"]]:
-        for each in client.list_objects_v2(Bucket="rollouts").get("Contents", []):
-            client.delete_object(Bucket="rollouts", Key=each["Key"])
+        if listed := client.list_objects_v2(Bucket="rollouts").get("Contents"):
+            client.delete_objects(Bucket="rollouts", Delete={"Objects": [{"Key": each["Key"]} for each in listed]})
     else:
         client.create_bucket(Bucket="rollouts")
 
