@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from itertools import repeat
 from typing import Final, Literal, TypeAlias, TypedDict
 
@@ -12,7 +11,6 @@ import numpy as np
 
 from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.batch_frame import BLOCK, keep_freed_memory
-from dh2sim.kinematics.numba_kernels import Kernel
 from dh2sim.kinematics.straight_line import JACOBIAN, Kind
 from dh2sim.messages import did_you_mean, listed, shown
 from dh2sim.processors import available_processors
@@ -27,6 +25,9 @@ _FEW_BLOCKS: Final = 4
 """Blocks at once for which NumPy's calls are too short for threads."""
 _JOINTS: Final = 64
 """Blocks at once times joints: bounds the memory of a thread."""
+Kernel: TypeAlias = Callable[[Array, Array], bool]
+"""Fills results, shape (N, numbers of one), from joint vectors, shape (N, n); False where a coordinate is too large
+or not finite."""
 Fill: TypeAlias = Callable[[Array, Array], None]
 """Fills the results of a block, shape (N, *shape of one), from its joint coordinates."""
 
@@ -153,6 +154,8 @@ def in_blocks(
         for start in range(0, count, BLOCK):
             compute(start)
     else:
+        from concurrent.futures import ThreadPoolExecutor
+
         blocks = math.ceil(count / BLOCK)
         at_once = math.ceil(blocks / math.ceil(blocks / at_once))  # all alike
         starts = range(0, count, at_once * BLOCK)

@@ -27,7 +27,6 @@ from dh2sim.kinematics.batches import (
     require_shape,
 )
 from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vector, joint_vectors, require_finite
-from dh2sim.kinematics.numba_kernels import numba_kernel
 from dh2sim.kinematics.straight_line import JACOBIAN, POSE, Kind, of_one
 from dh2sim.kinematics.transforms import compose, identity, joint_part
 from dh2sim.kinematics.trig import sin_cos
@@ -316,7 +315,11 @@ def _computed(
     """Compute a pose or a Jacobian of a frame for joint vectors, one or a batch."""
     out, rows, threads, compiled = checked_options(kind, options)
     vectors, batch = joint_vectors(robot, q, finite=False)
-    kernel = numba_kernel(kind, robot, *place, rows) if compiled and batch else None
+    kernel = None
+    if compiled and batch:
+        from dh2sim.kinematics.numba_kernels import numba_kernel
+
+        kernel = numba_kernel(kind, robot, *place, rows)
     if kernel is None:
         require_finite(robot, vectors.reshape(*batch, robot.n))
     if not batch:

@@ -18,7 +18,6 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from pickle import UnpicklingError
@@ -26,14 +25,11 @@ from tempfile import NamedTemporaryFile
 from typing import Any, Final
 
 from dh2sim.extras import require_extra
+from dh2sim.kinematics.batches import Kernel
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.straight_line import Kind, number_text, statements, traced
 from dh2sim.kinematics.trace import COSINE, SINE, VARIABLE, Token, Trace, live_nodes
 from dh2sim.typing import Array
-
-Kernel = Callable[[Array, Array], bool]
-"""Fills results, shape (N, numbers of one), from joint vectors, shape (N, n); False where a coordinate is too large
-or not finite."""
 
 LARGEST: Final = 1.6e6
 """Angle, rad, up to which sines and cosines are correct: 2^20 quarter turns, whose products with parts of pi/2 of 33
