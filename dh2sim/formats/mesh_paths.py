@@ -10,6 +10,7 @@ from typing import Final, TypeAlias
 from urllib.parse import unquote
 
 from dh2sim.errors import Dh2simError
+from dh2sim.input_files import read_input
 
 FindMesh: TypeAlias = Callable[[str], Path | None]
 """Returns the file of a mesh name, or None."""
@@ -146,8 +147,7 @@ def _in(folder: Path, package: str) -> Iterator[Path]:
 def package_name(folder: Path) -> str | None:
     """Return the name that a folder's ``package.xml`` gives it; None where there is none."""
     try:
-        with (folder / "package.xml").open("rb") as stream:
-            found = _NAME.search(stream.read(100_000))
+        found = _NAME.search(read_input(folder / "package.xml", 100_000))
     except OSError:
         return None
     return found.group(1).decode("utf-8", "replace") if found else None

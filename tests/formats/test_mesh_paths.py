@@ -192,3 +192,12 @@ def test_a_link_to_the_package_itself_is_followed(tmp_path: Path) -> None:
     find = mesh_finder(tmp_path / "urdf", [tmp_path / "share"])
     assert find("package://arm/a.stl") == tmp_path / "share" / "arm" / "a.stl"
     assert found.exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+def test_a_pipe_in_the_place_of_a_packages_description_is_not_waited_for(tmp_path: Path) -> None:
+    found = mesh(tmp_path / "arm" / "meshes" / "a.stl")
+    os.mkfifo(tmp_path / "arm" / "package.xml")
+    find = mesh_finder(tmp_path / "arm" / "urdf")
+    assert find("package://arm/meshes/a.stl") == found
+    assert find("package://other/meshes/a.stl") is None
