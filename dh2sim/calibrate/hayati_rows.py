@@ -11,8 +11,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from dh2sim.kinematics.compaction import compact_rows, far_frames
+from dh2sim.kinematics.compaction import compact_rows
 from dh2sim.kinematics.conversion import convert_rows
+from dh2sim.kinematics.far_frames import far_frames
 from dh2sim.kinematics.transforms import (
     compose,
     joint_part,

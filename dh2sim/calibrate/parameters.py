@@ -6,7 +6,6 @@ Every constant is an elementary motion, so that the derivative of the tool's pos
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -338,8 +337,3 @@ def _pose(T: Array, units: Units) -> Pose:
 def _rounded_pose(T: Array, units: Units) -> Array:
     pose = _pose(T, units)
     return pose_from_rpy(pose.xyz, pose.rpy)
-
-
-def names_of(parameters: Sequence[Parameter]) -> list[str]:
-    """Return the names of parameters."""
-    return [parameter.name for parameter in parameters]

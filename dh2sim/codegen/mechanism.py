@@ -127,18 +127,6 @@ class Mechanism:
     tool_angle: Turn
 
 
-class Step(NamedTuple):
-    """An elementary motion."""
-
-    axis: str
-    """x, y or z: a rotation about it; t: a translation."""
-    angle: float = 0.0
-    """rad."""
-    name: str = ""
-    """Of the angle."""
-    offset: Vector = ORIGIN
-
-
 Lengths: TypeAlias = Callable[[int | str, str, float, str], Number]
 """Returns a constant for the length of a part (the number of a row, ``base``, ``tool``) and an axis (``a``, ``x``).
 

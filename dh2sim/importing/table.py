@@ -9,7 +9,7 @@ from dh2sim.formats.table.read import read_table
 from dh2sim.importing.result import Imported
 from dh2sim.importing.serial import robot_name
 from dh2sim.importing.source_errors import MADE, errors_of
-from dh2sim.kinematics.compaction import far_frames
+from dh2sim.kinematics.far_frames import far_frames
 from dh2sim.kinematics.frame_assignment.recover import TOLERANCE
 from dh2sim.kinematics.frame_assignment.result import Tolerances
 from dh2sim.kinematics.frame_assignment.rounding import simple_angle, simple_length

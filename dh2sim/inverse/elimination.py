@@ -52,7 +52,6 @@ _ILL = 1e6
 """Condition above which solutions may be missing."""
 _BLOCK = 128
 """Poses solved at a time, so that their matrices stay in the processor's cache."""
-_SEED = 2026
 _NEIGHBOURS = 6
 """Solutions of a pose, sorted by a hash of their coordinates, that each one is compared with."""
 
@@ -126,8 +125,6 @@ class Method:
     arm: Arm
     moving: Flags
     """Which joints are not locked, bool, shape (n,)."""
-    ranges: Array = field(repr=False)
-    """Where configurations are drawn from, in the arm's units, shape (n, 2)."""
     virtual: tuple[Array, ...] = field(repr=False)
     """Links before, between and behind the virtual joints that make six of fewer joints, each of shape (4, 4)."""
     eliminations: tuple[Elimination, ...]

@@ -42,7 +42,7 @@ def choose_method(arm: Arm, moving: Flags, ranges: Array) -> Method:
         ranges: Where trial configurations are drawn from, in the arm's units, shape (n, 2).
     """
     if not moving.any():
-        return Method(arm=arm, moving=moving, ranges=ranges, virtual=(), eliminations=(), found_share=1.0)
+        return Method(arm=arm, moving=moving, virtual=(), eliminations=(), found_share=1.0)
     rng = np.random.default_rng(_SEED)
     missing = 6 - int(moving.sum())
     q = rng.uniform(ranges[:, 0], ranges[:, 1], (2 * _TRIALS, arm.n))
@@ -50,15 +50,15 @@ def choose_method(arm: Arm, moving: Flags, ranges: Array) -> Method:
     q = q[np.sort(np.argsort(-np.linalg.svd(J, compute_uv=False)[:, -1])[:_TRIALS])]  # away from singular ones
     # three virtual joints make a wrist, unless that leaves the others with a point that they cannot move freely
     wrists = (True, False) if missing == 3 else (False,)
-    methods = [_tried(arm, moving, ranges, q, _virtual_links(missing, rng, wrist=wrist), rng) for wrist in wrists[:1]]
-    if methods[0].found_share < 1.0 and len(wrists) > 1:
-        methods.append(_tried(arm, moving, ranges, q, _virtual_links(missing, rng, wrist=False), rng))
+    methods: list[Method] = []
+    for wrist in wrists:
+        methods.append(_tried(arm, moving, q, _virtual_links(missing, rng, wrist=wrist), rng))
+        if methods[-1].found_share == 1.0:
+            break
     return max(methods, key=lambda method: method.found_share)
 
 
-def _tried(
-    arm: Arm, moving: Flags, ranges: Array, q: Array, virtual: tuple[Array, ...], rng: np.random.Generator
-) -> Method:
+def _tried(arm: Arm, moving: Flags, q: Array, virtual: tuple[Array, ...], rng: np.random.Generator) -> Method:
     """Return the best eliminations for the poses that trial configurations reach."""
     T = np.zeros((len(q), 4, 4))
     T[:, :3], T[:, 3, 3] = pose_and_jacobian(arm, q)[0], 1.0
@@ -66,7 +66,7 @@ def _tried(
     loop = close_loop(arm, T, locked, virtual)
     J = pose_and_jacobian(arm, q)[1]
     drawn = Found(pose=np.arange(len(q)), q=q, sigma=np.ones(len(q)), error=np.zeros(len(q)), J=J)
-    bare = Method(arm=arm, moving=moving, ranges=ranges, virtual=virtual, eliminations=(), found_share=0.0)
+    bare = Method(arm=arm, moving=moving, virtual=virtual, eliminations=(), found_share=0.0)
     values = np.linalg.svd(J[:, :, moving], compute_uv=False)
     rounded = bool((values[:, -1] < _ROUNDED * values[:, 0]).all())
     trials: list[_Trial] = []

@@ -9,16 +9,11 @@ keep every number.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Set
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any, Final, TypeVar
 
-import numpy as np
-
-from dh2sim.kinematics.arm_path import NEAR, ROUNDING, ArmPath, arm_path
-from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.conversion import Conversion, convert_rows
 from dh2sim.kinematics.exact import (
     ONE,
@@ -42,158 +37,16 @@ from dh2sim.kinematics.exact import (
     rounded_atan2,
     rounded_matrix,
 )
+from dh2sim.kinematics.far_frames import PARALLEL, Survey, tail_of
 from dh2sim.kinematics.transforms import rotate_tensor, rpy_from_rotation
 from dh2sim.robot.links import BaseSpec, LinkSpec, MeshSpec, Pose, ToolSpec
 from dh2sim.robot.row import Convention, JointType, Row
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array, read_only
 
-_PARALLEL: Final = Decimal("4e-16")
-"""Sine of an angle that is none: what doubles leave of a right angle."""
 _ON_AXIS: Final = Decimal("1e-12")
 """Of the reach: an axis that passes as near as that goes through the point, and leaves x free."""
-_BEHIND_TOOL: Final = 0.1
-"""Of the reach: a last frame may be that far behind the tool."""
 _NOWHERE: Final[Vector] = (ZERO, ZERO, ZERO)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FarFrame:
-    """A DH frame that is far from the arm."""
-
-    frame: int
-    """0 … number of rows."""
-    distance: float
-    """From the arm's path in its link, m."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FarFrames:
-    """The DH frames of a table that stand far from the arm, and how long the arm itself is."""
-
-    frames: tuple[FarFrame, ...]
-    """Base first; empty where the table is compact."""
-    length: float
-    """Of the arm along its links, m, whatever its frames."""
-
-    @property
-    def sentence(self) -> str:
-        """The frames, how far out they are, and how long the arm is."""
-        names = " and ".join(str(far.frame) for far in self.frames)
-        distances = " and ".join(f"{far.distance:.4g}" for far in self.frames)
-        one = len(self.frames) == 1
-        return (
-            f"DH {'frame' if one else 'frames'} {names} {'is' if one else 'are'} {distances} m away from the arm, "
-            f"which is {self.length:.3g} m long."
-        )
-
-
-def far_frames(spec: RobotSpec) -> FarFrames:
-    """Return which DH frames of a table stand far from the arm: those that ``compact_rows`` moves.
-
-    Far is more than half the reach from the arm's path, or out of reach, where axes are nearly parallel; and out of
-    reach where a frame can slide along parallel axes, at the ends, and of the axis of a prismatic joint.
-    """
-    with exact_arithmetic():
-        survey = _Survey(spec)
-    far = [FarFrame(frame=i, distance=survey.distance(i)) for i in range(len(spec.rows) + 1) if survey.is_far(i)]
-    return FarFrames(frames=tuple(far), length=survey.path.reach)
-
-
-class _Survey:
-    """A table's links in exact arithmetic, and which of them lead far out; link 0 is the base, link n the last."""
-
-    def __init__(self, spec: RobotSpec) -> None:
-        rows = spec.rows
-        chain = build_chain(spec)
-        self.rows = rows
-        self.n = len(rows)
-        self.path: ArmPath = arm_path(chain)
-        self.travel = math.fsum(
-            self.path.reach if row.limits.position is None else max(abs(end) for end in row.limits.position)
-            for row in rows
-            if row.type is JointType.PRISMATIC
-        )
-        base, tool = (exact_pose(pose.xyz, pose.rpy) for pose in (spec.base.pose, spec.tool))
-        parts = [base, *(_tail(row) for row in rows)]
-        heads = [*(_head(row) for row in rows), tool]
-        self.links: tuple[Matrix, ...] = tuple(exact_product(*pair) for pair in zip(parts, heads, strict=True))
-        """From link i's own frame, behind Z_i, to where Z_(i+1) begins; from the last one to tool0."""
-        frames = [
-            base,
-            *(exact_link_part(0.0, 0.0) if row.convention is Convention.MODIFIED else _tail(row) for row in rows),
-        ]
-        self.frames = [_doubles(column(T, 3)) for T in frames]
-        self.beside = [False, *(self._is_beside(i) for i in range(1, self.n + 1)), False]
-        """Whether the axis of row i, which slides or is fixed, runs out of reach."""
-        self.far: list[bool] = []
-        for i in range(self.n + 1):
-            self.far.append(self._leads_far(i))
-
-    def is_far(self, i: int) -> bool:
-        """Whether frame i is far out."""
-        return self.far[i] or self.beside[i] or (i < self.n and self.beside[i + 1])
-
-    def distance(self, i: int) -> float:
-        """Return how far frame i is from the path, m."""
-        return self.path.distance(i, self.frames[i])
-
-    def _is_beside(self, i: int) -> bool:
-        x, y, _ = self.path.own(i)
-        return not self.rows[i - 1].type.turns and self._beyond(math.hypot(x, y))
-
-    def _beyond(self, distance: float) -> bool:
-        return self.path.reach > 0.0 and distance > (self.path.reach + self.travel) * (1.0 + ROUNDING)
-
-    def _leads_far(self, i: int) -> bool:
-        if self.path.reach == 0.0:
-            return False
-        if i == 0:
-            ends = (self.frames[0], _doubles(column(self.links[0], 3)))
-            return any(self._beyond(self.path.distance(0, end)) for end in ends)
-        if i == self.n and not self.rows[-1].type.turns:
-            return self._beyond(self.distance(i))
-        if i == self.n:
-            behind = self.path.way_to(i, self.frames[i]) - _BEHIND_TOOL * self.path.reach
-            return self.distance(i) > NEAR * self.path.reach or self._beyond(behind)
-        if self._sine(i) <= _PARALLEL:  # then only the height at which x starts can be changed
-            return self._beyond(self.path.way_along_axis(i, 0.0))
-        # where the row before leads far out too, this one will begin beside the arm
-        start = self.path.heights[i - 1][0] if i > 1 and self.far[i - 1] else -self.rows[i - 1].d
-        return self._is_nearly_parallel(i) and self.leads_away(i, 0.0, start)
-
-    def leads_away(self, i: int, foot: float, start: float) -> bool:
-        """Whether row i, counted from 1, is to be Hayati's; see ``ArmPath.leads_away``."""
-        slides = self.rows[i - 1].type is JointType.PRISMATIC  # then the row can begin elsewhere
-        return self.path.is_far_along_axis(i, foot) if slides else self.path.leads_away(i, foot, start)
-
-    def _sine(self, i: int) -> Decimal:
-        z = column(self.links[i], 2)
-        return exact_length((z[0], z[1], ZERO))
-
-    def _is_nearly_parallel(self, i: int) -> bool:
-        """Whether a Hayati row would end nearer than one along the common normal: the axes are within 45 degrees."""
-        return _PARALLEL < self._sine(i) < abs(self.links[i][2][2])
-
-    def angle(self, i: int) -> float:
-        """Return the acute angle between the axes at the ends of a link, rad."""
-        return rounded_atan2(self._sine(i), abs(self.links[i][2][2]))
-
-    def nearly_parallel_up_to_far(self) -> Set[int]:
-        """Return links between nearly parallel axes that lead far out, or lead up to one that does."""
-        far = [i for i in range(1, self.n) if self.far[i]]
-        return {k for i in far for k in (i - 1, i) if k > 0 and self._is_nearly_parallel(k)}
-
-
-def _head(row: Row) -> Matrix:
-    """What a row has before its Z."""
-    return exact_link_part(row.a, row.alpha) if row.convention is Convention.MODIFIED else exact_link_part(0.0, 0.0)
-
-
-def _tail(row: Row) -> Matrix:
-    """What a row has behind its Z."""
-    modified = row.convention is Convention.MODIFIED
-    return exact_link_part(0.0, 0.0) if modified else exact_link_part(row.a, row.alpha, row.beta)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -224,7 +77,7 @@ def compact_rows(spec: RobotSpec) -> Conversion:
         The robot, without a source file unless nothing had to be changed, and a note on every row that changed.
     """
     with exact_arithmetic():
-        survey = _Survey(spec)
+        survey = Survey(spec)
         if not any(survey.is_far(i) for i in range(survey.n + 1)):
             return Conversion(spec=spec, notes=())
     distal = spec
@@ -235,7 +88,7 @@ def compact_rows(spec: RobotSpec) -> Conversion:
         while True:
             compact, moved, notes = _rewritten(distal, hayati)
             # a row that starts where a frame was left, far from the way, may end too far out: the row before goes too
-            more = hayati | _Survey(compact).nearly_parallel_up_to_far()
+            more = hayati | Survey(compact).nearly_parallel_up_to_far()
             if more == hayati:
                 break
             hayati = more
@@ -269,7 +122,7 @@ def _rewritten(spec: RobotSpec, hayati: Set[int]) -> tuple[RobotSpec, list[Matri
         spec: The robot.
         hayati: Rows, counted from 1, that become Hayati's in any case.
     """
-    survey = _Survey(spec)
+    survey = Survey(spec)
     rows, n = spec.rows, len(spec.rows)
     rewritten = [survey.is_far(i) or i in hayati for i in range(n + 1)]
     for i in range(n - 1, 0, -1):  # a row that is to end with its X cannot begin with one
@@ -320,11 +173,7 @@ def _decimals(point: Array) -> Vector:
     return (x, y, z)
 
 
-def _doubles(point: Vector) -> Array:
-    return np.array([float(value) for value in point])
-
-
-def _moved_base(base: BaseSpec, survey: _Survey) -> tuple[BaseSpec, Matrix]:
+def _moved_base(base: BaseSpec, survey: Survey) -> tuple[BaseSpec, Matrix]:
     """Slide frame 0 to where its axis is nearest to base_link; return the base, and the new frame in the old one."""
     T = survey.links[0]
     z, place = column(T, 2), _decimals(survey.path.entry(0))
@@ -336,7 +185,7 @@ def _moved_base(base: BaseSpec, survey: _Survey) -> tuple[BaseSpec, Matrix]:
     return replace(base, pose=pose, mesh=_moved_mesh(base.mesh, exact_inverse(T_old_new))), T_old_new
 
 
-def _last(begins: Matrix, survey: _Survey, spec: RobotSpec) -> tuple[_Cut, ToolSpec]:
+def _last(begins: Matrix, survey: Survey, spec: RobotSpec) -> tuple[_Cut, ToolSpec]:
     """End the last row on its own axis, beside the tool, which takes the rest."""
     height = Decimal(float(survey.path.own(survey.n)[2]))
     frame = exact_frame((begins[0][3], begins[1][3], height), (ONE, ZERO, ZERO), (ZERO, ZERO, ONE))
@@ -353,7 +202,7 @@ def _last(begins: Matrix, survey: _Survey, spec: RobotSpec) -> tuple[_Cut, ToolS
     return cut, ToolSpec(xyz=read_only(tool[:3, 3]), rpy=rpy)
 
 
-def _lead(begins: Matrix, survey: _Survey, i: int, *, hayati: bool) -> _Cut:
+def _lead(begins: Matrix, survey: Survey, i: int, *, hayati: bool) -> _Cut:
     """Rewrite row i: from where it begins, in link i's frame, to the next axis, as near to the arm as it can."""
     origin, z = column(begins, 3), column(begins, 2)
     T = survey.links[i]
@@ -361,7 +210,7 @@ def _lead(begins: Matrix, survey: _Survey, i: int, *, hayati: bool) -> _Cut:
     point = _decimals(survey.path.outlines[i][2]) if survey.beside[i + 1] else column(T, 3)
     cross = exact_cross(z, direction)
     sine, cosine = exact_length(cross), exact_dot(z, direction)
-    if sine <= _PARALLEL:
+    if sine <= PARALLEL:
         foot = _slid(origin, z, survey, i)
         gap = exact_sum(point, foot, -ONE)
         end = exact_sum(point, z, -exact_dot(gap, z))
@@ -381,13 +230,13 @@ def _lead(begins: Matrix, survey: _Survey, i: int, *, hayati: bool) -> _Cut:
     return _cut(begins, foot, end, x, direction, Convention.HAYATI)
 
 
-def _slid(origin: Vector, z: Vector, survey: _Survey, i: int) -> Vector:
+def _slid(origin: Vector, z: Vector, survey: Survey, i: int) -> Vector:
     """Return the point of axis i, through ``origin``, that is beside the path's own, in link i's frame."""
     place = _decimals(survey.path.own(i))
     return exact_sum(origin, z, exact_dot(exact_sum(place, origin, -ONE), z))
 
 
-def _sense(gap: Vector, begins: Matrix, survey: _Survey) -> Vector:
+def _sense(gap: Vector, begins: Matrix, survey: Survey) -> Vector:
     """Return x along a gap or against it, whichever leaves theta the smaller; as it was where there is no gap."""
     x_before = column(begins, 0)
     if exact_length(gap) <= _ON_AXIS * Decimal(survey.path.reach):
@@ -430,7 +279,7 @@ def _cut(
 
 def _shift(old: Row, new: Row, T_old_new: Matrix | None) -> Matrix | None:
     """Return the old DH frame of a row in its new one; None where they are the same."""
-    tails = (_tail(old), _tail(new))
+    tails = (tail_of(old), tail_of(new))
     if T_old_new is None and tails[0] == tails[1]:
         return None
     Z = exact_link_part(0.0, 0.0) if T_old_new is None else T_old_new
@@ -476,7 +325,7 @@ def _moved_pose(pose: Pose, T_new_old: Matrix) -> Pose:
 class _Notes:
     """Sentences on what was changed, and why."""
 
-    def __init__(self, survey: _Survey) -> None:
+    def __init__(self, survey: Survey) -> None:
         self._survey = survey
         self.sentences: list[str] = []
 

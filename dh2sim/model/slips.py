@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from dh2sim.errors import Problem
-from dh2sim.kinematics.compaction import far_frames
+from dh2sim.kinematics.far_frames import far_frames
 from dh2sim.messages import Loc, loc_of, path_of
 from dh2sim.model.build import ModelLike, model_of
 from dh2sim.model.limits import NO_LENGTH

@@ -112,17 +112,6 @@ class Distribution:
         """Least value that is drawn."""
         return self.first - NORMAL_ENDS * self.second if self.shape == "normal" else self.first
 
-    @property
-    def greatest(self) -> float:
-        """Greatest value that is drawn."""
-        match self.shape:
-            case "normal":
-                return self.first + NORMAL_ENDS * self.second
-            case "fixed":
-                return self.first
-            case _:
-                return self.second
-
     def at(self, u: float) -> float:
         """Return the value below which a share ``u`` of all draws is, from 0 to 1."""
         match self.shape:

@@ -29,7 +29,6 @@ _REFINEMENTS: Final = 5
 """Rounds in which pieces of a curve are halved."""
 _FLAT: Final = 1e-3
 """Share of a cell by which the middle of a piece may be off the boundary."""
-_STRAIGHT: Final = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -15,7 +15,7 @@ from dh2sim import Robot
 from dh2sim.errors import Dh2simError
 from dh2sim.importing.result import Imported
 from dh2sim.importing.sources import ImportOptions, import_data
-from dh2sim.kinematics.compaction import far_frames
+from dh2sim.kinematics.far_frames import far_frames
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.model.build import build_model

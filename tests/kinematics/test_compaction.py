@@ -12,8 +12,9 @@ from hypothesis import given, settings
 
 from dh2sim.kinematics.arm_path import arm_path
 from dh2sim.kinematics.chain import build_chain
-from dh2sim.kinematics.compaction import compact_rows, far_frames
+from dh2sim.kinematics.compaction import compact_rows
 from dh2sim.kinematics.conversion import convert_rows
+from dh2sim.kinematics.far_frames import far_frames
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_errors
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.robot.links import BaseSpec, LinkSpec, MeshSpec, PayloadSpec, Pose, ToolSpec

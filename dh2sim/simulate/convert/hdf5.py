@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from _typeshed import ReadableBuffer, WriteableBuffer
 
-SUFFIX = ".h5"
 CHUNK_BYTES = 4 << 20
 """Largest chunk: HDF5 reads and unpacks whole chunks, and a single rollout is often read."""
 LEVEL = 1

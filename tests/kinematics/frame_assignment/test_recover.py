@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dh2sim.kinematics.chain import build_chain
-from dh2sim.kinematics.compaction import far_frames
+from dh2sim.kinematics.far_frames import far_frames
 from dh2sim.kinematics.frame_assignment.recover import chain_reach, measure_residual, recover_table, within
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
