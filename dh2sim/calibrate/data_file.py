@@ -14,10 +14,10 @@ from typing import Final
 import numpy as np
 
 from dh2sim.calibrate.measurements import OTHER_KINDS, Kind, Measurements, grouped, problems_of
-from dh2sim.calibrate.parameters import rotation_of
 from dh2sim.errors import Dh2simError, MeasurementFileError, Problem
 from dh2sim.input_files import check_columns, read_input, utf16_hint
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
+from dh2sim.kinematics.rotations import rotations_of_quaternions, rotations_of_vectors
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import counted, did_you_mean, listed, member, shown
 from dh2sim.robot.spec import RobotSpec
@@ -455,16 +455,11 @@ def _rotations(
         wrong(
             np.abs(norm - 1.0), "qw", lambda off: f"a quaternion must have length 1, which this is off by {off:.3g}"
         )
-        w, v = q[:, 0] / np.maximum(norm, 1e-12), q[:, 1:] / np.maximum(norm, 1e-12)[:, None]
-        K = np.zeros((len(q), 3, 3))
-        x, y, z = v.T
-        K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -z, y, -x
-        K[:, 1, 0], K[:, 2, 0], K[:, 2, 1] = z, -y, x
-        return np.asarray(np.eye(3) + 2.0 * (w[:, None, None] * K + K @ K))
+        return rotations_of_quaternions(q / np.maximum(norm, 1e-12)[:, None])
     if "roll" in values:
         return np.array([pose_from_rpy(np.zeros(3), rpy)[:3, :3] for rpy in _stack(values, _RPY)])
     if "rx" in values:
-        return np.array([rotation_of(vector) for vector in _stack(values, _VECTOR)])
+        return rotations_of_vectors(_stack(values, _VECTOR))
     names = _MATRIX if "r11" in values else tuple(name for name in _TRANSFORM if not name.endswith("4"))
     R = _stack(values, names).reshape(-1, 3, 3)
     off = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))

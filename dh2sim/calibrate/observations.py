@@ -20,8 +20,8 @@ from dh2sim.calibrate.parameters import (
     RobotParameters,
     Values,
     moved_pose,
-    rotation_vectors,
 )
+from dh2sim.kinematics.rotations import hat, rotation_vectors
 from dh2sim.typing import Array
 
 LENGTH, ANGLE, ARTEFACT = 0, 1, 2
@@ -246,10 +246,7 @@ def _right_inverse(vectors: Array) -> Array:
     Groups 2, 2012, section 10.6.
     """
     angle = np.linalg.norm(vectors, axis=1)
-    K = np.zeros((len(vectors), 3, 3))
-    x, y, z = vectors.T
-    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -z, y, -x
-    K[:, 1, 0], K[:, 2, 0], K[:, 2, 1] = z, -y, x
+    K = hat(vectors)
     small = angle < 1e-4
     safe = np.where(small, 1.0, angle)
     factor = np.where(small, 1.0 / 12.0, 1.0 / safe**2 - 1.0 / (2.0 * safe * np.tan(0.5 * safe)))

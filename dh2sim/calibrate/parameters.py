@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from dh2sim.kinematics.rotations import rotation_vectors, rotations_of_vectors
 from dh2sim.kinematics.transforms import pose_from_rpy, rpy_from_rotation
 from dh2sim.robot.links import Pose
 from dh2sim.robot.row import Convention, JointType, Row
@@ -281,40 +282,15 @@ class RobotParameters:
 def moved_pose(T: Array, step: Array) -> Array:
     """Return a pose moved along the axes of the frame that it is in, and turned about them at its own origin."""
     new = np.eye(4)
-    new[:3, :3] = rotation_of(step[3:]) @ T[:3, :3]
+    new[:3, :3] = rotations_of_vectors(step[3:]) @ T[:3, :3]
     new[:3, 3] = T[:3, 3] + step[:3]
     return new
 
 
 def pose_change(T: Array, since: Array) -> Array:
     """Return the step that leads from one pose to another, as ``moved_pose`` takes it, shape (6,)."""
-    turn = rotation_vectors((T[:3, :3] @ since[:3, :3].T)[None])[0]
+    turn = rotation_vectors(T[:3, :3] @ since[:3, :3].T)
     return np.concatenate([T[:3, 3] - since[:3, 3], turn])
-
-
-def rotation_of(vector: Array) -> Array:
-    """Return the rotation of a rotation vector, rad, shape (3,), as a matrix; by Rodrigues' formula."""
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector.tolist()
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if angle < 1e-6:
-        return np.asarray(np.eye(3) + K + 0.5 * K @ K)
-    return np.asarray(np.eye(3) + math.sin(angle) / angle * K + (1.0 - math.cos(angle)) / angle**2 * K @ K)
-
-
-def rotation_vectors(R: Array) -> Array:
-    """Return the rotation vectors of rotations of shape (N, 3, 3), rad in [0, pi], shape (N, 3)."""
-    twice = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
-    sine = 0.5 * np.linalg.norm(twice, axis=1)
-    cosine = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
-    angle = np.arctan2(sine, cosine)
-    vectors = 0.5 * twice * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-300), 1.0)[:, None]
-    for k in np.flatnonzero((sine <= 1e-7) & (cosine < 0.0)):  # about half a turn: the axis from R + 1
-        column = int(np.argmax(np.diag(R[k])))
-        axis = R[k][:, column] + np.eye(3)[column]
-        axis *= (1.0 if axis @ twice[k] >= 0.0 else -1.0) / np.linalg.norm(axis)
-        vectors[k] = angle[k] * axis
-    return np.asarray(vectors)
 
 
 _ANGLE_DECIMALS: Final = {AngleUnit.RAD: 9, AngleUnit.DEG: 7}

@@ -16,6 +16,7 @@ from dh2sim.compare.matching import (
     some_correspondences,
 )
 from dh2sim.compare.screws import ScrewAxes
+from dh2sim.kinematics.rotations import hat
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint, serial_link_poses
 from dh2sim.kinematics.transforms import pose_errors
@@ -182,7 +183,7 @@ def _refined(way: Correspondence, chain_b: SerialChain, poses: Array, q: Array, 
             else:
                 matrix[:, :3, i] = z
         matrix[:, :3, n : n + 3] = -np.eye(3)
-        matrix[:, :3, n + 3 : n + 6] = _skew(p)
+        matrix[:, :3, n + 3 : n + 6] = hat(p)
         matrix[:, 3:, n + 3 : n + 6] = -np.eye(3)
         matrix[:, :3, n + 6 : n + 9] = -R
         matrix[:, 3:, n + 9 :] = -R
@@ -211,12 +212,6 @@ def _refined(way: Correspondence, chain_b: SerialChain, poses: Array, q: Array, 
     return replace(way, zeros=zeros, T_base=T_base, T_tool=T_tool)
 
 
-def _skew(p: Array) -> Array:
-    K = np.zeros((len(p), 3, 3))
-    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -p[:, 2], p[:, 1], -p[:, 0]
-    return K - K.transpose(0, 2, 1)
-
-
 def _turned(R: Array) -> Array:
     """Return the rotation vectors of small rotations, shape (N, 3)."""
     return 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
@@ -224,7 +219,7 @@ def _turned(R: Array) -> Array:
 
 def _moved(step: Array) -> Array:
     """Return the transform of a small displacement and rotation vector, shape (4, 4); its rotation is orthogonal."""
-    K = _skew(step[None, 3:])[0]
+    K = hat(step[3:])
     U, _, Vt = np.linalg.svd(np.eye(3) + K + 0.5 * K @ K)
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = U @ Vt, step[:3]

@@ -25,6 +25,7 @@ from enum import StrEnum
 import numpy as np
 
 from dh2sim.compare.screws import ScrewAxes
+from dh2sim.kinematics.rotations import rotations_about
 from dh2sim.typing import Array
 
 MOST_HYPOTHESES = 256
@@ -254,7 +255,7 @@ class _Matcher:
             if normals is None or max(np.linalg.norm(w) for w in normals) <= self.length:
                 return np.asarray(R)
             u, v = R @ normals[0], normals[1]
-            return _about(of_b[0], math.atan2(float(np.cross(u, v) @ of_b[0]), float(u @ v))) @ R
+            return rotations_about(of_b[0], math.atan2(float(np.cross(u, v) @ of_b[0]), float(u @ v))) @ R
         if normals is not None:
             of_a = np.vstack([of_a, normals[0] / self.size])
             of_b = np.vstack([of_b, normals[1] / self.size])
@@ -428,12 +429,6 @@ def _turn(R: Array, axis: Array) -> float:
     sine = (R[2, 1] - R[1, 2]) * x + (R[0, 2] - R[2, 0]) * y + (R[1, 0] - R[0, 1]) * z
     angle = math.atan2(float(sine), float(np.trace(R)) - 1.0)
     return math.pi if angle <= -math.pi + 1e-12 else angle
-
-
-def _about(axis: Array, angle: float) -> Array:
-    x, y, z = axis.tolist()
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K))
 
 
 def _least_turn(u: Array, v: Array) -> Array:

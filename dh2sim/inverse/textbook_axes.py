@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from dh2sim.kinematics.chain import KinematicChain
+from dh2sim.kinematics.rotations import rotations_about
 from dh2sim.typing import Array, read_only
 
 EXACT: Final = 1e-9
@@ -101,7 +102,7 @@ class ArmAxes:
         if axis.slides:
             T[..., :3, 3] = q[..., None] * axis.direction
         else:
-            T[..., :3, :3] = rotation(axis.direction, q)
+            T[..., :3, :3] = rotations_about(axis.direction, q)
             T[..., :3, 3] = axis.point - T[..., :3, :3] @ axis.point
         return T
 
@@ -169,15 +170,6 @@ def arm_axes(chain: KinematicChain, tolerance: float = EXACT) -> ArmAxes:
         size=size if size > 0.0 else 1.0,
         tolerance=tolerance,
     )
-
-
-def rotation(axis: Array, angle: float | Array) -> Array:
-    """Return the rotations by angles, rad, about a unit vector, shape (..., 3, 3): Rodrigues' formula."""
-    x, y, z = (float(value) for value in axis)
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turned = np.asarray(angle, dtype=np.float64)[..., None, None]
-    half = np.sin(0.5 * turned)
-    return np.asarray(np.eye(3) + np.sin(turned) * K + 2.0 * half * half * (K @ K))
 
 
 def turn_about(axis: Array, one: Array, other: Array) -> float:

@@ -12,7 +12,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from dh2sim.inverse.textbook_axes import ArmAxes, norm, rotation, turn_about, wrapped
+from dh2sim.inverse.textbook_axes import ArmAxes, norm, turn_about, wrapped
 from dh2sim.inverse.textbook_parts import (
     FromAngle,
     Names,
@@ -30,6 +30,7 @@ from dh2sim.inverse.textbook_parts import (
     wrist_name,
 )
 from dh2sim.inverse.textbook_steps import METRE, RAD, Signs, Worksheet, number, term
+from dh2sim.kinematics.rotations import rotations_about
 from dh2sim.typing import Array
 
 _SINGULAR: Final = 1e-12
@@ -138,8 +139,8 @@ class OffsetWristArm:
         found = []
         for signs, q1, q5, z4, singular in bent:
             if singular:
-                q6 = next((x for x in _TRIED if self._reaches(W, q1, rotation(z6, -x) @ axis)), 0.0)
-                z5 = rotation(z6, -q6) @ axis
+                q6 = next((x for x in _TRIED if self._reaches(W, q1, rotations_about(z6, -x) @ axis)), 0.0)
+                z5 = rotations_about(z6, -q6) @ axis
                 sheet.line("q6", q6, RAD, "any", signs)
                 sheet.note(
                     f"Wrist singular{with_signs(signs)}: axes 4 and 6 are parallel, so that joints 2, 3, 4 and 6 "

@@ -13,9 +13,10 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from dh2sim.inverse.textbook_axes import ArmAxes, rotation, turn_about
+from dh2sim.inverse.textbook_axes import ArmAxes, turn_about
 from dh2sim.inverse.textbook_parts import FromAngle, Names, PartialBranch, from_angle, with_signs, wrist_name
 from dh2sim.inverse.textbook_steps import RAD, Signs, Worksheet, number
+from dh2sim.kinematics.rotations import rotations_about
 from dh2sim.typing import Array
 
 SINGULAR: Final = 1e-12
@@ -82,7 +83,7 @@ class SphericalWrist(Wrist):
             ),
         )
         self.bend.describe(sheet)
-        H = rotation(self.axes.joints[self.first + 1].direction, self.bend.at_zero)
+        H = rotations_about(self.axes.joints[self.first + 1].direction, self.bend.at_zero)
         found = []
         for branch in branches:
             E = self.left_over(branch, R) @ self.frame.T @ H @ self.frame

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dh2sim.kinematics.loop_closure import POSITIONS, TOLERANCE, mechanism_size
+from dh2sim.kinematics.rotations import rotation_vectors
 from dh2sim.kinematics.tree import BASE, Closure, Frame, KinematicTree
 from dh2sim.robot.mechanism import ClosureType
 from dh2sim.typing import Array
@@ -217,16 +218,7 @@ def _rotation(kind: ClosureType, R: Array) -> tuple[Array, Array]:
             ways = np.where(sine[:, None] > 0.0, np.stack([-z[:, 1], z[:, 0]], axis=1) / safe[:, None], [1.0, 0.0])
             return ways * angle[:, None], fixed
         case _:
-            return _rotation_vectors(R), fixed
-
-
-def _rotation_vectors(R: Array) -> Array:
-    """Return the axes of rotations times their angles, shape (N, 3); of half a turn some vector of that length."""
-    axial = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
-    sine, cosine = np.linalg.norm(axial, axis=1), 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
-    angle = np.arctan2(sine, cosine)[:, None]
-    turned = angle / np.where(sine > 0.0, sine, 1.0)[:, None] * axial
-    return np.asarray(np.where(sine[:, None] > 0.0, turned, angle * np.eye(3)[0]))
+            return rotation_vectors(R), fixed
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError
+from dh2sim.kinematics.rotations import rotations_about
 from dh2sim.robot.row import JointType
 from dh2sim.typing import Array
 
@@ -84,13 +85,10 @@ def serial_link_poses(chain: SerialChain, q: ArrayLike) -> Array:
 
 def _motion(joint: SerialJoint, q: Array) -> Array:
     """Pose of the moved link in the link at coordinate zero, shape (N, 4, 4)."""
-    x, y, z = joint.axis.tolist()
     T = np.zeros((len(q), 4, 4))
     T[:] = np.eye(4)
     if joint.type.turns:
-        K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        sine, half = np.sin(q)[:, None, None], np.sin(0.5 * q)[:, None, None]
-        R = np.eye(3) + sine * K + 2.0 * half * half * (K @ K)
+        R = rotations_about(joint.axis, q)
         T[:, :3, :3] = R
         T[:, :3, 3] = joint.point - R @ joint.point
     else:

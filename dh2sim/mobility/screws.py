@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dh2sim.kinematics.rotations import hat
 from dh2sim.typing import Array
 
 DEPENDENT: Final = 1e-8
@@ -110,9 +111,3 @@ def moved_screw(motions: Array, screw: Array) -> Array:
     seen = (positions[:, None] @ rotations)[:, 0]  # from the moved frame: p x R w = R (R' p x w)
     slides = screw[3:] - seen @ hat(screw[:3]).T
     return np.concatenate([rotations @ screw[:3], (rotations @ slides[:, :, None])[:, :, 0]], axis=1)
-
-
-def hat(w: Array) -> Array:
-    """Return the matrix of the cross product with ``w``, shape (3, 3)."""
-    x, y, z = w
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

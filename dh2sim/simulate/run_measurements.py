@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dh2sim.calibrate.measurements import Kind, Measurements, measurements
-from dh2sim.calibrate.parameters import rotation_of
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.chain import SpecLike, serial_spec_of
+from dh2sim.kinematics.rotations import rotations_of_quaternions, rotations_of_vectors
 from dh2sim.messages import listed
 from dh2sim.simulate.store.reader import open_dataset, reading
 from dh2sim.typing import Array
@@ -65,7 +65,8 @@ def run_measurements(
     T = np.tile(np.eye(4), (len(chosen), 1, 1))
     for k, row in enumerate(chosen.tolist()):
         T[k, :3, 3] = pose[row, :3] + length * rng.normal(size=3)
-        T[k, :3, :3] = rotation_of(angle * rng.normal(size=3)) @ _rotation(pose[row, 3:])
+        measured = rotations_of_quaternions(pose[row, 3:] / np.linalg.norm(pose[row, 3:]))
+        T[k, :3, :3] = rotations_of_vectors(angle * rng.normal(size=3)) @ measured
     groups = [f"rollout {number}" for number in rollout[chosen].tolist()]
     if kind is Kind.POSITION:
         return measurements(spec, q[chosen], positions=T[:, :3, 3], groups=groups)
@@ -93,9 +94,3 @@ def _recorded(data: xr.Dataset, robot: str, joints: list[str], name: str) -> tup
     if not whole.any():
         raise CalibrationError(f"{name}: nothing was recorded")
     return q[whole], pose[whole], rollout[whole]
-
-
-def _rotation(quaternion: Array) -> Array:
-    w, x, y, z = (quaternion / np.linalg.norm(quaternion)).tolist()
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + 2.0 * (w * K + K @ K))

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from dh2sim.inverse.goals import Free
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian
+from dh2sim.kinematics.rotations import rotation_vectors
 from dh2sim.trajectory.curves import ChebyshevCurve, NotSmoothError, PiecewisePolynomial, fit
-from dh2sim.trajectory.tool_paths import ToolPath, rotation_vector
+from dh2sim.trajectory.tool_paths import ToolPath
 from dh2sim.typing import Array
 
 BLIND: Final = 1e-4
@@ -153,7 +154,7 @@ class Task:
         rows, left = [J[:, :3] / self.size], [position]
         R = goal[:, :3, :3]
         if self.free is None:
-            left.append(rotation_vector(T[:, :3, :3] @ np.swapaxes(R, 1, 2)))
+            left.append(rotation_vectors(T[:, :3, :3] @ np.swapaxes(R, 1, 2)))
             rows.append(J[:, 3:])
         elif self.free == "roll":
             z = T[:, :3, 2]

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from dh2sim.errors import TrajectoryError
+from dh2sim.kinematics.rotations import rotation_vectors, rotations_of_vectors
 from dh2sim.typing import Array, read_only
 
 _ON_LINE: Final = 1e-9
@@ -44,12 +45,12 @@ class ToolPath:
         """Return poses at parameters, shape (N, 4, 4)."""
         T = np.zeros((len(x), 4, 4))
         T[:, 3, 3] = 1.0
-        T[:, :3, :3] = rotations(x[:, None] * self.turn) @ self.start[:3, :3]
+        T[:, :3, :3] = rotations_of_vectors(x[:, None] * self.turn) @ self.start[:3, :3]
         if self.centre is None:
             T[:, :3, 3] = self.start[:3, 3] + x[:, None] * self.chord
         else:
             spoke = self.start[:3, 3] - self.centre
-            T[:, :3, 3] = self.centre + rotations(x[:, None] * self.sweep) @ spoke
+            T[:, :3, 3] = self.centre + rotations_of_vectors(x[:, None] * self.sweep) @ spoke
         return T
 
     def velocities(self, T: Array) -> Array:
@@ -69,7 +70,7 @@ class ToolPath:
 
 def line(start: Array, end: Array) -> ToolPath:
     """Return the straight line between two poses, shape (4, 4)."""
-    turn = rotation_vector(end[:3, :3] @ start[:3, :3].T)
+    turn = rotation_vectors(end[:3, :3] @ start[:3, :3].T)
     chord = end[:3, 3] - start[:3, 3]
     return ToolPath(
         kind="line",
@@ -107,7 +108,7 @@ def arc(start: Array, via: Array, end: Array) -> ToolPath:
     axis = normal / size
     spoke, last = start[:3, 3] - centre, end[:3, 3] - centre
     swept = math.atan2(float(np.cross(spoke, last) @ axis), float(spoke @ last)) % math.tau
-    return _arc(start, centre, axis * swept, rotation_vector(end[:3, :3] @ start[:3, :3].T))
+    return _arc(start, centre, axis * swept, rotation_vectors(end[:3, :3] @ start[:3, :3].T))
 
 
 def circle(start: Array, centre: Array, axis: Array, angle: float) -> ToolPath:
@@ -138,41 +139,3 @@ def _arc(start: Array, centre: Array, sweep: Array, turn: Array) -> ToolPath:
         centre=read_only(centre),
         sweep=read_only(sweep),
     )
-
-
-def rotations(vectors: Array) -> Array:
-    """Return the rotations about axes by angles: vectors (N, 3), rad, to matrices (N, 3, 3); Rodrigues's formula."""
-    angle = np.linalg.norm(vectors, axis=1)
-    half = 0.5 * angle
-    safe = np.where(angle > 0.0, angle, 1.0)
-    # sin(a) / a and (1 - cos a) / a², without cancellation
-    first = np.where(angle > 0.0, np.sin(angle) / safe, 1.0)[:, None, None]
-    second = np.where(angle > 0.0, 2.0 * (np.sin(half) / safe) ** 2, 0.5)[:, None, None]
-    K = np.zeros((len(vectors), 3, 3))
-    K[:, 2, 1], K[:, 0, 2], K[:, 1, 0] = vectors.T
-    K -= np.swapaxes(K, 1, 2)
-    return np.asarray(np.eye(3) + first * K + second * (K @ K))
-
-
-def rotation_vector(R: Array) -> Array:
-    """Return the axis times the angle, 0 to pi, of a rotation, shape (3, 3), or of each of shape (N, 3, 3)."""
-    matrices = R[None] if R.ndim == 2 else R
-    axial = 0.5 * np.stack(
-        [
-            matrices[:, 2, 1] - matrices[:, 1, 2],
-            matrices[:, 0, 2] - matrices[:, 2, 0],
-            matrices[:, 1, 0] - matrices[:, 0, 1],
-        ],
-        axis=1,
-    )
-    sine = np.linalg.norm(axial, axis=1)
-    cosine = 0.5 * (np.trace(matrices, axis1=1, axis2=2) - 1.0)
-    angle = np.arctan2(sine, cosine)
-    factor = np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 1.0)
-    vectors = factor[:, None] * axial
-    for i in np.flatnonzero((cosine < 0.0) & (sine < 1e-4)):  # near half a turn the axis is in the symmetric part
-        symmetric = 0.5 * (matrices[i] + matrices[i].T) - np.cos(angle[i]) * np.eye(3)
-        column = symmetric[:, int(np.argmax(np.diag(symmetric)))]
-        axis = column / np.linalg.norm(column)
-        vectors[i] = angle[i] * (axis if axis @ axial[i] >= 0.0 else -axis)
-    return np.asarray(vectors[0] if R.ndim == 2 else vectors)

@@ -12,6 +12,7 @@ import numpy as np
 
 from dh2sim.errors import ConfigurationError, SettingsError
 from dh2sim.inverse.goals import read_goals
+from dh2sim.kinematics.rotations import rotations_of_quaternions
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import Loc, did_you_mean, listed, path_of, shown
 from dh2sim.robot.expressions import NumberError, to_number
@@ -171,9 +172,7 @@ class Waypoint:
         if self.T is not None:
             return np.asarray(self.T[:3, :3])
         if self.quaternion is not None:
-            w, *axis = self.quaternion / np.linalg.norm(self.quaternion)
-            K = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-            return np.asarray(np.eye(3) + 2.0 * (w * K + K @ K))
+            return rotations_of_quaternions(self.quaternion / np.linalg.norm(self.quaternion))
         return None if self.rpy is None else np.asarray(pose_from_rpy((0.0, 0.0, 0.0), self.rpy)[:3, :3])
 
     @property

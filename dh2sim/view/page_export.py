@@ -20,6 +20,7 @@ from dh2sim.errors import PictureError
 from dh2sim.files import atomic_file
 from dh2sim.kinematics.chain import KinematicChain
 from dh2sim.kinematics.forward import forward_kinematics
+from dh2sim.kinematics.rotations import rotations_of_quaternions
 from dh2sim.kinematics.transforms import compose, identity
 from dh2sim.messages import listed
 from dh2sim.model.robot_model import RobotModel
@@ -28,7 +29,7 @@ from dh2sim.view.scene.items import Arrow, Item, Label, Placed, Polyline, Scene,
 from dh2sim.view.scene.link_poses import round_length, triad_length
 from dh2sim.view.scene.painter import Painter
 from dh2sim.view.scene.scene import PLANNED_COLOR
-from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids, rotation_matrix
+from dh2sim.view.scene.solids import orientation_of, position_of, robot_solids
 from dh2sim.view.server import recording_server
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def _corners(points: Array) -> Array:
 
 def _pose(item: Item) -> Array:
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = rotation_matrix(item.orientation), item.position
+    T[:3, :3], T[:3, 3] = rotations_of_quaternions(item.orientation), item.position
     return T
 
 

@@ -14,6 +14,7 @@ from dh2sim.inverse.goals import Free
 from dh2sim.inverse.solver import InverseSolver
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.forward import forward_kinematics, geometric_jacobian
+from dh2sim.kinematics.rotations import rotations_about, rotations_of_quaternions
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.progress import Advance, no_progress
 from dh2sim.robot.row import JointType, Limits
@@ -170,31 +171,16 @@ def spread_rotations(count: int, kind: Kind, axis: Array, R0: Array) -> Array:
     """
     s = np.arange(count) + 0.5
     if kind == "angles":
-        angle = 2.0 * math.pi * s / count
-        K = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-        turned = np.eye(3) + np.sin(angle)[:, None, None] * K + (1.0 - np.cos(angle))[:, None, None] * (K @ K)
-        return np.asarray(turned @ R0)
+        return np.asarray(rotations_about(axis, 2.0 * math.pi * s / count) @ R0)
     if kind == "directions":
         height, longitude = 1.0 - 2.0 * s / count, math.pi * (3.0 - math.sqrt(5.0)) * s
         tilt = np.arccos(height)
         zero = np.zeros(count)
-        return _rotations(
-            np.stack(
-                [np.cos(tilt / 2), -np.sin(tilt / 2) * np.sin(longitude), np.sin(tilt / 2) * np.cos(longitude), zero],
-                axis=-1,
-            )
-        )
+        sine = np.sin(tilt / 2)
+        quaternions = [np.cos(tilt / 2), -sine * np.sin(longitude), sine * np.cos(longitude), zero]
+        return rotations_of_quaternions(np.stack(quaternions, axis=-1))
     psi = 1.533751168755204288118041
     r, R = np.sqrt(s / count), np.sqrt(1.0 - s / count)
     alpha, beta = 2.0 * math.pi * s / math.sqrt(2.0), 2.0 * math.pi * s / psi
-    return _rotations(np.stack([R * np.cos(beta), r * np.sin(alpha), r * np.cos(alpha), R * np.sin(beta)], axis=-1))
-
-
-def _rotations(quaternions: Array) -> Array:
-    w, x, y, z = quaternions.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
+    quaternions = [R * np.cos(beta), r * np.sin(alpha), r * np.cos(alpha), R * np.sin(beta)]
+    return rotations_of_quaternions(np.stack(quaternions, axis=-1))

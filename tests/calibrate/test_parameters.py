@@ -10,7 +10,7 @@ from hypothesis import given, settings
 
 from dh2sim.calibrate.measurements import Measurements
 from dh2sim.calibrate.observations import Observations, State
-from dh2sim.calibrate.parameters import Parameter, RobotParameters, rotation_of, rotation_vectors
+from dh2sim.calibrate.parameters import Parameter, RobotParameters
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
@@ -126,15 +126,3 @@ def test_equations_follow_every_unknown_as_their_derivatives_say(kind: str) -> N
         step[column] = STEP
         above, below = (observations.equations(observations.moved(state, sign * step)).e for sign in (1.0, -1.0))
         assert np.abs(equations.J[:, column] + (above - below) / (2.0 * STEP)).max() < 1e-7, parameter.name
-
-
-def test_rotation_vectors_come_back_up_to_half_a_turn() -> None:
-    rng = np.random.default_rng(0)
-    vectors = rng.normal(size=(50, 3))
-    vectors *= (np.concatenate([[0.0, 1e-12, 1e-7, 3.1415926, np.pi], rng.uniform(0, 3.1, 45)]))[
-        :, None
-    ] / np.linalg.norm(vectors, axis=1)[:, None]
-    R = np.array([rotation_of(vector) for vector in vectors])
-    back = np.array([rotation_of(vector) for vector in rotation_vectors(R)])
-    assert np.abs(R - back).max() < 1e-7
-    assert np.abs(rotation_vectors(R[:3]) - vectors[:3]).max() < 1e-15

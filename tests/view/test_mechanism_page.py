@@ -13,6 +13,7 @@ import pytest
 from dh2sim.errors import SingularPositionError
 from dh2sim.kinematics.loop_closure import closure_gaps
 from dh2sim.kinematics.loop_motion import mechanism_configuration
+from dh2sim.kinematics.rotations import rotations_of_quaternions
 from dh2sim.kinematics.table_oracle import table_mechanism_frames
 from dh2sim.model.mechanism import build_mechanism
 from dh2sim.robot.read import load_robot, parse_robot
@@ -23,7 +24,6 @@ from dh2sim.view.mechanism.scene import frame_path, mechanism_scene
 from dh2sim.view.mechanism.server import MechanismViewer
 from dh2sim.view.motion.replay import open_replay
 from dh2sim.view.scene.items import Placed
-from dh2sim.view.scene.solids import rotation_matrix
 from tests.program import dh2sim
 from tests.view.on_page import field, shown, wait_for_equal, wait_for_text, wait_until, xyz
 
@@ -59,7 +59,7 @@ def test_links_and_frames_are_drawn_where_the_table_has_them() -> None:
 
 def _pose(item: Placed) -> np.ndarray:
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = rotation_matrix(item.orientation), item.position
+    T[:3, :3], T[:3, 3] = rotations_of_quaternions(item.orientation), item.position
     return T
 
 

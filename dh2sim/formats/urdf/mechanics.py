@@ -15,6 +15,7 @@ import numpy as np
 from dh2sim.formats.serial_robot import Mechanics
 from dh2sim.formats.urdf.tree import read_numbers, read_pose
 from dh2sim.formats.xml_read import Element, XmlReport
+from dh2sim.kinematics.rotations import rotations_about
 from dh2sim.kinematics.transforms import identity
 from dh2sim.typing import Array
 
@@ -97,10 +98,7 @@ def _moved(link: _Link, values: Array) -> Array:
     if not link.turns:
         T[:, :3, 3] = values[:, None] * link.axis
         return T
-    x, y, z = link.axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # Rodrigues' formula
-    s, v = np.sin(values)[:, None, None], 1.0 - np.cos(values)[:, None, None]
-    T[:, :3, :3] += s * K + v * (K @ K)
+    T[:, :3, :3] = rotations_about(link.axis, values)
     return T
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from dh2sim.engines.mujoco_engine import keep_centers_of_mass
 from dh2sim.errors import EngineError
 from dh2sim.formats.mjcf.write import EXPORTED, MjcfOptions, to_mjcf
+from dh2sim.kinematics.rotations import rotations_of_quaternions
 from dh2sim.model.collision_exclusions import ExcludedPair, Reason
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_actuators, with_base_mass, without_meshes
@@ -180,20 +181,7 @@ def simulate(compiled: mujoco.MjModel, state: State, substeps: int) -> Motion:
         qpos[k], qvel[k] = data.qpos, data.qvel
     if compiled.nq == compiled.nv:
         return Motion(q=qpos, v=qvel, base=None)
-    R = _rotations(qpos[:, 3:7])
+    R = rotations_of_quaternions(qpos[:, 3:7])
     angular = np.einsum("kij,kj->ki", R, qvel[:, 3:6])  # MuJoCo has it along the base's own axes
     base = BaseMotion(rotation=R, position=qpos[:, :3], velocity=qvel[:, :3], angular_velocity=angular)
     return Motion(q=qpos[:, 7:], v=qvel[:, 6:], base=base)
-
-
-def _rotations(quaternions: Array) -> Array:
-    """Return the rotation matrices, shape (K, 3, 3), of unit quaternions (w, x, y, z), shape (K, 4)."""
-    w, x, y, z = quaternions.T
-    rows = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    return np.moveaxis(rows, 2, 0)

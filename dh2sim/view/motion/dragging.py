@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from dh2sim.kinematics.forward import forward_kinematics
+from dh2sim.kinematics.rotations import rotations_of_quaternions
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.view.events import DragLink, Event, MoveTool, ReleaseLink
 from dh2sim.view.scene.link_poses import triad_length
 from dh2sim.view.scene.scene import ROBOT, point_in_link
-from dh2sim.view.scene.solids import orientation_of, position_of, rotation_matrix
+from dh2sim.view.scene.solids import orientation_of, position_of
 from dh2sim.view.state import LinkDrag, Matrix, Mode, Part, ViewState
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ def _pose(position: Array, wxyz: Array) -> Array:
     """Return the pose, shape (4, 4), of a position and a quaternion of any length; not finite if that is zero."""
     T = np.eye(4)
     with np.errstate(invalid="ignore"):
-        T[:3, :3] = rotation_matrix(np.asarray(wxyz, dtype=np.float64) / np.linalg.norm(wxyz))
+        T[:3, :3] = rotations_of_quaternions(np.asarray(wxyz, dtype=np.float64) / np.linalg.norm(wxyz))
     T[:3, 3] = position
     return T
 

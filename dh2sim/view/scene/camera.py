@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from dh2sim.draw.projection import Pinhole
+from dh2sim.kinematics.rotations import rotations_of_quaternions
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.typing import Array
 from dh2sim.view.events import SetCamera
 from dh2sim.view.scene.ground import ground_of
 from dh2sim.view.scene.items import Placed, Solid, Vector, vector
 from dh2sim.view.scene.link_poses import frame_origins, robot_size, triad_length
-from dh2sim.view.scene.solids import robot_solids, rotation_matrix
+from dh2sim.view.scene.solids import robot_solids
 
 if TYPE_CHECKING:
     import viser
@@ -195,7 +196,7 @@ def _box(vertices: tuple[Vector, ...]) -> tuple[Vector, Vector]:
 
 def _placed(item: Placed, points: Array) -> Array:
     """Return points in an item's frame in that of its carrier, shape (count, 3)."""
-    return np.asarray(points @ rotation_matrix(item.orientation).T + item.position)
+    return np.asarray(points @ rotations_of_quaternions(item.orientation).T + item.position)
 
 
 def _rotated(wxyz: Array, x: Vector) -> Array:

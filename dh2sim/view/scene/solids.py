@@ -162,18 +162,6 @@ def orientation_of(T: Array) -> Quaternion:
     return w, x, y, z
 
 
-def rotation_matrix(quaternion: ArrayLike) -> Array:
-    """Return the rotation of a unit quaternion (w, x, y, z), shape (3, 3)."""
-    w, x, y, z = np.asarray(quaternion, dtype=np.float64).tolist()
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
 def _solid(
     vertices: tuple[Vector, ...],
     faces: tuple[tuple[int, int, int], ...],
