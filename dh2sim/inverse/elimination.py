@@ -22,6 +22,7 @@ from dh2sim.inverse.loop import (
 )
 from dh2sim.inverse.nearly_singular import near_solutions
 from dh2sim.inverse.polish import polish, refine
+from dh2sim.kinematics.rotations import rotations_of_vectors
 from dh2sim.typing import Array
 
 CONVERGED = 1e-12
@@ -52,6 +53,9 @@ _ILL = 1e6
 """Condition above which solutions may be missing."""
 _BLOCK = 128
 """Poses solved at a time, so that their matrices stay in the processor's cache."""
+_SEED = 2026
+NUDGE = 1e-6
+"""Size of changes, in lengths of the arm and rad, that make singular eliminations regular."""
 _NEIGHBOURS = 6
 """Solutions of a pose, sorted by a hash of their coordinates, that each one is compared with."""
 
@@ -128,9 +132,9 @@ class Method:
     virtual: tuple[Array, ...] = field(repr=False)
     """Links before, between and behind the virtual joints that make six of fewer joints, each of shape (4, 4)."""
     eliminations: tuple[Elimination, ...]
-    """The best one, and those to fall back on."""
+    """The best one, and one to fall back on."""
     found_share: float
-    """Share of the solutions known of the trial's poses that the first two find."""
+    """Share of the solutions known of the trial's poses that they find."""
     telling: bool = True
     """Whether the first one tells where it may lack solutions: not if it says so of most poses."""
 
@@ -165,18 +169,13 @@ class Method:
         blurred = np.zeros(len(T), dtype=np.bool_)
         blurred[found.unsure] = self.telling
         found = replace(found, unsure=found.unsure[:0])
-        for other in self.eliminations[1:]:
-            again = np.flatnonzero(self.doubtful(found, len(T)) | blurred)
-            if not len(again):
-                return found
-            if other is not self.eliminations[1]:
-                again = self._ill(again, blurred, found, T, locked, last=False)
-            if len(again):
-                more = self.solve_by(other, T[again], _values_at(locked, again))
-                blurred[np.delete(again, more.unsure)] = False
-                found = self._joined_with(found, again, replace(more, unsure=more.unsure[:0]))
         again = np.flatnonzero(self.doubtful(found, len(T)) | blurred)
-        again = self._ill(again, blurred, found, T, locked, last=True) if len(again) else again
+        if len(again) and len(self.eliminations) > 1:
+            more = self.solve_by(self.eliminations[1], T[again], _values_at(locked, again))
+            blurred[np.delete(again, more.unsure)] = False
+            found = self._joined_with(found, again, replace(more, unsure=more.unsure[:0]))
+            again = np.flatnonzero(self.doubtful(found, len(T)) | blurred)
+        again = self._ill(again, blurred, found, T, locked)
         if not len(again):
             return found
         more, lost, elsewhere = self._continued(T[again], _values_at(locked, again))
@@ -247,30 +246,24 @@ class Method:
             (regular % 2 == 1) & (regular == all_of_them) & (bool(self.eliminations) and not self.virtual)
         )
 
-    def _ill(
-        self, again: Indices, blurred: Flags, found: Found, T: Array, locked: Mapping[int, Array], *, last: bool
-    ) -> Indices:
-        """Return doubtful poses, without those that are well-conditioned and have no solution: out of reach.
+    def _ill(self, again: Indices, blurred: Flags, found: Found, T: Array, locked: Mapping[int, Array]) -> Indices:
+        """Return doubtful poses, without those at which an elimination is well-conditioned and leaves no doubt.
 
-        Nor are those searched at the last that have singular solutions where an elimination is well-conditioned:
-        these are among its eigenvalues. Nearly singular ones may be as well, but merged by rounding.
+        There all solutions are among its eigenvalues: none at a pose out of reach, and singular ones. Nearly singular
+        ones are as well, but may be merged by rounding.
         """
         counts = np.bincount(found.pose, minlength=len(T))[again]
         none = (counts == 0) & ~blurred[again]
         close = np.isin(again, found.pose[(found.sigma > _MET) & (found.sigma < _DOUBTFUL)])
-        asked = again[none | ((counts > 0) & (counts % 2 == 0) & ~close)] if last else again[none]
+        asked = again[none | ((counts > 0) & (counts % 2 == 0) & ~close)]
         if not len(asked) or not self.eliminations:
             return again
-        return np.setdiff1d(again, asked[self._condition(asked, T, locked, all_of_them=last) < _ILL])
-
-    def _condition(self, poses: Indices, T: Array, locked: Mapping[int, Array], *, all_of_them: bool) -> Array:
-        """Return how ill-conditioned the first, or else the best elimination is at some poses."""
-        loop = close_loop(self.arm, T[poses], _values_at(locked, poses), self.virtual)
+        loop = close_loop(self.arm, T[asked], _values_at(locked, asked), self.virtual)
         condition = self.eliminations[0].condition(loop)
-        for other in self.eliminations[1:] if all_of_them else ():
+        for other in self.eliminations[1:]:
             if not isinstance(other, Nudged):  # which is regular where the arm itself is singular
                 condition = np.minimum(condition, other.condition(loop))
-        return condition
+        return np.setdiff1d(again, asked[condition < _ILL])
 
     def _in_valleys(self, T: Array, locked: Mapping[int, Array]) -> Found:
         """Return what is found in the valleys that lead through what eliminations leave."""
@@ -286,7 +279,13 @@ class Method:
 
     def _stuck(self, T: Array, locked: Mapping[int, Array]) -> tuple[Indices, Array]:
         """Return configurations of eliminations that almost reach poses, and their poses."""
-        parts = [self._candidates(elimination, T, locked) for elimination in self.eliminations]
+        rng = np.random.default_rng(_SEED)
+        nudged = [
+            Nudged(elimination=elimination, nudges=small_motions(rng, 6, size))
+            for elimination in self.eliminations
+            for size in (NUDGE, 0.1 * NUDGE)
+        ]
+        parts = [self._candidates(elimination, T, locked) for elimination in (*self.eliminations, *nudged)]
         pose, q = np.concatenate([part.pose for part in parts]), np.concatenate([part.q for part in parts])
         q, error, _ = polish(self.arm, q, T[pose], self.moving, gate=_GATE)
         stuck = (error > CONVERGED) & (error < _STUCK)
@@ -361,14 +360,9 @@ class Method:
 
 def small_motions(rng: np.random.Generator, count: int, size: float) -> Array:
     """Return random motions of about a size, in lengths of the arm and rad, shape (count, 4, 4)."""
-    motions = np.zeros((count, 4, 4))
     turns, shifts = size * rng.normal(size=(2, count, 3))
-    x, y, z = turns.T
-    motions[:, 0, 1], motions[:, 0, 2], motions[:, 1, 2] = -z, y, -x
-    motions[:, :3, :3] += np.eye(3) - np.swapaxes(motions[:, :3, :3], 1, 2)
-    left, _, right = np.linalg.svd(motions[:, :3, :3])
-    motions[:, :3, :3] = left @ right
-    motions[:, :3, 3], motions[:, 3, 3] = shifts, 1.0
+    motions = np.zeros((count, 4, 4))
+    motions[:, :3, :3], motions[:, :3, 3], motions[:, 3, 3] = rotations_of_vectors(turns), shifts, 1.0
     return motions
 
 

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from dh2sim.inverse.elimination import Elimination, Found, Method, Nudged, joined, small_motions
+from dh2sim.inverse.elimination import NUDGE, Elimination, Found, Method, Nudged, joined, small_motions
 from dh2sim.inverse.loop import Arm, Flags, Loop, close_loop, inverse_poses, pose_and_jacobian
 from dh2sim.inverse.pencil import build_pencil
 from dh2sim.inverse.slides import OppositeSlides, ThreeSlides
@@ -28,8 +28,6 @@ _MORE: Final = 4
 """Eliminations of a kind that are tried in full where those of the kind before may miss solutions, or all must."""
 _ROUNDED: Final = 1e-6
 """Least share of singular values, below which the joints are independent by rounding of the table alone."""
-_NUDGE: Final = 1e-6
-"""Size of changes, in lengths of the arm and rad, that make singular eliminations regular."""
 _SEED: Final = 2026
 
 
@@ -71,7 +69,7 @@ def _tried(arm: Arm, moving: Flags, q: Array, virtual: tuple[Array, ...], rng: n
     rounded = bool((values[:, -1] < _ROUNDED * values[:, 0]).all())
     trials: list[_Trial] = []
     share = 0.0
-    nudges = small_motions(rng, 6, _NUDGE)
+    nudges = small_motions(rng, 6, NUDGE)
     nudged = loop.moved(nudges)
     for number, (seen, hidden) in enumerate(product((loop, nudged), ((0,), (1, 2)))):
         more = _MORE if number or rounded else math.inf  # where all is rounded, none is better
@@ -91,14 +89,8 @@ def _tried(arm: Arm, moving: Flags, q: Array, virtual: tuple[Array, ...], rng: n
         share = len(ours.pose) / len(union.pose)
         if rounded or (share == 1.0 and not bare.doubtful(ours, len(q)).any()):
             break
-    best = [trial.elimination for trial in trials[:2]]
-    # near a singularity another kind may be regular, and at one an arm that is nearly the same
-    others = [trial.elimination for trial in trials[2:] if trials[0].is_another(trial)]
-    best += [
-        *others[:1],
-        *(Nudged(elimination=elimination, nudges=small_motions(rng, 6, _NUDGE)) for elimination in best[:1]),
-    ]
-    return replace(bare, eliminations=tuple(best), found_share=share, telling=not trials or trials[0].is_telling)
+    best = tuple(trial.elimination for trial in trials[:2])
+    return replace(bare, eliminations=best, found_share=share, telling=not trials or trials[0].is_telling)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -120,11 +112,6 @@ class _Trial:
     def is_telling(self) -> bool:
         """Whether it is sure of most poses, so that where it is not tells something."""
         return len(self.found.unsure) < _TRIALS // 2
-
-    def is_another(self, other: _Trial) -> bool:
-        """Whether another elimination is of another kind, and found as much."""
-        wrists = [getattr(trial.elimination, "wrist", None) for trial in (self, other)]
-        return wrists[0] != wrists[1] and self.own == other.own
 
 
 def _eliminations(loop: Loop, hidden: tuple[int, ...], rng: np.random.Generator) -> Iterator[Elimination]:
