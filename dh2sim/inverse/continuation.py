@@ -261,7 +261,7 @@ def build_continuation(arm: Arm, moving: Flags) -> Continuation:
     known = _Start(parameters=np.zeros(7 + locked, dtype=complex), q=np.zeros((0, arm.n), dtype=complex))
     confirmed = 0
     for number in range(_MOST_STARTS):
-        goal = _reached(arm, moving, _general(arm, moving, rng))
+        [goal] = _reached(arm, moving, _general(arm, moving, rng))
         seeds = _random(arm, rng, _MORE_SEEDS if number else _SEEDS)
         begin = np.concatenate(
             [np.broadcast_to(known.parameters, (len(known.q), len(goal))), _reached(arm, moving, seeds)]
@@ -295,10 +295,9 @@ def _general(arm: Arm, moving: Flags, rng: np.random.Generator) -> ComplexArray:
 
 
 def _reached(arm: Arm, moving: Flags, q: ComplexArray) -> ComplexArray:
-    """Return the parameters of the poses that configurations reach: of one its vector, of more shape (M, 7 + ...)."""
+    """Return the parameters of the poses that configurations reach, shape (M, 7 + locked)."""
     frame, _ = pose_and_jacobian(arm, q)
-    parameters = np.concatenate([_parameters(frame), q[:, ~moving]], axis=1)
-    return parameters[0] if len(q) == 1 else parameters
+    return np.concatenate([_parameters(frame), q[:, ~moving]], axis=1)
 
 
 def _parameters(frame: ComplexArray | Array) -> ComplexArray:

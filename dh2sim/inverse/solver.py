@@ -365,7 +365,7 @@ class InverseSolver:
     def _results(
         self, method: Method, found: Found, poses: Array, q0: Array, free: Free | None, *, limits: bool
     ) -> list[Solutions]:
-        """Verify what was found by the table's own product, and tell it pose by pose."""
+        """Verify what was found by the table's own product, and return it pose by pose."""
         n = len(self.names)
         q = method.arm.unscaled(found.q)[:, :n]
         residual = goal_residuals(self._spec, q, poses[found.pose], free=free, size=self.size)

@@ -24,7 +24,8 @@ from dh2sim.kinematics.exact import (
     exact_product,
     rounded_atan2,
 )
-from dh2sim.robot.spec import Convention, JointType, RobotSpec, Row
+from dh2sim.robot.row import Convention, JointType, Row
+from dh2sim.robot.spec import RobotSpec
 from dh2sim.typing import Array
 
 PARALLEL: Final = Decimal("4e-16")
