@@ -830,7 +830,7 @@ class Robot:
             style: 'kinematic': joints as cylinders and boxes, axes, frames and lengths; 'frames': all axes of the
                 frames; 'stick': a stick plot in the box of the workspace, with base line and shadow.
             workspace: Box of a stick plot: least and greatest x, y and z, m; by default a cube around the arm.
-            reach: Length by which a stick plot measures joints and axes, m; by default the arm's.
+            reach: Length that joints and axes of a stick plot are scaled by, m; by default the arm's.
 
         Returns:
             The drawing: ``svg`` and ``tikz`` are texts, ``save("arm.pdf")`` writes a file.

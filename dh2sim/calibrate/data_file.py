@@ -108,7 +108,7 @@ def read_measurements(
     Args:
         path: A CSV file: commas, semicolons or tabs between columns, the first line names them.
         robot: That was measured.
-        kind: 'pose', 'position', 'distance' or 'socket'; by default what the columns are for.
+        kind: 'pose', 'position', 'distance' or 'socket'; by default as the columns say.
         groups: The column whose rows of one value are held out together; by default ``placement``, else ``group``,
             ``station`` or ``socket``.
 

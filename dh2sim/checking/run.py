@@ -54,7 +54,7 @@ def check_files(
         advance: Called with 1 after every robot.
 
     Returns:
-        What was found. A wrong robot file is a finding.
+        What was found. An invalid robot file counts as a finding.
 
     Raises:
         UnknownRobotError: A path does not exist.

@@ -51,7 +51,7 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="pose|position|distance|socket",
-            help="What was measured. [default: what the columns are for]",
+            help="What was measured. [default: as the columns say]",
         ),
     ] = None,
     unknown: Annotated[
@@ -118,9 +118,9 @@ def calibrate(
 ) -> None:
     """Fit a robot's table, base and tool to measurements, and say how far to trust it.
 
-    Only what the measurements tell is fitted: of parameters that do the same, one; the report names them. Rows
-    between nearly parallel axes become Hayati rows. Errors are also found at measurements held out of the fit, by
-    placement.
+    Only what the measurements determine is fitted: one of parameters with the same effect; the report names them.
+    Rows between nearly parallel axes become Hayati rows. Errors are also found at measurements held out of the fit,
+    by placement.
 
     \b
     Examples:

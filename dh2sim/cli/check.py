@@ -32,7 +32,7 @@ def check(
         typer.Option(
             "--dir",
             metavar="DIR",
-            help="Folder of the exports, DIR/<name>/; every robot must have some then. [default: generated, where "
+            help="Folder of the exports, DIR/<name>/; then every robot must have some. [default: generated, where "
             "robots may have none]",
         ),
     ] = None,
@@ -81,11 +81,11 @@ def check(
     seed: SeedOption = 0,
     tolerance: ToleranceOption = 1e-12,
 ) -> int:
-    """Check all that a repository with robots should keep right.
+    """Check everything that should hold in a repository with robots.
 
     Robot files: are they valid, do they point out likely slips? Exports: are they what the robot files say? Poses: do
     all engines read the table from the exports, or from a new export where there is none? The exit status is 1 if
-    anything is found that no baseline accepts; a wrong robot file is a finding.
+    anything is found that no baseline accepts; an invalid robot file counts as a finding.
 
     \b
     Examples:

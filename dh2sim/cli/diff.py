@@ -58,7 +58,7 @@ def diff(
     """Compare two robots: are they the same?
 
     Mechanisms are the same if they differ at most in base, tool, zeros and senses of the joints, and names. These
-    differences are listed, and limits, masses and gains that both give differently. For others it is printed where
+    differences are listed, and limits, masses and gains that both give differently. Otherwise it is printed where
     the mechanisms first differ, and which single misreading of the table explains it.
 
     Exit status: 0 the same mechanism, with the same limits, masses and gains; 1 different; 2 bad input.

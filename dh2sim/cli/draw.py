@@ -46,7 +46,7 @@ def draw(
     reach: Annotated[
         float | None,
         typer.Option(
-            metavar="R", help="Length by which a stick plot measures joints and axes, m. [default: the arm's]"
+            metavar="R", help="Length that joints and axes of a stick plot are scaled by, m. [default: the arm's]"
         ),
     ] = None,
     out: Annotated[

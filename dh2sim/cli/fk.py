@@ -172,8 +172,8 @@ def jacobian(
 
     Its rows are the velocity of the frame's origin and the angular velocity of the frame, its columns the joints.
     At a singular configuration the joint motions that do not move the frame and the velocities that the frame
-    cannot have are printed. A robot with more than six joints has self-motions everywhere. Of a mechanism the columns
-    are its driven joints, and the passive ones follow.
+    cannot have are printed. A robot with more than six joints has self-motions everywhere. For a mechanism the
+    columns are its driven joints, and the passive ones follow.
 
     \b
     Examples:

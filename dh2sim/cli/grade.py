@@ -56,7 +56,7 @@ def grade(
 ) -> int:
     """Grade students' tables against a solution.
 
-    A table that is equal up to the free choices of frames is right. Of others the misreading is named, as by 'dh2sim
+    A table that is equal up to the free choices of frames is right. Otherwise the misreading is named, as by 'dh2sim
     diff', and gives its points; what cannot be read is graded as unreadable.
 
     Exit status: 0 all have full points, 1 some have not, 2 bad input.

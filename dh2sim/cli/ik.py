@@ -55,7 +55,7 @@ def ik(
         str | None,
         typer.Option(
             metavar="FRAME",
-            help="Frame that is to get there: tool0 or dh_1 … dh_n. Joints behind it do not move. [default: tool0]",
+            help="Frame to place at the goal: tool0 or dh_1 … dh_n. Joints behind it do not move. [default: tool0]",
             show_default=False,
         ),
     ] = None,
@@ -79,12 +79,12 @@ def ik(
         bool,
         typer.Option(
             "--numeric",
-            help="Search one solution numerically, or the nearest configuration; needed where more than 50 joints "
-            "move.",
+            help="Search for one solution numerically, or the nearest configuration; needed where more than 50 "
+            "joints move.",
         ),
     ] = False,
     explain: Annotated[
-        bool, typer.Option("--explain", help="Print the textbook's steps, where it has some.")
+        bool, typer.Option("--explain", help="Print the derivation as in a textbook, where there is one.")
     ] = False,
     as_json: JsonOption = False,
 ) -> int:

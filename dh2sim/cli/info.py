@@ -33,7 +33,7 @@ def info(
 ) -> None:
     """Print a robot's table as in a textbook, its frames at home, mass and reach, and what is estimated.
 
-    Of a mechanism: its joints, driven and passive, the closures of its loops, and its mobility.
+    For a mechanism: its joints, driven and passive, the closures of its loops, and its mobility.
 
     \b
     Examples:

@@ -57,7 +57,7 @@ def new(
     ] = None,
     force: ForceOption = False,
 ) -> None:
-    """Write a commented robot file to start from: replace its numbers by those of your table.
+    """Write a commented robot file to start from: replace its numbers with those of your table.
 
     \b
     Examples:

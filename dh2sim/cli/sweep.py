@@ -50,7 +50,7 @@ def sweep(
         ),
     ] = None,
     samples: Annotated[
-        int, typer.Option(metavar="N", help="Configurations of each design that are looked at.")
+        int, typer.Option(metavar="N", help="Number of configurations evaluated for each design.")
     ] = 2000,
     voxel: Annotated[
         float | None,

@@ -87,7 +87,7 @@ def trajectory(
     rate: Annotated[
         float | None, typer.Option(metavar="HZ", help="Samples per second. [default: 1000; mechanisms: 100]")
     ] = None,
-    samples: Annotated[int | None, typer.Option(metavar="N", help="Number of samples, instead.")] = None,
+    samples: Annotated[int | None, typer.Option(metavar="N", help="Number of samples, in place of --rate.")] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -96,7 +96,7 @@ def trajectory(
     Motions start and stop at rest at each waypoint; a waypoint file may let them pass (stop: false), and name times,
     poses of the tool, and its own limits. Limits of position, velocity, acceleration and jerk hold at all times;
     lines and arcs of the tool are exact at all times. A path that would jump to another branch of the inverse
-    kinematics, or that crosses a singularity, is refused with the place. Of a mechanism the driven joints are
+    kinematics, or that crosses a singularity, is refused, and the place named. For a mechanism the driven joints are
     planned, by joint motions, and all joints are written: the passive ones follow.
 
     \b

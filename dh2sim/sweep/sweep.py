@@ -163,7 +163,7 @@ def sweep(
         count: Number of designs to draw, 256 by default; with ``designs`` it is that of the table.
         measure: 'workspace', 'manipulability', 'reach', 'payload', or ``module:function`` of your own, which takes a
             robot and returns a number, or numbers by name; several, or one text with commas.
-        samples: Configurations of each design that are looked at.
+        samples: Number of configurations evaluated for each design.
         voxel: Edge of the voxels of the workspace, m; by default an eighth of the reach of the robot file.
         seed: Of the draws.
         jobs: Number of processes; 0: one for each processor; the result does not depend on it.
