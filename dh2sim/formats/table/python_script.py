@@ -1,8 +1,8 @@
 """Robots that Python scripts make with Corke's Robotics Toolbox: read as text with ``ast``, never run.
 
 What is read: assignments of numbers, lists and poses; ``RevoluteDH``, ``PrismaticDH``, ``RevoluteMDH``,
-``PrismaticMDH``, ``DHLink``; ``DHRobot`` and what a subclass hands to it; the properties of links and robots. What
-else a script does is passed over, and matters only where a robot needs a value of it.
+``PrismaticMDH``, ``DHLink``; ``DHRobot`` and what a subclass hands to it; the properties of links and robots;
+loops over known lists. What else a script does is passed over, and matters only where a robot needs a value of it.
 """
 
 from __future__ import annotations
@@ -98,6 +98,8 @@ class _PythonScript:
         self.robots: list[ToolboxRobot] = []
         self.problems: list[ScriptError] = []
         self._links: list[ToolboxLink] = []
+        self._turns = 0
+        """Elements that loops have gone through; their number is limited, as loops in loops multiply it."""
         self._own: ToolboxRobot | None = None
         """The robot that the class at hand hands to ``super().__init__``."""
 
@@ -137,7 +139,9 @@ class _PythonScript:
                 self.value(value)
             case ast.If():
                 self._condition(node)
-            case ast.For() | ast.While() | ast.AsyncFor():
+            case ast.For():
+                self._loop(node)
+            case ast.While() | ast.AsyncFor():
                 self._pass_over(node, "a loop")
             case ast.With(body=body) | ast.Try(body=body):
                 self.block(body)
@@ -185,6 +189,60 @@ class _PythonScript:
             self.block(node.body)
         else:
             self._pass_over(node, "a condition")
+
+    def _loop(self, node: ast.For) -> None:
+        """Follow a loop over a list whose elements are known."""
+        ends = any(isinstance(inner, ast.Break | ast.Continue | ast.Return) for inner in ast.walk(node))
+        items = None if ends or node.orelse else self._items(node.iter)
+        if items is None:
+            self._pass_over(node, "a loop")
+            return
+        for item in items:
+            self._assign(node.target, item)
+            self.block(node.body)
+
+    def _items(self, node: ast.expr) -> list[object] | None:
+        """Return what a loop goes through; None where that is not known, or more than a script may go through."""
+        match node:
+            case ast.Call(func=ast.Name(id="range"), args=[_, *_] as bounds):
+                values = [self.value(bound) for bound in bounds]
+                whole = all(isinstance(value, float) and value.is_integer() for value in values)
+                if not whole or len(values) > 3 or values[2:] == [0.0]:
+                    return None
+                numbers = range(*(int(value) for value in values if isinstance(value, float)))
+                items: list[object] = [float(i) for i in numbers[: MAX_ITEMS + 1]]
+            case ast.Call(func=ast.Name(id="enumerate"), args=[inner]):
+                listed = self._items(inner)
+                items = [[float(i), item] for i, item in enumerate(listed or ())]
+                return None if listed is None else items
+            case ast.Call(func=ast.Name(id="zip"), args=[_, *_] as inners):
+                columns = [self._items(inner) for inner in inners]
+                known = [column for column in columns if column is not None]
+                return [list(row) for row in zip(*known, strict=False)] if len(known) == len(columns) else None
+            case _:
+                value = self.value(node)
+                if not isinstance(value, list):
+                    return None
+                items = list(value)
+        self._turns += len(items)
+        return items if self._turns <= MAX_ITEMS else None
+
+    def _comprehension(self, node: ast.ListComp | ast.GeneratorExp) -> object:
+        """Return the list that a comprehension makes."""
+        first = node.generators[0]
+        items = None if first.ifs or len(node.generators) > 1 else self._items(first.iter)
+        if items is not None:
+            self.scopes.append({})
+            made = []
+            for item in items:
+                self._assign(first.target, item)
+                made.append(self.value(node.elt))
+            self.scopes.pop()
+            return made
+        if self._concerns_robots(node):
+            message = "links that are made in a loop are not read: write them one after the other"
+            raise ScriptError(message, *_place(node))
+        return Unknown(f"the loop on line {node.lineno} is not followed")
 
     def _truth(self, node: ast.expr) -> bool | None:
         match node:
@@ -292,10 +350,7 @@ class _PythonScript:
             case ast.Call():
                 return self._call(node)
             case ast.ListComp() | ast.GeneratorExp():
-                if self._concerns_robots(node):
-                    message = "links that are made in a loop are not read: write them one after the other"
-                    raise ScriptError(message, *_place(node))
-                return Unknown(f"the loop on line {node.lineno} is not followed")
+                return self._comprehension(node)
             case _:
                 return Unknown(f"line {getattr(node, 'lineno', 0)} is not read: {shown(ast.unparse(node)[:60])}")
 
@@ -387,6 +442,8 @@ class _PythonScript:
             return pose
         if name in FUNCTIONS_OF_NUMBERS and arguments:
             return elementwise(FUNCTIONS_OF_NUMBERS[name], *arguments)
+        if name == "len" and len(arguments) == 1 and isinstance(arguments[0], list):
+            return float(len(arguments[0]))
         if name in ("zero", "zeros") and not arguments:
             return 0.0
         return Unknown(f"the function {shown(name)} on line {node.lineno} is not known")

@@ -109,6 +109,12 @@ def test_a_script_with_poses_set_afterwards() -> None:
         "%matplotlib inline\n!pip install roboticstoolbox-python\nprint 'x'\n"
         "r = DHRobot([RevoluteDH(d=0.4, alpha=pi/2), RevoluteDH(a=0.3)])",
         "links = [RevoluteDH(d=0.4, alpha=pi/2)] + [RevoluteDH(a=0.3)]\nfor q in links: print(q)\nr = DHRobot(links)",
+        "d = [0.4, 0]\na = [0, .3]\nalpha = np.radians([90, 0])\n"
+        "r = DHRobot([RevoluteDH(d=d[i], a=a[i], alpha=alpha[i]) for i in range(len(d))])",
+        "L = []\nfor d, a, alpha in np.array([[0.4, 0, 90], [0, .3, 0]]):\n"
+        "    L.append(RevoluteDH(d=d, a=a, alpha=np.deg2rad(alpha)))\nr = DHRobot(L)",
+        "L = []\nfor i, (d, a) in enumerate(zip([0.4, 0], [0, .3])):\n    L += [RevoluteDH(d, a, (1 - i) * pi / 2)]\n"
+        "r = DHRobot(L)",
         "def f(n):\n    return [0.0] * n\nd = [0.4, 0]; d[1] = 0.0\n"
         "r = DHRobot([RevoluteDH(d[0], 0, pi/2), RevoluteDH(d[1], .3)])",
     ],
@@ -122,9 +128,9 @@ def test_links_as_people_write_them(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("L = [RevoluteDH(d=d) for d in (1, 2)]\nr = DHRobot(L)",
+        ("L = [RevoluteDH(d=d) for d in read()]\nr = DHRobot(L)",
          ["arm.py:1:5: links that are made in a loop are not read: write them one after the other"]),
-        ("L = []\nfor d in (1, 2):\n    L.append(RevoluteDH(d=d))\nr = DHRobot(L)",
+        ("L = []\nfor d in read():\n    L.append(RevoluteDH(d=d))\nr = DHRobot(L)",
          ["arm.py:3:14: links that are made or changed in a loop are not read: write them one after the other",
           "arm.py:4:5: there are no links"]),
         ("r = DHRobot([RevoluteDH(d=d1)])",
@@ -147,6 +153,12 @@ def test_links_as_people_write_them(text: str) -> None:
 )  # fmt: skip
 def test_what_cannot_be_read_of_a_robot_is_refused_with_its_place(text: str, expected: list[str]) -> None:
     assert complaints(text, "arm.py") == expected
+
+
+def test_loops_in_loops_are_followed_only_so_far() -> None:
+    text = "L = []\nfor i in range(100):\n    for j in range(100):\n        L.append(RevoluteDH(d=i))\nr = DHRobot(L)"
+    assert any("are not read: write them one after the other" in found for found in complaints(text, "arm.py"))
+    assert "not read" in complaints("L = [RevoluteDH() for i in range(10**15)]\nr = DHRobot(L)", "arm.py")[0]
 
 
 def test_a_script_nested_without_end_is_refused() -> None:
