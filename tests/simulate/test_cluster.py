@@ -192,7 +192,7 @@ def test_dask_makes_the_run_of_one_process_though_a_worker_is_killed(tmp_path: P
         env=environment(),
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=600,
         check=False,
     )
     assert done.returncode == 0, done.stderr
