@@ -85,6 +85,22 @@ def test_a_two_joint_arm_moves_as_in_mujoco(controller: str) -> None:
 @needs_warp
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize(("controller", "way"), [("random", 1e-3), ("passive", 0.01)])
+def test_an_arm_with_stiff_actuators_moves_as_in_mujoco_where_no_links_touch(controller: str, way: float) -> None:
+    options: dict[str, Any] = {"rollouts": 12, "steps": 50, "start": "random", "seed": 3, "controller": controller}
+    expected, found = (
+        block("stanford", engine=name, record=("qpos", "qvel"), **options) for name in ("mujoco", "warp")
+    )
+    apart = expected["contact_step"] < 0
+    assert apart.sum() >= 6
+    assert np.ptp(expected["qpos"][apart], axis=1).max(axis=1).min() > way
+    np.testing.assert_allclose(found["qpos"][apart], expected["qpos"][apart], rtol=0.0, atol=1e-5)
+    np.testing.assert_allclose(found["qvel"][apart], expected["qvel"][apart], rtol=0.0, atol=1e-3)
+
+
+@needs_warp
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
 def test_one_that_goes_wrong_stops_alone() -> None:
     job = prepare(model("planar_2r"), RolloutOptions(rollouts=3, steps=4))
     batch = WarpBatch(job.plant, 3)
