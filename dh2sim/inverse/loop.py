@@ -23,6 +23,8 @@ Indices: TypeAlias = NDArray[np.intp]
 Flags: TypeAlias = NDArray[np.bool_]
 Numbers = TypeVar("Numbers", Array, ComplexArray)
 
+DEPENDENT: Final = 1e-9
+"""Share of the largest singular value up to which others are zero."""
 _ROUNDS: Final = 8
 """Of moving each frame between its neighbours: enough where axes are at an angle; nearly parallel ones stay."""
 _HALF_TURN: Final = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -199,7 +201,7 @@ def pose_and_jacobian(arm: Arm, q: Numbers) -> tuple[Numbers, Numbers]:
     return frame, J
 
 
-def joint_rank(arm: Arm, moving: Flags, ranges: Array, zero: float = 1e-9) -> int:
+def joint_rank(arm: Arm, moving: Flags, ranges: Array, zero: float = DEPENDENT) -> int:
     """Return how many of an arm's directions its joints move it in, at a general configuration.
 
     Args:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +17,7 @@ from dh2sim.inverse.branches import branch_names
 from dh2sim.inverse.elimination import Found, Method
 from dh2sim.inverse.families import family_kind, moving_joints, split_families
 from dh2sim.inverse.goals import Free, read_goals, require_free
-from dh2sim.inverse.loop import Arm, Flags, Indices, build_arm, joint_rank, pose_and_jacobian
+from dh2sim.inverse.loop import DEPENDENT, Arm, Flags, Indices, build_arm, joint_rank, pose_and_jacobian
 from dh2sim.inverse.nearest import (
     goal_residuals,
     goal_sigma_min,
@@ -56,6 +56,7 @@ _GOAL_JOINTS: Final[Mapping[str | None, int]] = {None: 0, "roll": 1, "rotation":
 
 MOST_JOINTS: Final = 50
 """That move, of arms whose solutions are all found; of others one is searched numerically."""
+_Built = TypeVar("_Built")
 
 
 class InverseSolver:
@@ -170,7 +171,7 @@ class InverseSolver:
                 results[i] = replace(results[i], complete=False, notes=(*results[i].notes, ODD))
             for i in found.unsure:
                 results[i] = replace(results[i], complete=False, notes=(*results[i].notes, UNSURE))
-            if self._is_rounded(free, tuple(sorted(locked))):
+            if self._surplus(free, tuple(sorted(locked)), _ROUNDED):  # joints are independent by rounding alone
                 results = [replace(one, complete=False, notes=(*one.notes, ROUNDED)) for one in results]
             for k, paths in families.items():
                 count = int((found.pose == k).sum())
@@ -240,18 +241,13 @@ class InverseSolver:
         return replace(none, reason=reason, nearest=nearest)
 
     def _numeric_solver(self, locked: Mapping[int, Array], *, limits: bool) -> NumericSolver:
-        key = ("numeric", limits)
-        if key in self._built and not locked:
-            solver = self._built[key]
-            assert isinstance(solver, NumericSolver)
-            return solver
-        lower, upper = self._bounds(limits=limits)
-        for joint, values in locked.items():
-            lower[joint] = upper[joint] = values[0]
-        solver = NumericSolver(self._chain, lower, upper)
-        if not locked:
-            self._built[key] = solver
-        return solver
+        def build() -> NumericSolver:
+            lower, upper = self._bounds(limits=limits)
+            for joint, values in locked.items():
+                lower[joint] = upper[joint] = values[0]
+            return NumericSolver(self._chain, lower, upper)
+
+        return build() if locked else self._kept(("numeric", limits), build)
 
     def _bounds(self, *, limits: bool) -> tuple[Array, Array]:
         lower, upper = (np.array(bound) for bound in position_limits(self._spec.moving_rows))
@@ -410,12 +406,15 @@ class InverseSolver:
         R = pose_and_jacobian(arm, found.q)[0][:, :, :3] if free == "roll" else None
         return least_singular_values(J, R, free=free, rank=self._rank(free))
 
+    def _kept(self, key: object, build: Callable[[], _Built]) -> _Built:
+        """Return what is built once, and kept for solvers of equal tables."""
+        if key not in self._built:
+            self._built[key] = build()
+        kept: _Built = self._built[key]
+        return kept
+
     def _arm(self, free: Free | None) -> Arm:
-        if free not in self._built:
-            self._built[free] = build_arm(self._chain, self._limits, _GOAL_JOINTS[free])
-        arm = self._built[free]
-        assert isinstance(arm, Arm)
-        return arm
+        return self._kept(free, lambda: build_arm(self._chain, self._limits, _GOAL_JOINTS[free]))
 
     def _moving(self, free: Free | None, locked: tuple[int, ...]) -> Flags:
         moving = np.ones(self._arm(free).n, dtype=np.bool_)
@@ -427,30 +426,20 @@ class InverseSolver:
         joints = self._arm(free).n
         return joints - self._surplus(free, ()) - self._arm(free).goal_joints
 
-    def _surplus(self, free: Free | None, locked: tuple[int, ...]) -> int:
-        """Return how many joints more than the goal needs an arm has."""
-        if ("surplus", free, locked) not in self._built:
-            arm, moving = self._arm(free), self._moving(free, locked)
-            rank = joint_rank(arm, moving, self._trial_ranges(arm))
-            self._built["surplus", free, locked] = int(moving.sum()) - rank
-        return int(self._built["surplus", free, locked])
+    def _surplus(self, free: Free | None, locked: tuple[int, ...], zero: float = DEPENDENT) -> int:
+        """Return how many joints more than the goal needs an arm has; ``zero`` is as for ``joint_rank``."""
 
-    def _is_rounded(self, free: Free | None, locked: tuple[int, ...]) -> bool:
-        """Return whether joints are independent by what rounding of the table makes of right angles."""
-        if ("rounded", free, locked) not in self._built:
+        def count() -> int:
             arm, moving = self._arm(free), self._moving(free, locked)
-            self._built["rounded", free, locked] = joint_rank(arm, moving, self._trial_ranges(arm), _ROUNDED) < int(
-                moving.sum()
-            )
-        return bool(self._built["rounded", free, locked])
+            return int(moving.sum()) - joint_rank(arm, moving, self._trial_ranges(arm), zero)
+
+        return self._kept(("surplus", free, locked, zero), count)
 
     def _method(self, free: Free | None, locked: tuple[int, ...]) -> Method:
-        if (free, locked) not in self._built:
-            arm = self._arm(free)
-            self._built[free, locked] = choose_method(arm, self._moving(free, locked), self._trial_ranges(arm))
-        method = self._built[free, locked]
-        assert isinstance(method, Method)
-        return method
+        arm = self._arm(free)
+        return self._kept(
+            (free, locked), lambda: choose_method(arm, self._moving(free, locked), self._trial_ranges(arm))
+        )
 
     def _trial_ranges(self, arm: Arm) -> Array:
         """Return where trial configurations are drawn from, in the arm's units, shape (n, 2)."""
