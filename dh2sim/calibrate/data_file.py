@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
 import numpy as np
 
@@ -28,7 +28,8 @@ MAX_BYTES: Final = 100_000_000
 MOST_ROWS: Final = 20_000
 _MOST_PROBLEMS: Final = 50
 _LENGTH_UNITS: Final = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
-_ANGLE_UNITS: Final = {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "mrad": 1e-3}
+_DEGREE: Final = math.pi / 180.0
+_ANGLE_UNITS: Final = {"rad": 1.0, "radian": 1.0, "deg": _DEGREE, "degree": _DEGREE, "°": _DEGREE, "mrad": 1e-3}
 _HEADING: Final = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(]\s*(?P<unit>[^\])]*?)\s*[\])])?\s*")
 _SUFFIXED: Final = re.compile(r"(?P<name>.+)_(?P<unit>m|mm|cm|um|in|rad|deg|mrad)")
 _JOINT_ALIAS: Final = re.compile(r"(?:q|j|joint)_?([0-9]{1,3})", re.IGNORECASE)
@@ -90,6 +91,12 @@ class _Report:
     def __call__(self, line: int, column: int, path: str, message: str) -> None:
         self.problems.append(Problem(file=self.file, line=line, column=column, path=path, message=message))
 
+    def stop(self, line: int, column: int, message: str) -> NoReturn:
+        """Report what makes the rest of the file unreadable."""
+        self(line, column, "", message)
+        self.raise_any()
+        raise AssertionError
+
     def raise_any(self) -> None:
         if self.problems:
             problems = sorted(self.problems)
@@ -125,14 +132,12 @@ def read_measurements(
         raise Dh2simError(f"{name}: cannot be read: {error.strerror or error}") from None
     report = _Report(name)
     if len(data) > MAX_BYTES:
-        report(1, 1, "", f"the file has more than {MAX_BYTES} bytes")
-        report.raise_any()
+        report.stop(1, 1, f"the file has more than {MAX_BYTES} bytes")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        report(line, 1, "", f"the file is not UTF-8 text{utf16_hint(data)}")
-        report.raise_any()
+        report.stop(line, 1, f"the file is not UTF-8 text{utf16_hint(data)}")
     return _read(text, spec, report, wanted, groups)
 
 
@@ -145,24 +150,17 @@ def _read(text: str, spec: RobotSpec, report: _Report, kind: Kind | None, groups
     lines = list(islice(every, MOST_ROWS + 1))
     more = sum(1 for _ in every)
     if not lines:
-        report(1, 1, "", "the file is empty; the first line must name the columns")
-        report.raise_any()
+        report.stop(1, 1, "the file is empty; the first line must name the columns")
     if more:
-        report(
-            lines[0][0],
-            1,
-            "",
-            f"the file has {len(lines) - 1 + more} measurements; at most {MOST_ROWS} are fitted: choose some",
-        )
-        report.raise_any()
+        message = f"the file has {len(lines) - 1 + more} measurements; at most {MOST_ROWS} are fitted: choose some"
+        report.stop(lines[0][0], 1, message)
     number, header = lines[0]
     separator = max(",;\t", key=header.count)
     cells = _split(header, separator)
     try:
         check_columns(len(cells))
     except ValueError as error:
-        report(number, 1, "", f"the file {error}")
-        report.raise_any()
+        report.stop(number, 1, f"the file {error}")
     columns = _columns(cells, number, spec, report, groups)
     kind = _kind(columns, kind, number, report)
     _require_columns(columns, kind, spec, number, report)
@@ -275,8 +273,7 @@ def _columns(
                 message = (
                     f"expected the name of a column, found {shown(cell.text)}: the first line must name the columns"
                 )
-                report(line, cell.column, "", message)
-                report.raise_any()
+                report.stop(line, cell.column, message)
             message = "the column has no name"
             if cell.text:
                 message = f"unknown column {shown(name)}.{did_you_mean(name, known)}"
@@ -296,10 +293,6 @@ def _columns(
 
 def _unit(unit: str, units: Mapping[str, float], name: str, line: int, cell: _Cell, report: _Report) -> float:
     factor = units.get(unit) or units.get(unit.casefold()) or units.get(unit.casefold().removesuffix("s"))
-    if factor is None and unit.casefold() in ("degree", "degrees"):
-        factor = units.get("deg")
-    if factor is None and unit.casefold() in ("radian", "radians"):
-        factor = units.get("rad")
     if factor is None:
         *most, last = [f"{name} [{each}]" for each in ("rad", "deg", "mrad") if each in units] or [
             f"{name} [{each}]" for each in ("m", "mm", "cm")
@@ -312,22 +305,17 @@ def _unit(unit: str, units: Mapping[str, float], name: str, line: int, cell: _Ce
 
 
 def _kind(columns: Mapping[str, _Column], kind: Kind | None, line: int, report: _Report) -> Kind:
-    oriented = [names for names in _ORIENTATIONS.values() if any(name in columns for name in names)]
     if kind is not None:
         return kind
     if "socket" in columns:
         return Kind.SOCKET
     if "distance" in columns:
         return Kind.DISTANCE
-    if oriented:
+    if any(name in columns for names in _ORIENTATIONS.values() for name in names):
         return Kind.POSE
     if not any(name in columns for name in _POSITION):
-        report(
-            line,
-            1,
-            "",
-            "nothing was measured: expected columns x, y, z (and an orientation), distance, or socket",
-        )
+        message = "nothing was measured: expected columns x, y, z (and an orientation), distance, or socket"
+        report(line, 1, "", message)
     return Kind.POSITION
 
 
@@ -424,12 +412,9 @@ def _look_at_units(
         if math.degrees(largest) <= 2.0 * math.pi and math.degrees(spread) > 0.5:
             column = joints[0]
             line, cells = rows[0]
-            report(
-                line,
-                cells[column.index].column,
-                column.heading,
-                f"all joint angles are within {math.degrees(largest):.3g} deg, which looks like radians: write [rad]",
-            )
+            angles = f"all joint angles are within {math.degrees(largest):.3g} deg"
+            message = f"{angles}, which looks like radians: write [rad]"
+            report(line, cells[column.index].column, column.heading, message)
 
 
 def _stack(values: Mapping[str, Array], names: Sequence[str]) -> Array:
