@@ -2,10 +2,11 @@
 
 They are chosen so that whatever is made of a robot stays within doubles and within what simulators read, and so that
 what dh2sim estimates is within them too: masses up to density · area · reach, inertias up to mass · reach², and the
-efforts and gains for them. So everything that is read can be exported, and what is exported can be imported again,
-but for robots whose lengths add up to nearly 1e6 m: lengths are those of one table, and an import may choose frames
-that are farther apart, on axes that are skew or nearly parallel. A bound that all tables of a mechanism share would
-be one on its axes, which are not known where numbers are read.
+efforts and gains for them. So everything that is read can be exported, and what is exported can be imported again.
+
+Robots near the bound of lengths are the exception: lengths and centres of mass are those of one table. An import may
+choose frames that are farther apart, on skew or nearly parallel axes, or make two lengths of one. A bound that all
+tables of a mechanism share would be one on its axes, which are not known where numbers are read.
 """
 
 from __future__ import annotations
