@@ -15,7 +15,6 @@ import numpy as np
 
 from dh2sim.errors import EngineError, MismatchError, ModelError
 from dh2sim.files import atomic_files, finish_interrupted
-from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.formats.urdf.tree import DYNAMICS as URDF_DYNAMICS
@@ -62,8 +61,7 @@ def render(
     if Format.MJCF in formats:
         if model.name.lower() == "scene":
             raise ModelError(f"{model.name}: its MJCF and its scene would both be scene.xml; rename the robot")
-        text = to_mechanism_mjcf(model) if isinstance(model, MechanismModel) else to_mjcf(model)
-        files[f"{model.name}.xml"] = text.encode()
+        files[f"{model.name}.xml"] = to_mjcf(model).encode()
         files["scene.xml"] = to_scene(model).encode()
     for link in model.all_links:
         if link.mesh is not None:

@@ -556,10 +556,9 @@ class Robot:
 
     def mjcf(self) -> str:
         """Return the MJCF. Meshes are written by ``export``."""
-        from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
         from dh2sim.formats.mjcf.write import to_mjcf
 
-        return to_mechanism_mjcf(self.mechanism) if self.spec.is_mechanism else to_mjcf(self.model)
+        return to_mjcf(self._written)
 
     def mjmodel(self) -> mujoco.MjModel:
         """Return the robot compiled by MuJoCo, without floor or light.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import mujoco
 
 from dh2sim.errors import EngineError
-from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
 from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.model.mechanism import MechanismModel
 from dh2sim.model.robot_model import RobotModel
@@ -27,7 +26,7 @@ def compile_robot(
     Raises:
         EngineError: MuJoCo refuses it.
     """
-    mjcf = to_mechanism_mjcf(robot) if isinstance(robot, MechanismModel) else to_mjcf(robot)
+    mjcf = to_mjcf(robot)
     files = {link.mesh.file_name: link.mesh.data for link in robot.all_links if link.mesh is not None}
     with mujoco_warnings() as warned:
         try:

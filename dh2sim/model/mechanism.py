@@ -14,7 +14,7 @@ from dh2sim.kinematics.loop_closure import assembly, constraint_jacobian, mechan
 from dh2sim.kinematics.loop_motion import named_configuration
 from dh2sim.kinematics.transforms import move_point
 from dh2sim.kinematics.tree import BASE, KinematicTree, body_poses
-from dh2sim.model.build import build_model
+from dh2sim.model.build import ModelLike, build_model, model_of
 from dh2sim.model.collision_exclusions import ExcludedPair, Reason
 from dh2sim.model.robot_model import FilledIn, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart, between, neat
@@ -163,6 +163,20 @@ class MechanismModel:
             limits = joint.control_range
             controls.append(control if limits is None else min(max(control, limits[0]), limits[1]))
         return controls
+
+
+def written_model(robot: ModelLike | MechanismModel) -> RobotModel | MechanismModel:
+    """Return the model of a robot or a mechanism, whatever form it is given in.
+
+    Raises:
+        TypeError: It is neither.
+        MeshError: A mesh file cannot be used.
+        AssemblyError: Loops cannot be closed.
+    """
+    if isinstance(robot, RobotModel | MechanismModel):
+        return robot
+    spec = spec_of(robot)
+    return build_mechanism(spec) if spec.is_mechanism else model_of(robot)
 
 
 def build_mechanism(robot: SpecLike) -> MechanismModel:

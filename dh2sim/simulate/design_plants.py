@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 
 from dh2sim.errors import Dh2simError, MismatchError, Problem, RobotError
-from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
-from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
+from dh2sim.formats.mjcf.elements import MjcfOptions
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.kinematics.table_oracle import table_mechanism_frames
 from dh2sim.model.build import build_model
 from dh2sim.model.mechanism import MechanismModel
@@ -65,8 +65,6 @@ class PlantRecipe:
         """
         shown = self.shown(model)
         driven = shown if self.actuation is None else with_actuators(shown, self.actuation)
-        if isinstance(driven, MechanismModel):
-            return to_mechanism_mjcf(driven, self.mjcf)
         return to_mjcf(driven, self.mjcf)
 
 

@@ -184,7 +184,7 @@ def batch_plant(plants: Sequence[Plant]) -> Plant:
 
 
 def compile_plant(mjcf: str, robot: RobotModel | MechanismModel) -> Plant:
-    """Compile the text that ``to_mjcf`` or ``to_mechanism_mjcf`` wrote of a robot.
+    """Compile the text that ``to_mjcf`` wrote of a robot.
 
     Raises:
         EngineError: MuJoCo refuses it.
@@ -247,7 +247,7 @@ def _name_pairs(described: mujoco.MjSpec) -> None:
 
 
 def make_plant(compiled: mujoco.MjModel, robot: RobotModel | MechanismModel) -> Plant:
-    """Describe a robot that was compiled from what ``to_mjcf`` or ``to_mechanism_mjcf`` wrote.
+    """Describe a robot that was compiled from what ``to_mjcf`` wrote.
 
     Args:
         compiled: The compiled model.

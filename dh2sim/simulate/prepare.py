@@ -13,8 +13,8 @@ import mujoco
 import numpy as np
 
 from dh2sim.errors import AssemblyError, ControllerError, SettingsError
+from dh2sim.formats.mjcf.elements import MjcfOptions
 from dh2sim.formats.mjcf.scene import to_scene
-from dh2sim.formats.mjcf.write import MjcfOptions
 from dh2sim.kinematics.loop_motion import named_configuration
 from dh2sim.messages import listed
 from dh2sim.model.mechanism import MechanismModel

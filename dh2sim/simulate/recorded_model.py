@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from dh2sim.errors import Dh2simError, ModelError, RunError
 from dh2sim.formats.mjcf.compile import compile_text
+from dh2sim.formats.mjcf.elements import MjcfOptions
 from dh2sim.formats.mjcf.includes import MAX_ELEMENTS
 from dh2sim.formats.mjcf.scene import to_scene
-from dh2sim.formats.mjcf.write import MjcfOptions
 from dh2sim.messages import shown
 from dh2sim.model.build import build_model
 from dh2sim.robot.fields import name_problem

@@ -14,9 +14,8 @@ import numpy as np
 
 from dh2sim.errors import SettingsError
 from dh2sim.extras import require_extra
-from dh2sim.kinematics.chain import spec_of
-from dh2sim.model.build import ModelLike, model_of
-from dh2sim.model.mechanism import MechanismModel, build_mechanism
+from dh2sim.model.build import ModelLike
+from dh2sim.model.mechanism import MechanismModel, written_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import load_robot
 from dh2sim.simulate.block import Block, Job, simulate_block
@@ -176,11 +175,7 @@ def _no_report(_rollouts: int) -> None:
 
 
 def _model_of(robot: ModelLike | MechanismModel | str | PathLike[str]) -> RobotModel | MechanismModel:
-    if isinstance(robot, MechanismModel):
-        return robot
-    given = load_robot(robot) if isinstance(robot, str | PathLike) else robot
-    spec = spec_of(given)
-    return build_mechanism(spec) if spec.is_mechanism else model_of(given)
+    return written_model(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
 
 
 def with_block_size(job: Job, block_size: int | None) -> Job:

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import dh2sim
-from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
+from dh2sim.formats.mjcf.elements import MjcfOptions
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.model.build import build_model
 from dh2sim.model.mass import MIN_MASS
 from dh2sim.model.robot_model import RobotModel

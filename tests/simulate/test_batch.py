@@ -4,7 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
+from dh2sim.formats.mjcf.elements import MjcfOptions
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.model.build import build_model
 from dh2sim.model.variants import with_actuators, with_base_mass
 from dh2sim.robot.read import load_robot

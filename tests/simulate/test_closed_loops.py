@@ -11,7 +11,7 @@ import pytest
 
 import dh2sim
 from dh2sim.errors import ControllerError, SettingsError
-from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.kinematics.loop_closure import closure_gaps
 from dh2sim.kinematics.loop_motion import mechanism_configuration
 from dh2sim.model.mechanism import MechanismModel, build_mechanism
@@ -26,7 +26,7 @@ ALL = ("four_bar", "slider_crank", "bennett", "spherical_four_bar", "parallel_fo
 @cache
 def plant_of(name: str) -> tuple[MechanismModel, Plant, ClosedLoops]:
     model = build_mechanism(load_robot(name))
-    plant = compile_plant(to_mechanism_mjcf(model), model)
+    plant = compile_plant(to_mjcf(model), model)
     assert plant.loops is not None
     return model, plant, plant.loops
 

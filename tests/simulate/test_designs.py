@@ -11,7 +11,8 @@ import pytest
 import xarray as xr
 
 from dh2sim.errors import DesignFileError, SettingsError
-from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
+from dh2sim.formats.mjcf.elements import MjcfOptions
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import quaternion_from_rotation
 from dh2sim.model.build import build_model

@@ -10,8 +10,7 @@ import xml.etree.ElementTree as ET
 from math import hypot
 from typing import Final
 
-from dh2sim.formats.mjcf.sites import add_site, placed
-from dh2sim.formats.mjcf.write import (
+from dh2sim.formats.mjcf.elements import (
     MjcfOptions,
     add_actuators,
     add_assets,
@@ -24,6 +23,7 @@ from dh2sim.formats.mjcf.write import (
     add_sensors,
     class_name,
 )
+from dh2sim.formats.mjcf.sites import add_site, placed
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.parallelograms import find_couplings
 from dh2sim.kinematics.transforms import compose, identity, invert, joint_part, move_point

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
-from typing import cast
 
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.forward import reference_joint_poses
 from dh2sim.kinematics.transforms import compose, identity, move_point
 from dh2sim.kinematics.tree import body_poses
-from dh2sim.model.build import ModelLike, model_of
-from dh2sim.model.mechanism import MechanismModel
+from dh2sim.model.build import ModelLike
+from dh2sim.model.mechanism import MechanismModel, written_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind
 from dh2sim.typing import Array, read_only
@@ -45,15 +44,15 @@ def to_scene(model: ModelLike | MechanismModel) -> str:
         The text of the file. The floor is at z = 0, or at the foot of the base if that is lower; below the arm
         where that is lower at home, and then the base stands on a pedestal.
     """
-    mechanism = model if isinstance(model, MechanismModel) else None
-    model = mechanism.main if mechanism is not None else model_of(cast("ModelLike", model))
-    extent = _extent(model if mechanism is None else mechanism)
+    written = written_model(model)
+    main = written.main if isinstance(written, MechanismModel) else written
+    extent = _extent(written)
     cell = 10.0 ** math.floor(math.log10(extent.radius))
     floor = 0.0 if extent.foot is None else min(0.0, extent.foot)
     if extent.lowest < floor - 1e-6 * extent.radius:
         floor = _short(extent.lowest - 0.15 * extent.radius)
-    root = ET.Element("mujoco", model=f"{model.name} scene")
-    child(root, "include", file=f"{model.name}.xml")
+    root = ET.Element("mujoco", model=f"{main.name} scene")
+    child(root, "include", file=f"{main.name}.xml")
     child(root, "statistic", center=numbers(extent.centre), extent=number(extent.radius))
     visual = child(root, "visual")
     child(visual, "headlight", ambient="0.35 0.35 0.35", diffuse="0.45 0.45 0.45", specular="0.1 0.1 0.1")
@@ -74,9 +73,9 @@ def to_scene(model: ModelLike | MechanismModel) -> str:
         material="floor",
     )
     if extent.foot is not None and floor < extent.foot:
-        _pedestal(world, model, floor, extent.foot)
+        _pedestal(world, main, floor, extent.foot)
     _camera(world, extent)
-    return document(root, provenance(mechanism or model)[:2])
+    return document(root, provenance(written)[:2])
 
 
 def _extent(model: RobotModel | MechanismModel) -> _Extent:

@@ -6,15 +6,14 @@ import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import cast
 
 from dh2sim.formats.urdf.tree import DYNAMICS
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.parallelograms import find_couplings
 from dh2sim.kinematics.transforms import compose, identity, invert, pose_from_rpy, rpy_from_rotation
-from dh2sim.model.build import ModelLike, model_of
+from dh2sim.model.build import ModelLike
 from dh2sim.model.mass import LIGHTEST, MassProperties
-from dh2sim.model.mechanism import BranchModel, MechanismModel
+from dh2sim.model.mechanism import BranchModel, MechanismModel, written_model
 from dh2sim.model.robot_model import Color, JointModel, LinkModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.row import JointType
@@ -40,11 +39,12 @@ def to_urdf(model: ModelLike | MechanismModel, *, dh_frames: bool = True) -> str
         other readers ignore, makes MuJoCo keep the fixed links as bodies and give no mass to the base. Massless links
         have an ``inertial`` of zeros, but for the root, where KDL warns of any.
     """
-    mechanism = model if isinstance(model, MechanismModel) else None
-    model = mechanism.main if mechanism is not None else model_of(cast("ModelLike", model))
+    whole = written_model(model)
+    mechanism = whole if isinstance(whole, MechanismModel) else None
+    model = whole.main if isinstance(whole, MechanismModel) else whole
     robot = ET.Element("robot", name=model.name)
     child(child(robot, "mujoco"), "compiler", fusestatic="false", inertiafromgeom="false")
-    materials = _materials(model.all_links if mechanism is None else mechanism.all_links)
+    materials = _materials(whole.all_links)
     for color, name in materials.items():
         child(child(robot, "material", name=name), "color", rgba=numbers(color))
     _link(robot, model.base, model.chain.T_base_link_dh0, materials, model.base.inertial)
@@ -63,7 +63,6 @@ def to_urdf(model: ModelLike | MechanismModel, *, dh_frames: bool = True) -> str
         _link(robot, model.tool, identity(), materials, model.tool.inertial or MASSLESS)
     _frame(robot, "flange", parent, compose(model.joints[-1].T_joint_dh, T_DHN_FLANGE))
     _frame(robot, "tool0", "flange", compose(T_FLANGE_DHN, model.chain.T_dhn_tool0))
-    whole = mechanism or model
     if mechanism is not None:
         _mimic(robot, mechanism)
     header = [*provenance(whole), *(entry.sentence for entry in whole.assumptions)]

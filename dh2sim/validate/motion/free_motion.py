@@ -10,7 +10,8 @@ import numpy as np
 
 from dh2sim.engines.mujoco_engine import keep_centers_of_mass
 from dh2sim.errors import EngineError
-from dh2sim.formats.mjcf.write import EXPORTED, MjcfOptions, to_mjcf
+from dh2sim.formats.mjcf.elements import MjcfOptions
+from dh2sim.formats.mjcf.write import EXPORTED, to_mjcf
 from dh2sim.kinematics.rotations import rotations_of_quaternions
 from dh2sim.model.collision_exclusions import ExcludedPair, Reason
 from dh2sim.model.robot_model import RobotModel

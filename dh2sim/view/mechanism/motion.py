@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 
 from dh2sim.errors import AssemblyError, SingularPositionError
-from dh2sim.formats.mjcf.mechanism import joint_coordinates, to_mechanism_mjcf
+from dh2sim.formats.mjcf.mechanism import joint_coordinates
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.kinematics.loop_closure import close_loops, closure_gaps
 from dh2sim.kinematics.loop_motion import actuated_joints, driven_motion
 from dh2sim.model.mechanism import MechanismModel
@@ -130,7 +131,7 @@ class _Simulation:
     def __init__(self, model: MechanismModel) -> None:
         self._robot = without_meshes(with_actuators(model, ActuatorType.POSITION))
         with mujoco_warnings():
-            self._model = mujoco.MjModel.from_xml_string(to_mechanism_mjcf(self._robot))
+            self._model = mujoco.MjModel.from_xml_string(to_mjcf(self._robot))
         self._data = mujoco.MjData(self._model)
         self._places = [int(self._model.joint(joint.name).qposadr[0]) for joint in model.moving_joints]
         self._now = time.perf_counter()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from dh2sim import Robot, to_scene, to_urdf
 from dh2sim.errors import RobotError
 from dh2sim.formats.mjcf.write import EXPORTED, to_mjcf
 from dh2sim.kinematics.transforms import quaternion_from_rotation
@@ -165,3 +166,13 @@ def test_the_longest_robot_is_read_by_mujoco_with_a_body_for_its_last_site() -> 
     spec = dataclasses.replace(built.spec, rows=(*built.spec.rows[:-1], last))
     mj = in_mujoco(to_mjcf(build_model(spec)))
     assert mj.nbody > MOST_ROWS + 2
+
+
+@pytest.mark.parametrize("name", ["four_bar", "planar_2r"])
+def test_a_robot_and_a_mechanism_are_written_from_any_form(name: str) -> None:
+    robot = Robot.load(name)
+    forms = (robot, robot.spec, robot.mechanism if robot.spec.is_mechanism else robot.model)
+    for write, text in ((to_mjcf, robot.mjcf()), (to_urdf, robot.urdf())):
+        assert [write(form) for form in forms] == [text] * 3
+    assert len({to_scene(form) for form in forms}) == 1
+    assert ("<equality>" in to_mjcf(robot.spec)) is (name == "four_bar")

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from dh2sim.formats.mjcf.write import EXPORTED, MjcfOptions, to_mjcf
+from dh2sim.formats.mjcf.elements import MjcfOptions
+from dh2sim.formats.mjcf.write import EXPORTED, to_mjcf
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.model.build import build_model
 from dh2sim.model.variants import with_base_mass

@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from dh2sim.formats.mjcf.write import MjcfOptions, to_mjcf
+from dh2sim.formats.mjcf.elements import MjcfOptions
+from dh2sim.formats.mjcf.write import to_mjcf
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.variants import with_base_mass, without_meshes
 from dh2sim.typing import Array
