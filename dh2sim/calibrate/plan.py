@@ -114,6 +114,8 @@ def plan_measurements(
         raise CalibrationError(f"the number of configurations must be at most {MOST}, got {count}")
     length, angle = noise if isinstance(noise, tuple) else (noise, noise)
     joints = len(spec.moving_rows)
+    if not joints:
+        raise CalibrationError(f"{spec.name} has no joint that moves")
     if joints > MOST_JOINTS:
         raise CalibrationError(f"{joints} joints move; configurations are chosen for at most {MOST_JOINTS}")
     contact = _SelfContact(build_model(spec))

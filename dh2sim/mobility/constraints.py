@@ -116,7 +116,8 @@ class LoopEquations:
             errors[:, row, :3] /= 2.0
             errors[:, row, 3:] = position
         jacobian = self._signs[None, :, None, :] * screws.transpose(0, 2, 1)[:, None]
-        return errors.reshape(count, -1), jacobian.reshape(count, -1, mechanism.freedoms)
+        rows = 6 * len(self._signs)
+        return errors.reshape(count, rows), jacobian.reshape(count, rows, mechanism.freedoms)
 
     def _moved(self, pose: Array, joint: int, direction: int, q: Array, screws: Array) -> Array:
         """Return the poses of the link behind a joint, and put the joint's screws where they are then."""

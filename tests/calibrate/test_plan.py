@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from dh2sim import Fixed, Robot
 from dh2sim.calibrate.calibration import calibrate
 from dh2sim.calibrate.measurements import Kind
 from dh2sim.calibrate.plan import plan_measurements
@@ -92,3 +93,8 @@ def test_what_cannot_be_planned_is_refused() -> None:
     assert "the ball has to be in one" in refusal(
         CalibrationError, plan_measurements, robot("puma560"), 20, kind="socket"
     )
+
+
+def test_a_robot_of_fixed_rows_has_no_plan() -> None:
+    with pytest.raises(CalibrationError, match="has no joint that moves"):
+        plan_measurements(Robot([Fixed(a=0.5)], name="still"), 5)

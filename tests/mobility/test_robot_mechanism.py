@@ -232,3 +232,12 @@ assembly: {q: [15, -160, -60, -15, 160, 60, 20]}
     assert np.allclose(line, (3**2 - 1**2) / (2 * 1.2), rtol=0, atol=1e-11), (
         "inversion of a circle through its centre"
     )
+
+
+def test_a_robot_of_fixed_rows_has_no_freedoms(tmp_path: Path) -> None:
+    robot = tmp_path / "still.yaml"
+    robot.write_text("name: still\nconvention: standard\njoints:\n  - {type: fixed, a: 0.5, alpha: 0.3}\n")
+    found = find_mobility(load_robot(robot))
+    assert (found.count.by_loop, found.rank.mobility, found.finite) == (0, 0, 0)
+    run = dh2sim("mobility", robot)
+    assert (run.status, run.err) == (0, "")
