@@ -44,12 +44,14 @@ _HOMES = {
     "Workspace": "workspace.workspace",
     "build_chain": "kinematics.chain",
     "build_model": "model.build",
+    "calibrate_robot": "calibrate.calibration",
     "check_files": "checking.run",
     "compute_workspace": "workspace.workspace",
     "convert_robot": "importing.convert",
     "diff": "compare.comparison",
     "draw_robot": "draw.diagram.drawing",
     "explain_inverse_kinematics": "inverse.textbook",
+    "export_robot": "export",
     "find_mobility": "mobility.robot_mechanism",
     "find_slips": "model.slips",
     "forward_kinematics": "kinematics.forward",
@@ -62,25 +64,32 @@ _HOMES = {
     "load_robot": "robot.read",
     "measurements": "calibrate.measurements",
     "parse_robot": "robot.read",
+    "plan_measurements": "calibrate.plan",
     "plan_mechanism_trajectory": "trajectory.mechanism",
     "plan_trajectory": "trajectory.plan",
     "read_measurements": "calibrate.data_file",
     "read_trajectory": "trajectory.files",
     "recover_table": "kinematics.frame_assignment.recover",
     "robot_file_text": "robot.write",
+    "rollout": "simulate.run",
+    "save_robot": "robot.write",
+    "sweep_designs": "sweep.sweep",
     "symbolic_form": "symbolic.request",
     "to_mjcf": "formats.mjcf.write",
     "to_scene": "formats.mjcf.scene",
     "to_urdf": "formats.urdf.write",
+    "validate_robot": "validate.run",
 }
 """The module of every public name; a type checker reads the same below."""
 
 __all__ = [*_HOMES]
 
 if TYPE_CHECKING:
+    from dh2sim.calibrate.calibration import calibrate_robot as calibrate_robot
     from dh2sim.calibrate.data_file import read_measurements as read_measurements
     from dh2sim.calibrate.measurements import Measurements as Measurements
     from dh2sim.calibrate.measurements import measurements as measurements
+    from dh2sim.calibrate.plan import plan_measurements as plan_measurements
     from dh2sim.calibrate.result import Calibration as Calibration
     from dh2sim.checking.run import check_files as check_files
     from dh2sim.codegen.generate import generate_code as generate_code
@@ -91,6 +100,7 @@ if TYPE_CHECKING:
     from dh2sim.errors import Dh2simError as Dh2simError
     from dh2sim.errors import RobotError as RobotError
     from dh2sim.errors import RobotFileError as RobotFileError
+    from dh2sim.export import export_robot as export_robot
     from dh2sim.formats.mjcf.scene import to_scene as to_scene
     from dh2sim.formats.mjcf.write import to_mjcf as to_mjcf
     from dh2sim.formats.urdf.write import to_urdf as to_urdf
@@ -133,7 +143,10 @@ if TYPE_CHECKING:
     from dh2sim.robot.table_rows import Prismatic as Prismatic
     from dh2sim.robot.table_rows import Revolute as Revolute
     from dh2sim.robot.write import robot_file_text as robot_file_text
+    from dh2sim.robot.write import save_robot as save_robot
     from dh2sim.robot_facade import Robot as Robot
+    from dh2sim.simulate.run import rollout as rollout
+    from dh2sim.sweep.sweep import sweep_designs as sweep_designs
     from dh2sim.symbolic.request import SymbolicForm as SymbolicForm
     from dh2sim.symbolic.request import symbolic_form as symbolic_form
     from dh2sim.trajectory.files import SampledTrajectory as SampledTrajectory
@@ -141,6 +154,7 @@ if TYPE_CHECKING:
     from dh2sim.trajectory.mechanism import plan_mechanism_trajectory as plan_mechanism_trajectory
     from dh2sim.trajectory.plan import plan_trajectory as plan_trajectory
     from dh2sim.trajectory.trajectory import Trajectory as Trajectory
+    from dh2sim.validate.run import validate_robot as validate_robot
     from dh2sim.workspace.workspace import Workspace as Workspace
     from dh2sim.workspace.workspace import compute_workspace as compute_workspace
 

@@ -6,13 +6,16 @@ Every export reports what its formats cannot hold of the robot file, so that not
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, fields
 from enum import StrEnum
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from dh2sim.arguments import file_path, names
 from dh2sim.errors import EngineError, MismatchError, ModelError
 from dh2sim.files import atomic_files, finish_interrupted
 from dh2sim.formats.mjcf.scene import to_scene
@@ -25,11 +28,12 @@ from dh2sim.kinematics.parallelograms import find_couplings
 from dh2sim.kinematics.sampling import scattered_configurations
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_mechanism_frames, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
-from dh2sim.messages import counted, listed
-from dh2sim.model.mechanism import MechanismModel
-from dh2sim.model.robot_model import FilledIn, RobotModel
+from dh2sim.messages import counted, listed, member
+from dh2sim.model.mechanism import AnyModel, MechanismModel, written_model
+from dh2sim.model.robot_model import FilledIn
 from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
 from dh2sim.robot.row import ActuatorSpec, ActuatorType, Dynamics
+from dh2sim.robot.spec import SpecLike
 
 
 class Format(StrEnum):
@@ -39,9 +43,7 @@ class Format(StrEnum):
     MJCF = "mjcf"
 
 
-def render(
-    model: RobotModel | MechanismModel, formats: Collection[Format], *, dh_frames: bool = True
-) -> dict[str, bytes]:
+def render(model: AnyModel, formats: Collection[Format], *, dh_frames: bool = True) -> dict[str, bytes]:
     """Return the files of an export.
 
     Args:
@@ -119,7 +121,7 @@ class Loss:
         return words if self.format is None else f"{self.format.upper()}: {words}"
 
 
-def losses(model: RobotModel | MechanismModel, formats: Collection[Format]) -> list[Loss]:
+def losses(model: AnyModel, formats: Collection[Format]) -> list[Loss]:
     """List what is in the robot file and the formats cannot hold."""
     found: list[Loss] = []
     if Format.URDF in formats:
@@ -136,7 +138,7 @@ def losses(model: RobotModel | MechanismModel, formats: Collection[Format]) -> l
     return found
 
 
-def _lost_in_urdf(model: RobotModel | MechanismModel) -> Iterator[Loss]:
+def _lost_in_urdf(model: AnyModel) -> Iterator[Loss]:
     spec, urdf = model.spec, Format.URDF
     kept = find_couplings(spec).closures if spec.closures else ()  # by joints that mimic others
     if lost := tuple(closure.name for closure in spec.closures if closure.name not in kept):
@@ -155,7 +157,7 @@ def _lost_in_urdf(model: RobotModel | MechanismModel) -> Iterator[Loss]:
         yield Loss(what=Lost.EXCLUSIONS, format=urdf, where=pairs)
 
 
-def _lost_in_mjcf(model: RobotModel | MechanismModel) -> Iterator[Loss]:
+def _lost_in_mjcf(model: AnyModel) -> Iterator[Loss]:
     names = tuple(
         row.name
         for row in model.spec.all_rows
@@ -187,7 +189,7 @@ class Verified:
     """Greatest angle, rad."""
 
 
-def verify(model: RobotModel | MechanismModel, folder: Path, formats: Collection[Format]) -> list[Verified]:
+def verify_files(model: AnyModel, folder: Path, formats: Collection[Format]) -> list[Verified]:
     """Compare all frames of the files in ``folder`` with the table at scattered configurations.
 
     Raises:
@@ -303,6 +305,25 @@ class ExportReport:
         checked = "compared with the table" if self.verified else "not compared with the table"
         return f"<ExportReport of '{self.name}': {files}; {checked}>"
 
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry of the ``robots`` list that ``dh2sim export --json`` prints."""
+        return {
+            "name": self.name,
+            "files": [{"path": str(file.path), "bytes": file.size, "changed": file.changed} for file in self.files],
+            "verified": [
+                {
+                    "format": each.format.value,
+                    "max_position_error": each.position_error,
+                    "max_rotation_error": each.rotation_error,
+                }
+                for each in self.verified
+            ],
+            "losses": [str(loss) for loss in self.losses],
+            "estimates": [str(entry) for entry in self.estimates],
+            "assumptions": [str(entry) for entry in self.assumptions],
+            "warnings": list(self.warnings),
+        }
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
@@ -314,23 +335,23 @@ class Drift:
 
 
 def export_robot(
-    model: RobotModel | MechanismModel,
-    out: Path,
+    robot: SpecLike,
+    out: str | PathLike[str] = "generated",
     *,
-    formats: Collection[Format] = ALL_FORMATS,
+    formats: Iterable[Format | str] | Format | str = ALL_FORMATS,
     dh_frames: bool = True,
-    verified: bool = True,
+    verify: bool = True,
     wait: bool = True,
     waiting: Callable[[Path], None] | None = None,
 ) -> ExportReport:
     """Write a robot's files to ``out``/<name>/, all of them or none; a file that is the same already is left alone.
 
     Args:
-        model: the robot.
+        robot: the robot, in any form.
         out: the folder that holds a folder for each robot.
-        formats: what to write.
+        formats: 'urdf', 'mjcf' or both.
         dh_frames: whether the URDF has a link for every DH frame.
-        verified: whether to compare the written files with the table before they are put in place.
+        verify: whether to compare the written files with the table before they are put in place.
         wait: whether to wait while another process writes the files of this robot, or to raise an error.
         waiting: called once with the folder if that takes longer than a moment.
 
@@ -343,17 +364,20 @@ def export_robot(
         MismatchError: a file's poses differ from the table's.
         OutputError: the files cannot be written. In each case the files that were there before are untouched.
     """
-    files = render(model, formats, dh_frames=dh_frames)
-    target = out / model.name
+    folder = file_path("out", out)
+    wanted = list(dict.fromkeys(member(Format, name, "format") for name in names("formats", formats)))
+    model = written_model(robot)
+    files = render(model, wanted, dh_frames=dh_frames)
+    target = folder / model.name
     checks: list[Verified] = []
     warned: list[str] = []
-    with atomic_files(out, model.name, wait=wait, waiting=waiting) as staging:
+    with atomic_files(folder, model.name, wait=wait, waiting=waiting) as staging:
         for relative, data in files.items():
             (staging / relative).parent.mkdir(parents=True, exist_ok=True)
             (staging / relative).write_bytes(data)
-        if verified:
+        if verify:
             with mujoco_warnings() as warned:
-                checks = verify(model, staging, formats)
+                checks = verify_files(model, staging, wanted)
         unchanged = {relative for relative, data in files.items() if _holds(target / relative, data)}
     return ExportReport(
         name=model.name,
@@ -362,7 +386,7 @@ def export_robot(
             for relative, data in files.items()
         ),
         verified=tuple(checks),
-        losses=tuple(losses(model, formats)),
+        losses=tuple(losses(model, wanted)),
         estimates=model.estimates,
         assumptions=model.assumptions,
         warnings=warning_sentences(warned, [joint.name for joint in model.moving_joints]),
@@ -376,7 +400,7 @@ _SHOWN = 12
 """Digits of a hash that messages show."""
 
 
-def mixture(model: RobotModel | MechanismModel, folder: Path, formats: Collection[Format] = ALL_FORMATS) -> str:
+def mixture(model: AnyModel, folder: Path, formats: Collection[Format] = ALL_FORMATS) -> str:
     """Return a sentence if the files of a robot come from different robot files, or an empty text.
 
     The first line of each says which, with its SHA-256. Files without such a line were not exported, and are ignored.
@@ -397,7 +421,7 @@ def mixture(model: RobotModel | MechanismModel, folder: Path, formats: Collectio
     return f"contains files of different exports: {parts}"
 
 
-def _names(model: RobotModel | MechanismModel, formats: Collection[Format]) -> list[str]:
+def _names(model: AnyModel, formats: Collection[Format]) -> list[str]:
     urdf = [f"{model.name}.urdf"] if Format.URDF in formats else []
     return [*urdf, *([f"{model.name}.xml", "scene.xml"] if Format.MJCF in formats else [])]
 
@@ -415,7 +439,7 @@ def _shortened(origin: str) -> str:
 
 
 def drift(
-    model: RobotModel | MechanismModel,
+    model: AnyModel,
     out: Path,
     *,
     formats: Collection[Format] = ALL_FORMATS,

@@ -1,6 +1,7 @@
 """``Robot``: a robot with its verbs.
 
-Every method calls functions that are public themselves, and imports what it needs when it is called.
+Every method calls a function that is public itself, and imports it when it is called. What a method says of its
+arguments is what ``help`` shows; which values are allowed is checked by the function.
 """
 
 from __future__ import annotations
@@ -16,10 +17,9 @@ from typing import TYPE_CHECKING, Any, Final, Self, TypeAlias, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.arguments import file_path, names
-from dh2sim.errors import ArgumentError, Dh2simError
+from dh2sim.arguments import file_path
+from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.transforms import PoseLike, pose_of
-from dh2sim.messages import member
 from dh2sim.robot.links import BaseSpec, PayloadSpec, ToolSpec
 from dh2sim.robot.row import Convention, Row
 from dh2sim.robot.spec import RobotSpec
@@ -43,18 +43,20 @@ if TYPE_CHECKING:
     from dh2sim.compare.comparison import Comparison
     from dh2sim.draw.diagram.drawing import DrawingStyle, RobotDrawing
     from dh2sim.export import ExportReport, Format
+    from dh2sim.importing.convert import TableFormLike
     from dh2sim.inverse.goals import Free
     from dh2sim.inverse.textbook import Explanation
     from dh2sim.kinematics.batches import BatchOptions, JacobianOptions
-    from dh2sim.kinematics.chain import KinematicChain, SpecLike
+    from dh2sim.kinematics.chain import KinematicChain
     from dh2sim.mobility.result import Mobility
     from dh2sim.model.mechanism import MechanismModel
     from dh2sim.model.robot_model import RobotModel
     from dh2sim.model.slips import Slip
+    from dh2sim.robot.spec import SpecLike
     from dh2sim.simulate.options import RolloutKeywords
     from dh2sim.sweep.sweep import Sweep, SweepKeywords
     from dh2sim.symbolic.request import SymbolicForm, SymbolicKeywords, What
-    from dh2sim.trajectory.plan import TrajectoryKeywords
+    from dh2sim.trajectory.options import TrajectoryKeywords
     from dh2sim.trajectory.trajectory import Trajectory
     from dh2sim.validate.report import RobotReport
     from dh2sim.view.server import PageServer
@@ -137,7 +139,7 @@ class Robot:
         Raises:
             AssemblyError: It has loops that cannot be closed.
         """
-        from dh2sim.kinematics.chain import spec_of
+        from dh2sim.robot.spec import spec_of
 
         robot = cls.__new__(cls)
         robot._set(spec_of(spec), notes)
@@ -150,7 +152,7 @@ class Robot:
     @classmethod
     def of_model(cls, model: RobotModel) -> Self:
         """Return the robot of a model."""
-        from dh2sim.kinematics.chain import spec_of
+        from dh2sim.robot.spec import spec_of
 
         return cls.from_spec(spec_of(model))
 
@@ -199,17 +201,8 @@ class Robot:
         Raises:
             Dh2simError: The file is wrong or holds no serial arm; the text says what and where.
         """
-        return cls._imported(
-            path,
-            base=base,
-            tip=tip,
-            convention=convention,
-            tolerance=tolerance,
-            package_paths=package_paths,
-            root=root,
-            arguments=arguments or {},
-            name=name,
-        )
+        where = {"package_paths": package_paths, "root": root, "arguments": arguments or {}}
+        return cls._imported(path, base=base, tip=tip, convention=convention, tolerance=tolerance, name=name, **where)
 
     @classmethod
     def from_mjcf(
@@ -321,11 +314,6 @@ class Robot:
 
         return build_mechanism(self.spec)
 
-    @property
-    def _written(self) -> RobotModel | MechanismModel:
-        """What is exported and checked."""
-        return self.mechanism if self.spec.is_mechanism else self.model
-
     @cached_property
     def configurations(self) -> Mapping[str, Array]:
         """Named joint vectors, rad and m, each of shape (n,): ``zero``, ``home`` and those of the robot file."""
@@ -355,13 +343,9 @@ class Robot:
             SingularPositionError: A dead or singular position of a mechanism is on the way.
             UnknownFrameError: The frame is unknown.
         """
-        if self.spec.is_mechanism:
-            from dh2sim.kinematics.loop_motion import mechanism_pose
-
-            return mechanism_pose(self.spec, q, frame, **options)
         from dh2sim.kinematics.forward import frame_pose
 
-        return frame_pose(self.chain, frame, self._vectors(q), **options)
+        return frame_pose(self, frame, q, **options)
 
     def jacobian(self, q: ArrayLike, frame: str = "tool0", **options: Unpack[JacobianOptions]) -> Array:
         """Return the geometric Jacobian of a frame in base_link.
@@ -379,13 +363,9 @@ class Robot:
             UnknownFrameError: The frame is unknown.
             SingularPositionError: The driven joints of a mechanism do not determine the passive ones there.
         """
-        if self.spec.is_mechanism:
-            from dh2sim.kinematics.loop_motion import mechanism_jacobian
-
-            return mechanism_jacobian(self.spec, q, frame, **options)
         from dh2sim.kinematics.forward import geometric_jacobian
 
-        return geometric_jacobian(self.chain, self._vectors(q), frame=frame, **options)
+        return geometric_jacobian(self, q, frame=frame, **options)
 
     def singular_values(self, q: ArrayLike, frame: str = "tool0") -> Array:
         """Return the singular values of :meth:`jacobian`, largest first, shape (..., min(6, n))."""
@@ -404,9 +384,6 @@ class Robot:
         from dh2sim.kinematics.sampling import random_configurations
 
         return random_configurations(*self.model.travel, count, seed)
-
-    def _vectors(self, q: ArrayLike) -> ArrayLike:
-        return self.spec.configuration(q) if isinstance(q, str) else q
 
     def ik(
         self,
@@ -440,8 +417,7 @@ class Robot:
         """
         from dh2sim.inverse.solver import inverse_kinematics
 
-        near = None if q0 is None else self._vectors(q0)
-        return inverse_kinematics(self, T, near, limits, lock, free, numeric)
+        return inverse_kinematics(self, T, q0, limits, lock, free, numeric)
 
     def explain_ik(self, T: ArrayLike) -> Explanation:
         """Derive the configurations that reach a pose as a textbook does, in steps with the numbers.
@@ -477,7 +453,7 @@ class Robot:
         """
         from dh2sim.workspace.workspace import compute_workspace
 
-        return compute_workspace(self.model, **options)
+        return compute_workspace(self, **options)
 
     def mobility(self) -> Mobility:
         """Count the degrees of freedom, and find out by rank and by walking along the loops what they are.
@@ -487,9 +463,9 @@ class Robot:
         """
         from dh2sim.mobility.robot_mechanism import find_mobility
 
-        return find_mobility(self.spec)
+        return find_mobility(self)
 
-    def convert(self, convention: Convention | str) -> Self:
+    def convert(self, to: TableFormLike) -> Self:
         """Return the same arm with its table in another convention, 'standard' or 'modified', or 'compact'.
 
         A compact table has every frame within reach of the arm; ``notes`` says which rows changed, and why.
@@ -499,7 +475,7 @@ class Robot:
         """
         from dh2sim.importing.convert import convert_robot
 
-        converted = convert_robot(self.spec, convention)
+        converted = convert_robot(self, to)
         return self.from_spec(converted.spec, notes=converted.notes)
 
     def save(self, path: FilePath, *, overwrite: bool = False) -> None:
@@ -512,7 +488,7 @@ class Robot:
         """
         from dh2sim.robot.write import save_robot
 
-        save_robot(self.spec, file_path("path", path), notes=self.notes, overwrite=overwrite)
+        save_robot(self, path, notes=self.notes, overwrite=overwrite)
 
     def symbolic(self, what: What | str = "pose", **options: Unpack[SymbolicKeywords]) -> SymbolicForm:
         """Return the robot's kinematics or dynamics in symbols, compared with numbers; ``print`` shows it.
@@ -527,8 +503,7 @@ class Robot:
         """
         from dh2sim.symbolic.request import symbolic_form
 
-        in_numbers = isinstance(what, str) and what == "dynamics" and not options.get("letters")
-        return symbolic_form(self.spec, what, bodies=self.model.bodies if in_numbers else None, **options)
+        return symbolic_form(self, what, **options)
 
     def code(
         self, language: Language | str = "python", what: str | Iterable[str] = "pose", *, name: str | None = None
@@ -546,19 +521,19 @@ class Robot:
         """
         from dh2sim.codegen.generate import generate_code
 
-        return generate_code(self, what, language, name=name)
+        return generate_code(self, language, what, name=name)
 
     def urdf(self, *, dh_frames: bool = True) -> str:
         """Return the URDF; with ``dh_frames`` it has a link for every DH frame. Meshes are written by ``export``."""
         from dh2sim.formats.urdf.write import to_urdf
 
-        return to_urdf(self._written, dh_frames=dh_frames)
+        return to_urdf(self, dh_frames=dh_frames)
 
     def mjcf(self) -> str:
         """Return the MJCF. Meshes are written by ``export``."""
         from dh2sim.formats.mjcf.write import to_mjcf
 
-        return to_mjcf(self._written)
+        return to_mjcf(self)
 
     def mjmodel(self) -> mujoco.MjModel:
         """Return the robot compiled by MuJoCo, without floor or light.
@@ -571,7 +546,7 @@ class Robot:
         """
         from dh2sim.engines.mujoco_model import compile_robot
 
-        compiled, sentences = compile_robot(self._written)
+        compiled, sentences = compile_robot(self)
         for sentence in sentences:
             warnings.warn(f"{self.name}: {sentence}", RuntimeWarning, stacklevel=2)
         return compiled
@@ -580,7 +555,7 @@ class Robot:
         self,
         out: FilePath = "generated",
         *,
-        formats: Iterable[Format | str] = ("urdf", "mjcf"),
+        formats: Iterable[Format | str] | Format | str = ("urdf", "mjcf"),
         dh_frames: bool = True,
         verify: bool = True,
     ) -> ExportReport:
@@ -599,19 +574,15 @@ class Robot:
         Raises:
             Dh2simError: The robot cannot be exported; what was there before is untouched.
         """
-        from dh2sim.export import Format, export_robot
+        from dh2sim.export import export_robot
 
-        chosen = [member(Format, format_, "format") for format_ in names("formats", formats)]
-        wanted = list(dict.fromkeys(chosen))
-        return export_robot(
-            self._written, file_path("out", out), formats=wanted, dh_frames=dh_frames, verified=verify
-        )
+        return export_robot(self, out, formats=formats, dh_frames=dh_frames, verify=verify)
 
     def slips(self) -> tuple[Slip, ...]:
         """Return numbers that are allowed but rarely meant, such as degrees in a file of radians."""
         from dh2sim.model.slips import find_slips
 
-        return find_slips(self.model)
+        return find_slips(self)
 
     def validate(
         self,
@@ -619,6 +590,7 @@ class Robot:
         samples: int = 1000,
         seed: int = 0,
         tolerance: float = 1e-12,
+        folder: FilePath | None = None,
         source: FilePath | None = None,
         base: str | None = None,
         tip: str | None = None,
@@ -629,6 +601,7 @@ class Robot:
             samples: Number of random configurations inside the limits.
             seed: Seed of the random number generator.
             tolerance: Allowed angle, rad, and distance as a share of max(1 m, reach).
+            folder: Folder with the exported files; by default they are exported afresh.
             source: URDF or MJCF that the robot was imported from, to compare its masses with.
             base: Link of the source that became base_link; by default the root.
             tip: Link or site of the source that became tool0; by default where the arm ends.
@@ -638,13 +611,8 @@ class Robot:
         """
         from dh2sim.validate.run import validate_robot
 
-        options = None
-        if source is not None:
-            from dh2sim.importing.sources import ImportOptions
-
-            options = ImportOptions(base=base, tip=tip)
         return validate_robot(
-            self._written, samples=samples, seed=seed, tolerance=tolerance, source=source, source_options=options
+            self, samples=samples, seed=seed, tolerance=tolerance, folder=folder, source=source, base=base, tip=tip
         )
 
     def diff(self, other: SpecLike | FilePath, *, tolerance: float = 1e-6) -> Comparison:
@@ -681,11 +649,7 @@ class Robot:
         """
         from dh2sim.trajectory.plan import plan_trajectory
 
-        if self.spec.is_mechanism:
-            from dh2sim.trajectory.mechanism import plan_mechanism_trajectory
-
-            return plan_mechanism_trajectory(self.mechanism, waypoints, **options)
-        return plan_trajectory(self.model, waypoints, **options)
+        return plan_trajectory(self, waypoints, **options)
 
     def rollout(
         self,
@@ -697,6 +661,7 @@ class Robot:
         resume: bool = False,
         overwrite: bool = False,
         share: tuple[int, int] | None = None,
+        blocks: Sequence[int] | None = None,
         block_size: int | None = None,
         executor: Executor | Client | str | None = None,
         **options: Unpack[RolloutKeywords],
@@ -711,10 +676,11 @@ class Robot:
             resume: Whether to continue the run at ``out``, if there is one.
             overwrite: Whether to replace the run at ``out``.
             share: ``(i, n)``: simulate the i-th of n shares of the run's blocks, beside other processes.
+            blocks: Simulate these blocks, from 0.
             block_size: Rollouts in a block; by default some seconds' work.
             executor: Simulates the blocks in place of this process: one of ``concurrent.futures``, a client of Dask,
                 'local' or 'dask://HOST:PORT'.
-            **options: What is simulated and recorded, as for :func:`dh2sim.simulate.rollout`: ``controller`` (its
+            **options: What is simulated and recorded, as for :func:`dh2sim.rollout`: ``controller`` (its
                 name, or a class of your own), ``seed``, ``duration`` or ``steps``, ``timestep``, ``integrator``,
                 ``start``, ``record``, ``every``, ``randomize``, ``floating_base``; ``vary``, ``designs`` and
                 ``per_design`` for robots that differ.
@@ -730,12 +696,13 @@ class Robot:
         if rollouts is not None:
             options["rollouts"] = rollouts
         return rollout(
-            self._written,
+            self,
             out=out,
             threads=threads,
             resume=resume,
             overwrite=overwrite,
             share=share,
+            blocks=blocks,
             block_size=block_size,
             executor=executor,
             **options,
@@ -746,7 +713,7 @@ class Robot:
 
         Args:
             out: File to write, .parquet or .csv; the same call continues it. None to keep the table in memory.
-            **options: As for :func:`dh2sim.sweep.sweep.sweep`: ``vary`` or ``designs``, ``count``, ``measure``
+            **options: As for :func:`dh2sim.sweep_designs`: ``vary`` or ``designs``, ``count``, ``measure``
                 ('workspace', 'manipulability', 'reach', 'payload', or ``module:function``, which is given a
                 :class:`Robot`), ``samples``, ``voxel``, ``seed``, ``jobs``, ``overwrite``.
 
@@ -756,27 +723,18 @@ class Robot:
         Raises:
             Dh2simError: An option or a design is wrong, a measure fails, or the table cannot be written.
         """
-        from dh2sim.sweep.sweep import sweep
+        from dh2sim.sweep.sweep import sweep_designs
 
-        return sweep(self.model, out=out, wrap=Robot.of_model, **options)
+        return sweep_designs(self, out=out, wrap=Robot.of_model, **options)
 
-    def calibrate(
-        self,
-        data: Measurements | FilePath,
-        *,
-        kind: str | None = None,
-        groups: str | None = None,
-        **options: Unpack[CalibrationKeywords],
-    ) -> Calibration:
+    def calibrate(self, data: Measurements | FilePath, **options: Unpack[CalibrationKeywords]) -> Calibration:
         """Fit table, base and tool to measurements of the real robot.
 
         Args:
             data: A CSV file, as ``docs/calibration.md`` describes it; or what ``measurements`` makes of arrays, or
                 ``run_measurements`` of a run.
-            kind: What a file contains, 'pose', 'position', 'distance' or 'socket'; by default seen by its columns.
-            groups: Column of a file; rows with the same value are held out together.
-            **options: As for :func:`dh2sim.calibrate.calibration.calibrate`: ``unknown``, ``prior``, ``robust``,
-                ``noise``, ``held_out``, ``seed``.
+            **options: As for :func:`dh2sim.calibrate_robot`: ``kind`` and ``groups`` of a file;
+                ``unknown``, ``prior``, ``robust``, ``noise``, ``held_out``, ``seed``.
 
         Returns:
             The calibration: ``robot`` is a specification, from which ``Robot.from_spec`` makes a robot.
@@ -785,22 +743,19 @@ class Robot:
             MeasurementFileError: The file is wrong; the text says what and where.
             CalibrationError: The measurements do not determine what is to be fitted.
         """
-        from dh2sim.calibrate.calibration import calibrate
-        from dh2sim.calibrate.data_file import read_measurements
-        from dh2sim.calibrate.measurements import Measurements
+        from dh2sim.calibrate.calibration import calibrate_robot
 
-        if isinstance(data, str | os.PathLike):
-            data = read_measurements(data, self, kind=kind, groups=groups)
-        if not isinstance(data, Measurements):
-            raise ArgumentError(f"data must be measurements or the path of a file, got {type(data).__name__}")
-        return calibrate(self, data, **options)
+        return calibrate_robot(self, data, **options)
 
-    def plan_measurements(self, count: int, *, kind: str = "position", seed: int = 0) -> Plan:
+    def plan_measurements(
+        self, count: int, *, kind: str = "position", noise: float | tuple[float, float] = 1e-4, seed: int = 0
+    ) -> Plan:
         """Choose configurations to measure the robot at, inside its limits and without self-contact.
 
         Args:
             count: Number of configurations.
             kind: What is measured: 'pose', 'position' or 'distance'.
+            noise: Standard deviation of a component, m, or m and rad.
             seed: Seed of the random number generator.
 
         Returns:
@@ -811,7 +766,7 @@ class Robot:
         """
         from dh2sim.calibrate.plan import plan_measurements
 
-        return plan_measurements(self, count, kind=kind, seed=seed)
+        return plan_measurements(self, count, kind=kind, noise=noise, seed=seed)
 
     def draw(
         self,
@@ -861,7 +816,7 @@ class Robot:
         """
         from dh2sim.view.start import start_viewer
 
-        return start_viewer(self.spec, host=host, port=port, browser=browser, allow_hosts=allow_hosts)
+        return start_viewer(self, host=host, port=port, browser=browser, allow_hosts=allow_hosts)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle, and copy, without what was computed."""

@@ -25,7 +25,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the simulated robots of the tests
 
-from dh2sim.calibrate.calibration import calibrate
+from dh2sim.calibrate.calibration import calibrate_robot
 from dh2sim.calibrate.fit import fit
 from dh2sim.calibrate.observations import Observations
 from dh2sim.robot.read import load_robot
@@ -67,7 +67,7 @@ def simulate(name: str, kind: str, *, fits: int, seed: int = 0) -> Statistics:
     for k in range(fits):
         true = off(nominal, 1e-3, 1000 * seed + k)
         q, unseen = random_q(nominal, ROWS[kind], 2000 * seed + k), random_q(nominal, UNSEEN, 3000 * seed + k)
-        found = calibrate(nominal, measured(nominal, true, kind, q, seed=k), noise=SIGMA, held_out=False)
+        found = calibrate_robot(nominal, measured(nominal, true, kind, q, seed=k), noise=SIGMA, held_out=False)
         best = found.fit
         chi2.append(best.chi2)
         dof = best.dof

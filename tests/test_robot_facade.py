@@ -315,6 +315,42 @@ def test_functions_take_a_robot_in_any_form(arm: Robot) -> None:
         )
 
 
+def test_functions_take_a_mechanism_in_any_form(tmp_path: Path) -> None:
+    four_bar = Robot.load("four_bar")
+    for robot in (four_bar, four_bar.spec, four_bar.mechanism):
+        assert np.array_equal(dh2sim.forward_kinematics(robot, "home", frame="dh_1"), four_bar.fk("home", "dh_1"))
+        assert np.array_equal(dh2sim.geometric_jacobian(robot, "home"), four_bar.jacobian("home"))
+        assert dh2sim.to_mjcf(robot) == four_bar.mjcf()
+        assert dh2sim.to_urdf(robot) == four_bar.urdf()
+        assert dh2sim.to_scene(robot).startswith("<!--")
+        assert dh2sim.plan_trajectory(robot, ["home", [1.5]]).duration > 0.0
+        assert len(dh2sim.export_robot(robot, tmp_path, verify=False).files) == 3
+
+
+def test_functions_take_what_methods_take(arm: Robot, tmp_path: Path) -> None:
+    assert np.array_equal(dh2sim.forward_kinematics(arm, "out", frame="dh_2"), arm.fk("out", "dh_2"))
+    assert np.array_equal(dh2sim.geometric_jacobian(arm.spec, "out"), arm.jacobian("out"))
+    goal = arm.fk("out")
+    assert np.array_equal(dh2sim.inverse_kinematics(arm, goal, "out").q, arm.ik(goal, "out").q)
+    for robot in (arm, arm.spec, arm.model):
+        assert dh2sim.plan_trajectory(robot, ["home", "out"]).duration == arm.trajectory(["home", "out"]).duration
+        assert dh2sim.robot_file_text(robot) == dh2sim.robot_file_text(arm.spec)
+    assert str(dh2sim.symbolic_form(arm, "dynamics")) == str(arm.symbolic("dynamics"))
+    report = dh2sim.export_robot(arm.spec, str(tmp_path), formats="mjcf", verify=False)
+    assert [file.path.name for file in report.files] == ["my_arm.xml", "scene.xml"]
+    dh2sim.save_robot(arm, tmp_path / "arm.yaml")
+    assert Robot.load(tmp_path / "arm.yaml").mjcf().splitlines()[5:] == arm.mjcf().splitlines()[5:]
+
+
+def test_exported_files_are_validated_where_they_are(arm: Robot, tmp_path: Path) -> None:
+    arm.export(tmp_path)
+    assert arm.validate(samples=5, folder=str(tmp_path / "my_arm")).ok
+    (tmp_path / "my_arm" / "my_arm.urdf").write_text("<robot/>")
+    assert not arm.validate(samples=5, folder=tmp_path / "my_arm").ok
+    with pytest.raises(Dh2simError, match="base and tip are links of the source, and need it"):
+        arm.validate(samples=5, tip="flange")
+
+
 @pytest.mark.parametrize(
     ("function", "wanted"),
     [

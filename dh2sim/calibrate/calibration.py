@@ -1,15 +1,17 @@
-"""``calibrate``: a robot's table fitted to measurements, with all that can be said of how far to trust it."""
+"""``calibrate_robot``: a robot's table fitted to measurements, with all that can be said of how far to trust it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from os import PathLike
 from typing import Final, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dh2sim.calibrate.data_file import read_measurements
 from dh2sim.calibrate.fit import NOISY, Fit, Sigma, fit, weighted_jacobian
 from dh2sim.calibrate.hayati_rows import fit_rows
 from dh2sim.calibrate.held_out import Errors, errors_of, held_out_errors
@@ -29,11 +31,11 @@ from dh2sim.calibrate.plausibility import (
 )
 from dh2sim.calibrate.result import Calibration, ParameterResult, ParameterStatus
 from dh2sim.calibrate.unknowns import prior_of, requested_columns
-from dh2sim.errors import CalibrationError
-from dh2sim.kinematics.chain import SpecLike, serial_spec_of
+from dh2sim.errors import ArgumentError, CalibrationError
+from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.messages import counted
 from dh2sim.robot.row import JointType
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike
 from dh2sim.typing import Array
 
 _TRIES: Final = 300
@@ -43,6 +45,8 @@ _TRIES: Final = 300
 class CalibrationKeywords(TypedDict, total=False):
     """What may be said of a calibration."""
 
+    kind: Kind | str | None
+    groups: str | None
     unknown: Iterable[str] | None
     prior: Mapping[str, float] | None
     robust: bool
@@ -51,10 +55,12 @@ class CalibrationKeywords(TypedDict, total=False):
     seed: int
 
 
-def calibrate(
+def calibrate_robot(
     robot: SpecLike,
-    measured: Measurements,
+    data: Measurements | str | PathLike[str],
     *,
+    kind: Kind | str | None = None,
+    groups: str | None = None,
     unknown: Iterable[str] | None = None,
     prior: Mapping[str, float] | None = None,
     robust: bool = False,
@@ -66,7 +72,10 @@ def calibrate(
 
     Args:
         robot: A serial robot, as its maker describes it.
-        measured: As ``measurements`` makes them of arrays, and ``read_measurements`` of a file.
+        data: A CSV file, as ``docs/calibration.md`` describes it; or what ``measurements`` makes of arrays, or
+            ``run_measurements`` of a run.
+        kind: What a file contains, 'pose', 'position', 'distance' or 'socket'; by default seen by its columns.
+        groups: Column of a file; rows with the same value are held out together.
         unknown: Groups of parameters to fit (base, tool, a, alpha, d, theta, beta), rows, or single parameters such
             as ``joint_2.theta``; by default all.
         prior: Standard deviations of what the robot file says: ``length`` (m) and ``angle`` (rad) of the table's
@@ -77,9 +86,13 @@ def calibrate(
         seed: Of random configurations and folds.
 
     Raises:
+        MeasurementFileError: The file is wrong; the text says what and where.
         CalibrationError: The measurements cannot tell what is asked of them; the text says why.
     """
     spec = serial_spec_of(robot)
+    measured = read_measurements(data, spec, kind=kind, groups=groups) if isinstance(data, str | PathLike) else data
+    if not isinstance(measured, Measurements):
+        raise ArgumentError(f"data must be measurements or the path of a file, got {type(data).__name__}")
     sigma = _sigma(noise)
     task = _Task(spec, measured, unknown, prior, robust=robust, sigma=sigma, seed=seed)
     before, whole = task.solve(measured)

@@ -16,11 +16,11 @@ import numpy as np
 from dh2sim.calibrate.measurements import OTHER_KINDS, Kind, Measurements, grouped, problems_of
 from dh2sim.errors import Dh2simError, MeasurementFileError, Problem
 from dh2sim.input_files import check_columns, read_input, utf16_hint
-from dh2sim.kinematics.chain import SpecLike, serial_spec_of
+from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.kinematics.rotations import rotations_of_quaternions, rotations_of_vectors
 from dh2sim.kinematics.transforms import pose_from_rpy
 from dh2sim.messages import counted, did_you_mean, listed, member, shown
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike
 from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.typing import Array, read_only
 

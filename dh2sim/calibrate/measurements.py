@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dh2sim.errors import CalibrationError
-from dh2sim.kinematics.chain import SpecLike, serial_spec_of
+from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.messages import counted
+from dh2sim.robot.spec import SpecLike
 from dh2sim.typing import Array, read_only
 
 

@@ -24,11 +24,11 @@ from dh2sim.calibrate.identify import find_basis
 from dh2sim.calibrate.measurements import OTHER_KINDS, Kind
 from dh2sim.calibrate.parameters import Group, Parameter, RobotParameters, Values
 from dh2sim.errors import CalibrationError
-from dh2sim.kinematics.chain import SpecLike, serial_spec_of
+from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.messages import counted, member
 from dh2sim.model.build import build_model
 from dh2sim.mujoco_warnings import mujoco_warnings
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike
 from dh2sim.typing import Array, read_only
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ from dh2sim.checking.files import changed_files, find_robot_files
 from dh2sim.checking.findings import PART_OF_RULE, Baseline, CheckPart, CheckReport, Finding, RobotCheck
 from dh2sim.errors import Dh2simError, RobotError
 from dh2sim.export import drift
-from dh2sim.model.build import build_model
-from dh2sim.model.mechanism import MechanismModel, build_mechanism
+from dh2sim.model.mechanism import MechanismModel, written_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.slips import find_slips
 from dh2sim.progress import Advance
@@ -112,7 +111,7 @@ def _read(path: Path) -> _Entry:
     spec = None
     try:
         spec = load_robot(path)
-        return _Entry(path, spec, build_mechanism(spec) if spec.is_mechanism else build_model(spec))
+        return _Entry(path, spec, written_model(spec))
     except RobotError as error:
         found = [
             Finding(

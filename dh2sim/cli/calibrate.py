@@ -156,11 +156,11 @@ def calibrate(
     if rows is not None and from_run is None:
         raise typer.BadParameter("needs --from-run", param_hint="--rows")
 
-    from dh2sim.calibrate.calibration import calibrate as calibrated
+    from dh2sim.calibrate.calibration import calibrate_robot
 
     sigma, names, expected = _noise(noise), words_of(unknown, "--unknown") or None, _prior(prior)
     measured = _measured(spec, data, from_run, kind, groups, sigma, rows, seed)
-    found = calibrated(spec, measured, unknown=names, prior=expected, robust=robust, noise=sigma, seed=seed)
+    found = calibrate_robot(spec, measured, unknown=names, prior=expected, robust=robust, noise=sigma, seed=seed)
     _write(found, out, report)
     if as_json:
         from dh2sim.calibrate.data import calibration_data

@@ -376,13 +376,9 @@ def build_any(robots: Sequence[str], *, strict: bool | None = None) -> list[Robo
     Raises:
         Dh2simError: A file is wrong, two robots have the same name, or a mesh cannot be used.
     """
-    from dh2sim.model.build import build_model
-    from dh2sim.model.mechanism import MechanismModel, build_mechanism
+    from dh2sim.model.mechanism import MechanismModel, written_model
 
-    def build(spec: RobotSpec) -> RobotModel | MechanismModel:
-        return build_mechanism(spec) if spec.is_mechanism else build_model(spec)
-
-    models = _all(build, _load_distinct(robots))
+    models = _all(written_model, _load_distinct(robots))
     if strict is not None:
         report_slips([model for model in models if not isinstance(model, MechanismModel)], strict=strict)
     return models

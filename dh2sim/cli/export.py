@@ -5,19 +5,28 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dh2sim.cli.common import DONE, FELL_SHORT, RobotsArgument, StrictOption, build_any, choice, complain, words_of
-from dh2sim.cli.output import print_wrapped
+from dh2sim.cli.common import (
+    DONE,
+    FELL_SHORT,
+    JsonOption,
+    RobotsArgument,
+    StrictOption,
+    build_any,
+    choice,
+    complain,
+    words_of,
+)
+from dh2sim.cli.output import json_text, print_wrapped
 from dh2sim.errors import Dh2simError, OutputError
 from dh2sim.messages import listed, printable
 
 if TYPE_CHECKING:
     from dh2sim.export import ExportReport, Format
-    from dh2sim.model.mechanism import MechanismModel
-    from dh2sim.model.robot_model import RobotModel
+    from dh2sim.model.mechanism import AnyModel
 
 
 def export(
@@ -48,6 +57,7 @@ def export(
     no_wait: Annotated[
         bool, typer.Option("--no-wait", help="Fail if another process is writing the files of the same robot.")
     ] = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Write a robot as URDF and MJCF, and verify them against its table.
 
@@ -59,14 +69,15 @@ def export(
       dh2sim export stanford
       dh2sim export my_arm.yaml --out build --format urdf
       dh2sim export robots/*.yaml --check       # in CI: are the files up to date?
+      dh2sim export stanford --json             # what was written, lost, estimated
     """
     chosen = _formats(formats)
     models = build_any(robots, strict=strict)
     if check:
-        return _check(models, out, chosen, dh_frames=not no_dh_frames)
+        return _check(models, out, chosen, dh_frames=not no_dh_frames, as_json=as_json)
     from dh2sim.export import export_robot
 
-    status, written = DONE, list[str]()
+    status, written, printed = DONE, list[str](), list[dict[str, Any]]()
     for position, model in enumerate(models):
         try:
             report = export_robot(
@@ -74,7 +85,7 @@ def export(
                 out,
                 formats=chosen,
                 dh_frames=not no_dh_frames,
-                verified=not no_verify,
+                verify=not no_verify,
                 wait=not no_wait,
                 waiting=_report_waiting,
             )
@@ -89,7 +100,12 @@ def export(
             status = max(status, complain(error))
         else:
             written.append(model.name)
-            _print_report(report, out, model)
+            if as_json:
+                printed.append(report.to_json())
+            else:
+                _print_report(report, out)
+    if as_json:
+        print(json_text({"ok": status == DONE, "robots": printed}))
     return status
 
 
@@ -105,19 +121,27 @@ def _formats(names: list[str] | None) -> list[Format]:
     return list(dict.fromkeys(chosen or Format))
 
 
-def _check(
-    models: Sequence[RobotModel | MechanismModel], out: Path, formats: list[Format], *, dh_frames: bool
-) -> int:
+def _check(models: Sequence[AnyModel], out: Path, formats: list[Format], *, dh_frames: bool, as_json: bool) -> int:
     from dh2sim.export import drift
 
-    status = 0
-    for model in models:
-        found = drift(model, out, formats=formats, dh_frames=dh_frames)
-        if not found:
-            print(f"{model.name}: up to date")
-        for entry in found:
-            status = FELL_SHORT
-            print(printable(f"{model.name}: {entry.path}: {entry.what}"))
+    found = {model.name: drift(model, out, formats=formats, dh_frames=dh_frames) for model in models}
+    status = FELL_SHORT if any(found.values()) else DONE
+    if as_json:
+        robots = [
+            {
+                "name": name,
+                "ok": not drifted,
+                "drift": [{"path": str(each.path), "what": each.what} for each in drifted],
+            }
+            for name, drifted in found.items()
+        ]
+        print(json_text({"ok": status == DONE, "robots": robots}))
+        return status
+    for name, drifted in found.items():
+        if not drifted:
+            print(f"{name}: up to date")
+        for entry in drifted:
+            print(printable(f"{name}: {entry.path}: {entry.what}"))
     if status:
         print(
             "dh2sim: some files are not what the robot files say; write them with 'dh2sim export'",
@@ -126,7 +150,7 @@ def _check(
     return status
 
 
-def _print_report(report: ExportReport, out: Path, model: RobotModel | MechanismModel) -> None:
+def _print_report(report: ExportReport, out: Path) -> None:
     """Print a table of the files with their errors, then what was lost, estimated and assumed."""
     folder = out / report.name
     errors = {check.format.value: check for check in report.verified}
@@ -144,8 +168,8 @@ def _print_report(report: ExportReport, out: Path, model: RobotModel | Mechanism
     for name, size, worst, state in lines:
         print(f"  {name:{widths[0]}}  {size:>{widths[1]}}  {worst:{widths[2]}}  {state}".rstrip())
     _list("not carried over", map(str, report.losses))
-    _list("estimated from the shapes", (f"{entry}." for entry in model.estimates))
-    _list("assumed", (f"{entry}." for entry in model.assumptions))
+    _list("estimated from the shapes", (f"{entry}." for entry in report.estimates))
+    _list("assumed", (f"{entry}." for entry in report.assumptions))
     _list("MuJoCo", report.warnings)
 
 

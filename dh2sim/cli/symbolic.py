@@ -15,7 +15,7 @@ from dh2sim.codegen.program import What as CodeWhat
 from dh2sim.errors import Dh2simError
 
 if TYPE_CHECKING:
-    from dh2sim.robot.spec import RobotSpec
+    from dh2sim.robot.spec import RobotSpec, SpecLike
 
 
 class Format(StrEnum):
@@ -110,15 +110,15 @@ def symbolic(
         refuse_options("--what dynamics", frames | nesting)
     require_free(out, force=force)
     spec = load_one(robot)
-    bodies = None
+    weighed: SpecLike = spec
     if wanted is What.DYNAMICS:
         _require_few_joints(spec)
-    if wanted is What.DYNAMICS and not letters:
-        from dh2sim.model.build import build_model
+        if not letters:
+            from dh2sim.model.build import build_model
 
-        bodies = build_model(spec).bodies
+            weighed = build_model(spec)
     form = symbolic_form(
-        spec,
+        weighed,
         wanted,
         source=source,
         target=target,
@@ -129,7 +129,6 @@ def symbolic(
         letters=letters,
         fold=axes,
         joint_names="q" if q else "theta",
-        bodies=bodies,
     )
     match format_:
         case Format.LATEX:

@@ -49,7 +49,7 @@ def print_code(robot: str, what: Sequence[str], as_: str, out: Path | None, *, f
     if as_.lower() in LANGUAGES:
         # MATLAB calls a function by the name of its file
         name = out.stem if out is not None and as_.lower() == Language.MATLAB else None
-        text = generate_code(spec, [word for word in wanted if word is not None], as_.lower(), name=name)
+        text = generate_code(spec, as_.lower(), [word for word in wanted if word is not None], name=name)
     elif about != What.INVERSE_DYNAMICS:
         raise typer.BadParameter(f"takes one of {', '.join(Language)} for several functions", param_hint="--as")
     elif as_ == "json":

@@ -113,7 +113,7 @@ def trajectory(
     """
     from dh2sim.model.mechanism import MechanismModel
     from dh2sim.trajectory.files import require_suffix
-    from dh2sim.trajectory.mechanism import driven_joints, plan_mechanism_trajectory
+    from dh2sim.trajectory.mechanism import driven_joints
     from dh2sim.trajectory.plan import plan_trajectory
 
     if out is None:
@@ -140,11 +140,7 @@ def trajectory(
 
     try:
         wanted: Any = {k: v for k, v in request.items() if v is not None}
-        planned = (
-            plan_mechanism_trajectory(built, points, stage=stage, **wanted)
-            if isinstance(built, MechanismModel)
-            else plan_trajectory(built, points, stage=stage, **wanted)
-        )
+        planned = plan_trajectory(built, points, stage=stage, **wanted)
     except TrajectoryError as error:
         raise TrajectoryError(_as_option(str(error))) from None
     if out is not None:

@@ -102,11 +102,6 @@ def validate(
         if isinstance(model, MechanismModel) and (dynamics or source is not None):
             option = "--dynamics" if dynamics else "--source"
             raise Dh2simError(f"{model.name}: {option} is for serial robots; this one is a mechanism")
-    source_options = None
-    if source is not None:
-        from dh2sim.importing.sources import ImportOptions
-
-        source_options = ImportOptions(base=base, tip=tip)
     serial = [model for model in models if not isinstance(model, MechanismModel)]
     poses = sum(engine_samples(samples, len(model.joints)) for model in serial)
     with progress_bar("comparing", "poses", poses) as advance:
@@ -119,7 +114,8 @@ def validate(
                 tolerance=tolerance,
                 folder=None if folder is None else folder / model.name,
                 source=source,
-                source_options=source_options,
+                base=base,
+                tip=tip,
                 advance=advance,
             )
             if dynamics and not isinstance(model, MechanismModel):

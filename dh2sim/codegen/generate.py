@@ -22,9 +22,9 @@ from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.kinematics.trace import Number, Operations, Trace, count_operations
 from dh2sim.messages import member
-from dh2sim.model.build import ModelLike, model_of
+from dh2sim.model.build import model_of
 from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike
 
 _WIDTH: Final = 100
 _MOST_TRIED: Final = 12
@@ -32,9 +32,9 @@ _MOST_TRIED: Final = 12
 
 
 def generate_code(
-    robot: ModelLike,
-    what: What | str | Iterable[What | str] = (What.POSE,),
+    robot: SpecLike,
     language: Language | str = Language.PYTHON,
+    what: What | str | Iterable[What | str] = What.POSE,
     *,
     name: str | None = None,
 ) -> str:
@@ -44,9 +44,9 @@ def generate_code(
     and compared with the table.
 
     Args:
-        robot: The robot.
-        what: 'pose' of tool0 in base_link, its 'jacobian', and 'inverse-dynamics', one or several.
+        robot: The robot, in any form.
         language: 'python', 'numpy', 'c', 'cpp', 'matlab' or 'javascript'.
+        what: 'pose' of tool0 in base_link, its 'jacobian', and 'inverse-dynamics', one or several.
         name: Begins the names of functions in C, is the namespace in C++ and the function's name in MATLAB; by
             default the robot's name.
 
@@ -65,7 +65,7 @@ def generate_code(
 
 
 def _asked_for(
-    robot: ModelLike, what: What | str | Iterable[What | str], name: str | None
+    robot: SpecLike, what: What | str | Iterable[What | str], name: str | None
 ) -> tuple[Program, RobotSpec, RobotModel | None]:
     wanted = {member(What, each, "code") for each in names("what", what)}
     if not wanted:
@@ -85,7 +85,7 @@ class CodeSummary:
     """Names, values in SI units, and notes; the base inertial parameters among them."""
 
 
-def summarize(robot: ModelLike, what: What | str | Iterable[What | str] = (What.INVERSE_DYNAMICS,)) -> CodeSummary:
+def summarize(robot: SpecLike, what: What | str | Iterable[What | str] = (What.INVERSE_DYNAMICS,)) -> CodeSummary:
     """Return what ``generate_code`` would write, in numbers; arguments and errors are those of it."""
     program, _, _ = _asked_for(robot, what, None)
     return CodeSummary(

@@ -19,10 +19,9 @@ from dh2sim.compare.screws import ScrewAxes, axes_of
 from dh2sim.compare.words import degrees, millimetres, pose_text
 from dh2sim.errors import Dh2simError
 from dh2sim.importing.sources import ImportOptions
-from dh2sim.kinematics.chain import SpecLike
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import invert
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike
 from dh2sim.typing import Array
 
 TOLERANCE = 1e-6

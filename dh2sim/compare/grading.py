@@ -20,9 +20,9 @@ from dh2sim.compare.matching import ObstacleKind
 from dh2sim.compare.misreadings import MisreadingKind
 from dh2sim.errors import Dh2simError
 from dh2sim.importing.sources import ImportOptions
-from dh2sim.kinematics.chain import SpecLike
 from dh2sim.messages import did_you_mean, listed, shown
 from dh2sim.robot.expressions import NumberError, to_number
+from dh2sim.robot.spec import SpecLike
 from dh2sim.robot.yaml_tree import Node, Report, compose, decode, read_yaml_file
 
 TOLERANCE_OF_GRADES = 1e-3

@@ -11,10 +11,10 @@ from dh2sim.formats.calibration import is_calibration
 from dh2sim.importing.axes import import_axes
 from dh2sim.importing.source_errors import errors_of
 from dh2sim.importing.sources import STDIN, ImportOptions, import_data, read_file
-from dh2sim.kinematics.chain import SpecLike, serial_spec_of
+from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.robot.axes_file import read_axes
 from dh2sim.robot.read import load_robot, parse_robot
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike
 
 PLAINLY = ImportOptions()
 """As a file says itself."""

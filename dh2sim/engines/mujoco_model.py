@@ -6,18 +6,16 @@ import mujoco
 
 from dh2sim.errors import EngineError
 from dh2sim.formats.mjcf.write import to_mjcf
-from dh2sim.model.mechanism import MechanismModel
-from dh2sim.model.robot_model import RobotModel
+from dh2sim.model.mechanism import written_model
 from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
+from dh2sim.robot.spec import SpecLike
 
 
-def compile_robot(
-    robot: RobotModel | MechanismModel, *, scene: str | None = None
-) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+def compile_robot(robot: SpecLike, *, scene: str | None = None) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     """Compile a robot.
 
     Args:
-        robot: The robot.
+        robot: The robot, in any form.
         scene: MJCF that includes ``<name>.xml``, the robot; by default the robot alone.
 
     Returns:
@@ -26,11 +24,12 @@ def compile_robot(
     Raises:
         EngineError: MuJoCo refuses it.
     """
-    mjcf = to_mjcf(robot)
-    files = {link.mesh.file_name: link.mesh.data for link in robot.all_links if link.mesh is not None}
+    model = written_model(robot)
+    mjcf = to_mjcf(model)
+    files = {link.mesh.file_name: link.mesh.data for link in model.all_links if link.mesh is not None}
     with mujoco_warnings() as warned:
         try:
-            compiled = mujoco.MjModel.from_xml_string(scene or mjcf, {f"{robot.name}.xml": mjcf.encode(), **files})
+            compiled = mujoco.MjModel.from_xml_string(scene or mjcf, {f"{model.name}.xml": mjcf.encode(), **files})
         except ValueError as error:
-            raise EngineError(f"{robot.name}: MuJoCo refuses the model: {' '.join(str(error).split())}") from error
-    return compiled, warning_sentences(warned, [joint.name for joint in robot.moving_joints])
+            raise EngineError(f"{model.name}: MuJoCo refuses the model: {' '.join(str(error).split())}") from error
+    return compiled, warning_sentences(warned, [joint.name for joint in model.moving_joints])

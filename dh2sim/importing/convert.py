@@ -11,7 +11,7 @@ import numpy as np
 
 from dh2sim.errors import Dh2simError, MismatchError
 from dh2sim.importing.source_errors import MADE, errors_of
-from dh2sim.kinematics.chain import SpecLike, build_chain, spec_of
+from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.compaction import compact_rows
 from dh2sim.kinematics.conversion import convert_rows
 from dh2sim.kinematics.frame_assignment.recover import CONFIGURATIONS, SEED
@@ -22,7 +22,7 @@ from dh2sim.messages import member
 from dh2sim.model.limits import frame_extent, travels_of
 from dh2sim.robot.read import parse_robot
 from dh2sim.robot.row import Convention
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike, spec_of
 from dh2sim.robot.units import AngleUnit, Units
 from dh2sim.robot.write import robot_file_text
 from dh2sim.typing import Array

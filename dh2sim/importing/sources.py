@@ -23,11 +23,11 @@ from dh2sim.importing.serial import import_serial
 from dh2sim.importing.source_errors import errors_of
 from dh2sim.importing.table import import_table
 from dh2sim.input_files import read_input
-from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.frame_assignment.recover import TOLERANCE
 from dh2sim.messages import Choice, member, shown
-from dh2sim.robot.read import load_robot
+from dh2sim.robot.read import loaded
 from dh2sim.robot.row import Convention
+from dh2sim.robot.spec import SpecLike, spec_of
 from dh2sim.robot.units import AngleUnit, LengthUnit
 
 STDIN = "-"
@@ -285,7 +285,7 @@ def _calibration(data: bytes, file: str, options: ImportOptions, folder: Path | 
     if options.convention is Convention.HAYATI:
         raise Dh2simError(_NO_HAYATI)
     given = options.nominal
-    nominal = load_robot(given) if isinstance(given, str | os.PathLike) else None if given is None else spec_of(given)
+    nominal = None if given is None else spec_of(loaded(given))
     called = "standard input" if file == STDIN else Path(file).name
     with errors_of(file):
         return import_calibration(

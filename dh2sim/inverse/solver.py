@@ -34,9 +34,9 @@ from dh2sim.inverse.solutions import Solutions
 from dh2sim.inverse.table import bare_table, shared_builds
 from dh2sim.inverse.trial import choose_method
 from dh2sim.inverse.turns import Turns
-from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, serial_spec_of
+from dh2sim.kinematics.chain import build_chain, configuration_of, joint_vector, serial_spec_of
 from dh2sim.messages import did_you_mean, listed, shown
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike
 from dh2sim.typing import Array, read_only
 
 VERIFIED: Final = 1e-10
@@ -476,8 +476,12 @@ def inverse_kinematics(
     free: Free | None = None,
     numeric: bool = False,
 ) -> Any:
-    """Return all configurations of a robot that reach a pose, or each of many poses: see ``InverseSolver.solve``."""
-    return InverseSolver(robot).solve(T, q0, limits, lock, free, numeric)
+    """Return all configurations of a robot that reach a pose, or each of many poses: see ``InverseSolver.solve``.
+
+    ``q0`` may be the name of a configuration, too.
+    """
+    near = None if q0 is None else configuration_of(robot, q0)
+    return InverseSolver(robot).solve(T, near, limits, lock, free, numeric)
 
 
 def _first_of_equal(pose: Indices, q: Array, turns: Turns) -> Flags:

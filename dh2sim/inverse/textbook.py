@@ -21,9 +21,10 @@ from dh2sim.inverse.branches import names_of_form
 from dh2sim.inverse.textbook_axes import EXACT, arm_axes, wrapped
 from dh2sim.inverse.textbook_forms import textbook_form
 from dh2sim.inverse.textbook_steps import Line, Signs, Step, Worksheet
-from dh2sim.kinematics.chain import SpecLike, build_chain, serial_spec_of
+from dh2sim.kinematics.chain import build_chain, serial_spec_of
 from dh2sim.kinematics.table_oracle import table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors
+from dh2sim.robot.spec import SpecLike
 from dh2sim.typing import Array, read_only
 
 ROUNDED: Final = 1e-5

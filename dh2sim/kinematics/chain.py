@@ -6,11 +6,10 @@ Also what functions of a robot are given: the robot in one of its forms, and joi
 from __future__ import annotations
 
 import math
-import os
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +17,7 @@ from numpy.typing import ArrayLike
 from dh2sim.errors import ConfigurationError, ModelError
 from dh2sim.kinematics.transforms import compose, identity, joint_part, link_part, pose_from_rpy, second_twist
 from dh2sim.robot.row import Convention, JointType, Row
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike, not_a_robot, spec_of
 from dh2sim.typing import Array
 
 
@@ -87,34 +86,7 @@ class KinematicChain:
         return len(self.moving_joints)
 
 
-class HasChain(Protocol):
-    """A robot in a larger form: a ``Robot`` or a ``RobotModel``."""
-
-    @property
-    def spec(self) -> RobotSpec:
-        """The robot as its file describes it."""
-        ...
-
-    @property
-    def chain(self) -> KinematicChain:
-        """The chain of its table."""
-        ...
-
-
-SpecLike: TypeAlias = RobotSpec | HasChain
-ChainLike: TypeAlias = KinematicChain | RobotSpec | HasChain
-
-
-def spec_of(robot: SpecLike) -> RobotSpec:
-    """Return the specification of a robot, whatever form it is given in.
-
-    Raises:
-        TypeError: It is not a robot.
-    """
-    spec = robot if isinstance(robot, RobotSpec) else getattr(robot, "spec", None)
-    if not isinstance(spec, RobotSpec):
-        raise TypeError(f"expected a Robot or a RobotSpec, got {_described(robot)}")
-    return spec
+ChainLike: TypeAlias = KinematicChain | SpecLike
 
 
 def serial_spec_of(robot: SpecLike) -> RobotSpec:
@@ -122,7 +94,7 @@ def serial_spec_of(robot: SpecLike) -> RobotSpec:
 
     Raises:
         ModelError: The robot has branches or closures.
-        TypeError: It is not a robot.
+        ArgumentError: It is not a robot.
     """
     spec = spec_of(robot)
     if spec.is_mechanism:
@@ -135,20 +107,28 @@ def chain_of(robot: ChainLike) -> KinematicChain:
     """Return the chain of a robot, whatever form it is given in.
 
     Raises:
-        TypeError: It is not a robot.
+        ArgumentError: It is not a robot.
     """
-    if isinstance(robot, RobotSpec):
-        return build_chain(robot)
-    chain = robot if isinstance(robot, KinematicChain) else getattr(robot, "chain", None)
-    if not isinstance(chain, KinematicChain):
-        raise TypeError(f"expected a Robot, a RobotSpec or a KinematicChain, got {_described(robot)}")
-    return chain
+    if isinstance(robot, KinematicChain):
+        return robot
+    chain = getattr(robot, "chain", None)
+    if isinstance(chain, KinematicChain):
+        return chain
+    spec = robot if isinstance(robot, RobotSpec) else getattr(robot, "spec", None)
+    if not isinstance(spec, RobotSpec):
+        raise not_a_robot(robot, "a Robot, a RobotSpec or a KinematicChain")
+    return build_chain(spec)
 
 
-def _described(value: object) -> str:
-    if isinstance(value, str | os.PathLike):
-        return f"{value!r}; Robot.load reads a file, or a robot that comes with dh2sim"
-    return "None" if value is None else type(value).__name__
+def mechanism_of(robot: ChainLike) -> RobotSpec | None:
+    """Return the specification of a robot with branches or closed loops; None of a serial one, and of no robot."""
+    spec = robot if isinstance(robot, RobotSpec) else getattr(robot, "spec", None)
+    return spec if isinstance(spec, RobotSpec) and spec.is_mechanism else None
+
+
+def configuration_of(robot: ChainLike, q: ArrayLike) -> ArrayLike:
+    """Return joint vectors, which may be given by the name of one of the robot's configurations."""
+    return spec_of(robot).configuration(q) if isinstance(q, str) and not isinstance(robot, KinematicChain) else q
 
 
 def build_chain(spec: SpecLike) -> KinematicChain:

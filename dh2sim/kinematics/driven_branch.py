@@ -14,12 +14,12 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.loop_batch import LoopBatch, blocks
 from dh2sim.kinematics.loop_closure import assembly
 from dh2sim.kinematics.loop_motion import LONGEST, Continuation, actuated_joints
 from dh2sim.kinematics.tree import joint_values
 from dh2sim.progress import Advance, no_progress
+from dh2sim.robot.spec import SpecLike, spec_of
 from dh2sim.typing import Array, read_only
 
 _TURN: Final = 2.0 * math.pi

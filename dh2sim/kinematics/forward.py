@@ -26,7 +26,16 @@ from dh2sim.kinematics.batches import (
     in_blocks,
     require_shape,
 )
-from dh2sim.kinematics.chain import ChainLike, KinematicChain, chain_of, joint_vector, joint_vectors, require_finite
+from dh2sim.kinematics.chain import (
+    ChainLike,
+    KinematicChain,
+    chain_of,
+    configuration_of,
+    joint_vector,
+    joint_vectors,
+    mechanism_of,
+    require_finite,
+)
 from dh2sim.kinematics.straight_line import JACOBIAN, POSE, Kind, of_one
 from dh2sim.kinematics.transforms import compose, identity, joint_part
 from dh2sim.kinematics.trig import sin_cos
@@ -34,12 +43,16 @@ from dh2sim.messages import did_you_mean, shown
 from dh2sim.typing import Array, read_only
 
 
-def forward_kinematics(chain: ChainLike, q: ArrayLike, **options: Unpack[BatchOptions]) -> Array:
-    """Return the pose of tool0 in base_link.
+def forward_kinematics(
+    chain: ChainLike, q: ArrayLike, *, frame: str = "tool0", **options: Unpack[BatchOptions]
+) -> Array:
+    """Return the pose of a frame in base_link.
 
     Args:
         chain: The robot, in any form.
-        q: Joint vectors, rad and m, shape (..., n).
+        q: Joint vectors, rad and m, shape (..., n); or the name of a configuration. Of a mechanism one vector, of all
+            joints or of the driven ones, which move the others from the assembly.
+        frame: tool0, base_link, dh_0 … dh_n or link_1 … link_n; rocker/dh_1 … of a branch.
         **options: ``out``, ``rows``, ``threads``, ``backend``: see :class:`BatchOptions`.
 
     Returns:
@@ -47,8 +60,10 @@ def forward_kinematics(chain: ChainLike, q: ArrayLike, **options: Unpack[BatchOp
 
     Raises:
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite; or an option is wrong.
+        UnknownFrameError: The frame is unknown.
+        SingularPositionError: A dead or singular position of a mechanism is on the way.
     """
-    return frame_pose(chain, "tool0", q, **options)
+    return frame_pose(chain, frame, q, **options)
 
 
 def frame_poses(chain: ChainLike, q: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array:
@@ -226,7 +241,7 @@ def frame_pose(chain: ChainLike, frame: str, q: ArrayLike, **options: Unpack[Bat
     Args:
         chain: The robot, in any form.
         frame: One of ``frame_names``; link_i is at joint i, dh_i is the table's frame i.
-        q: Joint vectors, rad and m, shape (..., n).
+        q: As for :func:`forward_kinematics`.
         **options: ``out``, ``rows``, ``threads``, ``backend``: see :class:`BatchOptions`.
 
     Returns:
@@ -236,7 +251,14 @@ def frame_pose(chain: ChainLike, frame: str, q: ArrayLike, **options: Unpack[Bat
         UnknownFrameError: The frame is unknown.
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite; or an option is wrong.
     """
-    robot = chain if chain.__class__ is KinematicChain else chain_of(chain)
+    if chain.__class__ is KinematicChain:
+        robot = chain
+    elif (mechanism := mechanism_of(chain)) is not None:
+        from dh2sim.kinematics.loop_motion import mechanism_pose  # costs what serial robots need not pay
+
+        return mechanism_pose(mechanism, q, frame, **options)
+    else:
+        robot, q = chain_of(chain), configuration_of(chain, q)
     if not options:
         evaluate = robot.code.pose.get(frame) if isinstance(frame, str) else None
         if evaluate is not None:
@@ -270,19 +292,27 @@ def geometric_jacobian(
 
     Args:
         chain: The robot, in any form.
-        q: Joint vectors, rad and m, shape (..., n).
+        q: As for :func:`forward_kinematics`.
         frame: One of ``frame_names``.
         **options: ``out``, ``threads``, ``backend``: see :class:`BatchOptions`.
 
     Returns:
         Shape (..., 6, n): rows 0-2 velocity of the frame's origin, m/s; rows 3-5 angular velocity, rad/s; both
-        along the axes of base_link, for each rad/s or m/s of a joint coordinate.
+        along the axes of base_link, for each rad/s or m/s of a joint coordinate. Of a mechanism (6, k), for its k
+        driven joints.
 
     Raises:
         UnknownFrameError: The frame is unknown.
         ConfigurationError: ``q`` has the wrong shape or holds something that is not finite; or an option is wrong.
     """
-    robot = chain if chain.__class__ is KinematicChain else chain_of(chain)
+    if chain.__class__ is KinematicChain:
+        robot = chain
+    elif (mechanism := mechanism_of(chain)) is not None:
+        from dh2sim.kinematics.loop_motion import mechanism_jacobian
+
+        return mechanism_jacobian(mechanism, q, frame, **options)
+    else:
+        robot, q = chain_of(chain), configuration_of(chain, q)
     if not options:
         evaluate = robot.code.jacobian.get(frame) if isinstance(frame, str) else None
         if evaluate is not None:

@@ -17,13 +17,12 @@ from typing import Final, NamedTuple
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import AssemblyError
-from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.transforms import compose, invert
 from dh2sim.kinematics.tree import BASE, Closure, KinematicTree, body_poses, build_tree, joint_values, placed
 from dh2sim.kinematics.trig import atan2
 from dh2sim.messages import listed
 from dh2sim.robot.mechanism import ClosureType
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike, spec_of
 from dh2sim.typing import Array, read_only
 
 TOLERANCE: Final = 1e-12

@@ -17,14 +17,13 @@ from numpy.typing import ArrayLike
 
 from dh2sim.arguments import real_array
 from dh2sim.errors import AssemblyError, ConfigurationError, SingularPositionError
-from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.loop_batch import LoopBatch
 from dh2sim.kinematics.loop_closure import assembly, close_loops, is_closed
 from dh2sim.kinematics.transforms import identity
 from dh2sim.kinematics.tree import Frame, KinematicTree, body_poses, joint_values, placed
 from dh2sim.messages import counted, listed
 from dh2sim.robot.mechanism import ClosureType
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike, spec_of
 from dh2sim.typing import Array, read_only
 
 LONGEST: Final = 0.1

@@ -14,7 +14,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.loop_closure import (
     FREEDOMS,
     TOLERANCE,
@@ -24,7 +23,7 @@ from dh2sim.kinematics.loop_closure import (
     mechanism_size,
 )
 from dh2sim.kinematics.tree import KinematicTree
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike, spec_of
 from dh2sim.typing import Array
 
 _EQUAL: Final = 1e-9

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError
 from dh2sim.kinematics.batch_frame import keep_freed_memory
-from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.trig import sin_cos
 from dh2sim.robot.row import Convention, JointType
+from dh2sim.robot.spec import SpecLike, spec_of
 from dh2sim.robot.variation import CELLS, Variation
 from dh2sim.typing import Array, read_only
 

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dh2sim.errors import ConfigurationError, UnknownFrameError
-from dh2sim.kinematics.chain import Joint, SpecLike, placed_joints, spec_of
+from dh2sim.kinematics.chain import Joint, placed_joints
 from dh2sim.kinematics.transforms import compose, identity, joint_part, pose_from_rpy
 from dh2sim.messages import did_you_mean, listed, shown
 from dh2sim.robot.mechanism import ClosureType
 from dh2sim.robot.mechanism_checks import chain_frames
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike, spec_of
 from dh2sim.typing import Array
 
 BASE = -1

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.loop_closure import assembly
 from dh2sim.kinematics.tree import BASE, Closure, KinematicTree, body_poses, placed
 from dh2sim.mobility.analysis import mobility_of
 from dh2sim.mobility.mechanism import Mechanism, Pair, PairType, pair
 from dh2sim.mobility.result import Mobility
 from dh2sim.robot.mechanism import ClosureType
+from dh2sim.robot.spec import SpecLike, spec_of
 from dh2sim.typing import Array
 
 

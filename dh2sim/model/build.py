@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from dh2sim.errors import ModelError
-from dh2sim.kinematics.chain import HasChain, Joint, KinematicChain, SpecLike, build_chain, spec_of
+from dh2sim.kinematics.chain import Joint, KinematicChain, build_chain
 from dh2sim.kinematics.skeleton import build_skeleton
 from dh2sim.kinematics.transforms import identity, move_point, pose_from_rpy
 from dh2sim.model.actuators import actuator_model, duties, seen_inertias
@@ -24,7 +23,7 @@ from dh2sim.model.shapes import Shape, given_shape, placed
 from dh2sim.robot.links import LinkSpec
 from dh2sim.robot.read import place_in
 from dh2sim.robot.row import Row
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike, spec_of
 from dh2sim.typing import Array, Point, read_only
 
 PALETTE: tuple[Color, ...] = (
@@ -39,23 +38,12 @@ PAYLOAD_SHARE = 0.2
 """Of the moving mass, that a robot is to carry whose file does not say. Published arms: 0.06 to 0.5."""
 
 
-class HasModel(HasChain, Protocol):
-    """A robot in a larger form: a ``Robot``."""
-
-    @property
-    def model(self) -> RobotModel:
-        """The robot with shapes, masses and limits."""
-        ...
-
-
-ModelLike: TypeAlias = RobotModel | RobotSpec | HasModel
-
-
-def model_of(robot: ModelLike) -> RobotModel:
+def model_of(robot: SpecLike) -> RobotModel:
     """Return the model of a robot, whatever form it is given in.
 
     Raises:
-        TypeError: It is not a robot.
+        ArgumentError: It is not a robot.
+        ModelError: The robot has branches or closures.
         MeshError: A mesh file cannot be used.
     """
     if isinstance(robot, RobotModel):

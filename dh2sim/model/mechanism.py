@@ -6,21 +6,21 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import TypeAlias
 
 import numpy as np
 
-from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.loop_closure import assembly, constraint_jacobian, mechanism_size
 from dh2sim.kinematics.loop_motion import named_configuration
 from dh2sim.kinematics.transforms import move_point
 from dh2sim.kinematics.tree import BASE, KinematicTree, body_poses
-from dh2sim.model.build import ModelLike, build_model, model_of
+from dh2sim.model.build import build_model, model_of
 from dh2sim.model.collision_exclusions import ExcludedPair, Reason
 from dh2sim.model.robot_model import FilledIn, JointModel, LinkModel, RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart, between, neat
 from dh2sim.robot.links import BaseSpec, ToolSpec
 from dh2sim.robot.row import ActuatorType, Row
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike, spec_of
 from dh2sim.typing import Array, read_only
 
 
@@ -165,18 +165,24 @@ class MechanismModel:
         return controls
 
 
-def written_model(robot: ModelLike | MechanismModel) -> RobotModel | MechanismModel:
-    """Return the model of a robot or a mechanism, whatever form it is given in.
+AnyModel: TypeAlias = RobotModel | MechanismModel
+
+
+def written_model(robot: SpecLike) -> AnyModel:
+    """Return the model of a robot or of a mechanism, whatever form it is given in.
 
     Raises:
-        TypeError: It is neither.
+        ArgumentError: It is neither.
+        AssemblyError: The loops of a mechanism cannot be closed.
         MeshError: A mesh file cannot be used.
-        AssemblyError: Loops cannot be closed.
     """
     if isinstance(robot, RobotModel | MechanismModel):
         return robot
     spec = spec_of(robot)
-    return build_mechanism(spec) if spec.is_mechanism else model_of(robot)
+    if not spec.is_mechanism:
+        return model_of(robot)
+    mechanism = getattr(robot, "mechanism", None)
+    return mechanism if isinstance(mechanism, MechanismModel) else build_mechanism(spec)
 
 
 def build_mechanism(robot: SpecLike) -> MechanismModel:

@@ -15,12 +15,12 @@ from enum import StrEnum
 from dh2sim.errors import Problem
 from dh2sim.kinematics.far_frames import far_frames
 from dh2sim.messages import Loc, loc_of, path_of
-from dh2sim.model.build import ModelLike, model_of
+from dh2sim.model.build import model_of
 from dh2sim.model.limits import NO_LENGTH
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.read import place_in
 from dh2sim.robot.row import Convention, Row
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike
 from dh2sim.robot.units import AngleUnit, LengthUnit
 
 TURN = 2 * math.pi
@@ -64,7 +64,7 @@ class Slip(Problem):
         return {**found, **place} if self.file else found
 
 
-def find_slips(robot: ModelLike) -> tuple[Slip, ...]:
+def find_slips(robot: SpecLike) -> tuple[Slip, ...]:
     """Return what looks like a slip in a robot, in the order of its file.
 
     Args:

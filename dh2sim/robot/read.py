@@ -20,7 +20,7 @@ from dh2sim.robot.checks import placed_rows
 from dh2sim.robot.expressions import NumberError, is_name, names_in, parameter_name_problem, to_number
 from dh2sim.robot.fields import WRONG, Scope, Tree
 from dh2sim.robot.parts import Part
-from dh2sim.robot.spec import ROBOT, RobotSpec, SourceFile, check_robot, robot_fields, robot_of_checked
+from dh2sim.robot.spec import ROBOT, RobotSpec, SourceFile, SpecLike, check_robot, robot_fields, robot_of_checked
 from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 from dh2sim.robot.yaml_tree import MAX_BYTES, Entry, Node, Report, check_size, compose, decode
 
@@ -49,6 +49,15 @@ def load_robot(path_or_name: str | os.PathLike[str]) -> RobotSpec:
         raise Dh2simError(f"{given}: cannot be read: {error.strerror or error}") from error
     check_size(size, Report(file))
     return parse_robot(data, file=file, directory=path.parent)
+
+
+def loaded(robot: SpecLike | str | os.PathLike[str]) -> SpecLike:
+    """Return a robot that may be given by its file or name.
+
+    Raises:
+        Dh2simError: As for :func:`load_robot`.
+    """
+    return load_robot(robot) if isinstance(robot, str | os.PathLike) else robot
 
 
 def parse_robot(

@@ -6,15 +6,16 @@ file or in code; parts are checked as part of a robot.
 """
 
 import dataclasses
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Protocol, TypeAlias
 
 import numpy as np
 
-from dh2sim.errors import ConfigurationError, Problem, RobotError
+from dh2sim.errors import ArgumentError, ConfigurationError, Problem, RobotError
 from dh2sim.messages import Loc, did_you_mean, listed, path_of, shown
 from dh2sim.robot.checks import check
 from dh2sim.robot.fields import (
@@ -189,6 +190,39 @@ class RobotSpec:
                 f"Configurations: {listed(known)}"
             )
         return known[name]
+
+
+class HasSpec(Protocol):
+    """A robot in a larger form, such as a ``Robot`` or a ``RobotModel``."""
+
+    @property
+    def spec(self) -> RobotSpec:
+        """The robot as its file describes it."""
+        ...
+
+
+SpecLike: TypeAlias = RobotSpec | HasSpec
+
+
+def spec_of(robot: SpecLike) -> RobotSpec:
+    """Return the specification of a robot, whatever form it is given in.
+
+    Raises:
+        ArgumentError: It is not a robot.
+    """
+    spec = robot if isinstance(robot, RobotSpec) else getattr(robot, "spec", None)
+    if not isinstance(spec, RobotSpec):
+        raise not_a_robot(robot, "a Robot or a RobotSpec")
+    return spec
+
+
+def not_a_robot(value: object, expected: str) -> ArgumentError:
+    """Return the error of a value that is not the robot that a function takes."""
+    if isinstance(value, str | os.PathLike):
+        found = f"{value!r}; Robot.load reads a file, or a robot that comes with dh2sim"
+    else:
+        found = "None" if value is None else type(value).__name__
+    return ArgumentError(f"expected {expected}, got {found}")
 
 
 ROBOT: Final = Part("", RobotSpec, more={"actuators": Part("What drives every joint.", ActuatorSpec)})

@@ -17,6 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from dh2sim.arguments import file_path
 from dh2sim.errors import ModelError, NotFiniteError, OutputError
 from dh2sim.files import atomic_file
 from dh2sim.robot.checks import default_name
@@ -25,7 +26,7 @@ from dh2sim.robot.mechanism_checks import default_closure_name
 from dh2sim.robot.number_text import UnitWriter, number, numbers
 from dh2sim.robot.parts import Inertia, Internal, Part, fields_of
 from dh2sim.robot.row import ActuatorSpec, Convention, Dynamics, JointType, Limits, Row
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import RobotSpec, SpecLike, spec_of
 from dh2sim.robot.units import AngleUnit, LengthUnit, Units
 from dh2sim.robot.yaml_text import WIDTH, Tree, block_lines, comment_lines, entry_lines, inline, text_lines, word
 from dh2sim.robot.yaml_tree import NOT_PRINTABLE
@@ -183,12 +184,12 @@ _GRAVITY: Final = [0.0, 0.0, -9.81]
 
 
 def save_robot(
-    spec: RobotSpec, path: str | os.PathLike[str], *, notes: Iterable[str] = (), overwrite: bool = False
+    robot: SpecLike, path: str | os.PathLike[str], *, notes: Iterable[str] = (), overwrite: bool = False
 ) -> None:
     """Write a robot file, in the units of the file that the robot was read from, or else in deg and m.
 
     Args:
-        spec: The robot.
+        robot: The robot, in any form.
         path: The file.
         notes: Sentences for comments at its top.
         overwrite: Whether to replace a file.
@@ -197,7 +198,8 @@ def save_robot(
         OutputError: There is a file already, or it cannot be written.
         ModelError: As for ``robot_file_text``.
     """
-    file = Path(path)
+    spec = spec_of(robot)
+    file = file_path("path", path)
     if file.exists() and not overwrite:
         raise OutputError(f"'{file}' already exists; choose another name, or pass overwrite=True")
     units = spec.units if spec.source_file else Units(angle=AngleUnit.DEG)
@@ -209,7 +211,7 @@ def save_robot(
 
 
 def robot_file_text(
-    spec: RobotSpec,
+    robot: SpecLike,
     *,
     header: Sequence[str] = (),
     folder: Path | None = None,
@@ -224,7 +226,7 @@ def robot_file_text(
     does not allow (such as a kp of a velocity actuator) is written as it is, for the reader to complain of.
 
     Args:
-        spec: The robot.
+        robot: The robot, in any form.
         header: Lines of comments to begin with, any text.
         folder: Where the file will stand: paths of meshes are relative to it; by default they are absolute.
         angle: Unit of the file's angles.
@@ -233,6 +235,7 @@ def robot_file_text(
     Raises:
         ModelError: A number is too large for the unit, or a mesh file has a name that YAML cannot hold.
     """
+    spec = spec_of(robot)
     parts = PartWriter(UnitWriter(units=Units(angle=angle, length=length)), folder)
     shared = parts.part(_shared_actuator(spec, parts))
     lines = [*comment_lines(header), f"name: {word(spec.name)}"]

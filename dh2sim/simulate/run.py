@@ -14,10 +14,9 @@ import numpy as np
 
 from dh2sim.errors import SettingsError
 from dh2sim.extras import require_extra
-from dh2sim.model.build import ModelLike
-from dh2sim.model.mechanism import MechanismModel, written_model
-from dh2sim.model.robot_model import RobotModel
-from dh2sim.robot.read import load_robot
+from dh2sim.model.mechanism import written_model
+from dh2sim.robot.read import loaded
+from dh2sim.robot.spec import SpecLike
 from dh2sim.simulate.block import Block, Job, simulate_block
 from dh2sim.simulate.dataset_layout import Layout
 from dh2sim.simulate.options import WARP, RolloutKeywords
@@ -62,7 +61,7 @@ class Progress:
 
 
 def rollout(
-    robot: ModelLike | MechanismModel | str | PathLike[str],
+    robot: SpecLike | str | PathLike[str],
     *,
     out: str | PathLike[str] | None = None,
     threads: int = 0,
@@ -111,7 +110,7 @@ def rollout(
         MissingExtraError: xarray is not installed, or what a place or an executor needs.
     """
     require_extra("data", "xarray", what="a run as an xarray dataset")
-    model = _model_of(robot)
+    model = written_model(loaded(robot))
     job = with_block_size(prepare(model, options_for(model, **options)), block_size)
     if out is None:
         if share is not None or blocks is not None:
@@ -172,10 +171,6 @@ def _in_memory(job: Job, *, threads: int, executor: Executor | Client | str | No
 
 def _no_report(_rollouts: int) -> None:
     pass
-
-
-def _model_of(robot: ModelLike | MechanismModel | str | PathLike[str]) -> RobotModel | MechanismModel:
-    return written_model(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
 
 
 def with_block_size(job: Job, block_size: int | None) -> Job:

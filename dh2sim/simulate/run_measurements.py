@@ -11,9 +11,10 @@ import numpy as np
 
 from dh2sim.calibrate.measurements import Kind, Measurements, measurements
 from dh2sim.errors import CalibrationError
-from dh2sim.kinematics.chain import SpecLike, serial_spec_of
+from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.kinematics.rotations import rotations_of_quaternions, rotations_of_vectors
 from dh2sim.messages import listed
+from dh2sim.robot.spec import SpecLike
 from dh2sim.simulate.store.reader import open_dataset, reading
 from dh2sim.typing import Array
 

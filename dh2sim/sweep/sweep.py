@@ -20,10 +20,11 @@ import numpy as np
 from dh2sim import arguments
 from dh2sim.errors import Dh2simError, MeasureError, OutputError, Problem, RobotError, SettingsError
 from dh2sim.messages import counted, listed
-from dh2sim.model.build import ModelLike, build_model, model_of
+from dh2sim.model.build import build_model, model_of
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.processors import end_with_parent
-from dh2sim.robot.read import load_robot
+from dh2sim.robot.read import loaded
+from dh2sim.robot.spec import SpecLike
 from dh2sim.robot.write import robot_file_text
 from dh2sim.simulate.designs import Designs, draws_of, read_design_table
 from dh2sim.sweep.journal import Journal
@@ -138,8 +139,8 @@ class Task:
         return columns, rows
 
 
-def sweep(
-    robot: ModelLike | str | PathLike[str],
+def sweep_designs(
+    robot: SpecLike | str | PathLike[str],
     *,
     vary: Mapping[str, Any] | None = None,
     designs: Any = None,
@@ -180,7 +181,7 @@ def sweep(
         RunDiffersError: What is there was measured with other settings.
         OutputError: The table cannot be written.
     """
-    model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
+    model = model_of(loaded(robot))
     task = prepare_task(
         model,
         vary={} if vary is None else arguments.mapping("vary", vary),
@@ -204,10 +205,10 @@ def measure_designs(
     overwrite: bool = False,
     advance: Callable[[int], None] | None = None,
 ) -> Sweep:
-    """Measure the designs that ``prepare_task`` has checked; the arguments are those of ``sweep``.
+    """Measure the designs that ``prepare_task`` has checked; the arguments are those of ``sweep_designs``.
 
     Raises:
-        Dh2simError: As ``sweep``.
+        Dh2simError: As ``sweep_designs``.
     """
     processes = _whole("jobs", jobs, 0, 1024) or len(os.sched_getaffinity(0))
     path = None if out is None else Path(out)
@@ -271,7 +272,7 @@ def prepare_task(
     wrap: Callable[[RobotModel], object],
     checked: Callable[[int], None] = lambda _: None,
 ) -> Task:
-    """Check what a sweep is made from; the arguments are those of ``sweep``.
+    """Check what a sweep is made from; the arguments are those of ``sweep_designs``.
 
     ``checked`` is called with the number of designs that were checked since the last call.
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from dh2sim.arguments import text
 from dh2sim.errors import Dh2simError
-from dh2sim.kinematics.chain import SpecLike, serial_spec_of
+from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.messages import member
+from dh2sim.robot.spec import SpecLike
 from dh2sim.symbolic.expression import Lengths, Style
 from dh2sim.symbolic.form import Equation, Form
 from dh2sim.symbolic.kinematics import FormNotation, jacobian_form, matrices_form, pose_form
@@ -104,12 +105,11 @@ def symbolic_form(
     letters: bool = False,
     fold: Fold | str = "parallel",
     joint_names: str = "theta",
-    bodies: Bodies | None = None,
 ) -> SymbolicForm:
     """Return the kinematics of a robot in symbols, compared with its table at random configurations.
 
     Args:
-        robot: The robot.
+        robot: The robot in any form; for dynamics in numbers, with what links weigh: a ``Robot`` or a ``RobotModel``.
         what: 'pose': a frame in another one; 'matrices': the transform of every row and every DH frame in frame 0;
             'jacobian': the geometric Jacobian, and its determinant in factors; 'dynamics': mass matrix, Coriolis
             matrix and gravity vector of up to four joints.
@@ -124,7 +124,6 @@ def symbolic_form(
             stand for what links weigh, which are numbers otherwise, and so are lengths.
         fold: Across which axes angles are added up: 'parallel', 'all' (antiparallel ones too) or 'none'.
         joint_names: 'theta', with d_i for slides, or 'q'.
-        bodies: What link_1 … link_n weigh, for dynamics without letters: ``RobotModel.bodies``.
 
     Returns:
         The form; ``str`` gives it as text.
@@ -140,8 +139,9 @@ def symbolic_form(
     text("target", target)
     if wanted is What.DYNAMICS:
         numbers = not letters
+        bodies: Bodies | None = getattr(getattr(robot, "model", robot), "bodies", None) if numbers else None
         if numbers and bodies is None:
-            raise Dh2simError("dynamics in numbers needs bodies; pass letters=True for letters")
+            raise Dh2simError("dynamics in numbers needs a Robot or a RobotModel; pass letters=True for letters")
     table = symbolic_table(serial_spec_of(robot), letters=letters, numbers=numbers)
     notation = FormNotation(
         style=member(Style, style, "style"),
@@ -154,7 +154,7 @@ def symbolic_form(
         case What.DYNAMICS:
             from dh2sim.symbolic.motion_form import dynamics_form
 
-            form = dynamics_form(table, None if letters else bodies, names=names, joint_names=joint_names)
+            form = dynamics_form(table, bodies, names=names, joint_names=joint_names)
         case What.POSE:
             form = pose_form(table, source, target, notation)
         case What.JACOBIAN:

@@ -27,8 +27,9 @@ from dh2sim.progress import Stage, silent
 from dh2sim.trajectory.files import SampledTrajectory
 from dh2sim.trajectory.limits import INSIDE
 from dh2sim.trajectory.motion import peaks_of
-from dh2sim.trajectory.plan import TrajectoryKeywords, plan_trajectory
+from dh2sim.trajectory.options import TrajectoryKeywords, TrajectoryOptions
 from dh2sim.trajectory.profiles import Profile
+from dh2sim.trajectory.serial import plan_serial_trajectory
 from dh2sim.trajectory.trajectory import Trajectory
 from dh2sim.trajectory.waypoints import MoveKind, Waypoint, waypoints_of
 from dh2sim.typing import Array, read_only
@@ -207,13 +208,13 @@ def plan_mechanism_trajectory(
 
     Args:
         model: The mechanism.
-        waypoints: As for :func:`plan_trajectory`: names of configurations, or coordinates of the driven joints in the
-            order of ``actuated``. The mechanism starts at the first, on the branch of motion of its assembly or of
-            the configuration that is named.
+        waypoints: Names of configurations, or coordinates of the driven joints in the order of ``actuated``. The
+            mechanism starts at the first, on the branch of motion of its assembly or of the configuration that is
+            named.
         stage: Shows the progress of what takes long.
-        **options: As for :func:`plan_trajectory`: ``profile`` ('quintic', 'trapezoid' or 'jerk'), ``duration``, and
-            ``limits`` of the driven joints. Where a passive joint would exceed the limit that its file gives, all
-            is slowed down, or refused if it leaves its range.
+        **options: ``profile`` ('quintic', 'trapezoid' or 'jerk'), ``duration``, and ``limits`` of the driven joints,
+            as for :func:`dh2sim.plan_trajectory`. Where a passive joint would exceed the limit that its file gives,
+            all is slowed down, or refused if it leaves its range.
 
     Raises:
         SettingsError: Waypoints or options are wrong; the error holds everything that is.
@@ -313,7 +314,7 @@ def _planned(
     stage: Stage,
     options: TrajectoryKeywords,
 ) -> MechanismTrajectory:
-    plan = plan_trajectory(stand_in, points, stage=stage, **options)
+    plan = plan_serial_trajectory(stand_in, points, TrajectoryOptions.of(options), stage)
     given = {each.name: getattr(plan, each.name) for each in fields(Trajectory)}
     return MechanismTrajectory(**given, mechanism=model, start=start)
 

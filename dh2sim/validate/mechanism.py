@@ -53,7 +53,7 @@ def validate_mechanism(
     """
     if folder is None:
         with TemporaryDirectory(prefix="dh2sim-") as temporary:
-            export_robot(model, Path(temporary), verified=False)
+            export_robot(model, Path(temporary), verify=False)
             return _validate(model, Path(temporary) / model.name, samples, seed, tolerance, None)
     return _validate(model, folder, samples, seed, tolerance, Examined())
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from dh2sim.arguments import number, whole_number
+from dh2sim.arguments import file_path, number, whole_number
 from dh2sim.engines.examined import Examined
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
@@ -22,13 +22,13 @@ from dh2sim.errors import Dh2simError, EngineCapacityError, EngineError
 from dh2sim.export import export_robot, mixture
 from dh2sim.files import finish_interrupted, signals_deferred
 from dh2sim.kinematics.sampling import random_configurations
-from dh2sim.model.build import ModelLike, model_of
-from dh2sim.model.mechanism import MechanismModel
+from dh2sim.model.mechanism import MechanismModel, written_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.slips import find_slips
 from dh2sim.mujoco_warnings import mujoco_warnings, warning_sentences
 from dh2sim.progress import Advance
-from dh2sim.robot.read import load_robot
+from dh2sim.robot.read import loaded
+from dh2sim.robot.spec import SpecLike
 from dh2sim.typing import Array
 from dh2sim.validate.dynamics import check_dynamics, check_inertias
 from dh2sim.validate.kinematics import (
@@ -44,7 +44,6 @@ from dh2sim.validate.mechanism import validate_mechanism
 from dh2sim.validate.report import Check, Quantity, RobotReport, unread_check
 
 if TYPE_CHECKING:  # what reads sources takes a tenth of the time to start, and is seldom asked for
-    from dh2sim.importing.sources import ImportOptions
     from dh2sim.validate.source import SourceArm
 
 SLOW_ROWS = 8000
@@ -71,14 +70,15 @@ def engine_samples(samples: int, rows: int) -> int:
 
 
 def validate_robot(
-    robot: ModelLike | MechanismModel | str | PathLike[str],
+    robot: SpecLike | str | PathLike[str],
     *,
     samples: int = 1000,
     seed: int = 0,
     tolerance: float = 1e-12,
-    folder: Path | None = None,
+    folder: str | PathLike[str] | None = None,
     source: str | PathLike[str] | None = None,
-    source_options: ImportOptions | None = None,
+    base: str | None = None,
+    tip: str | None = None,
     advance: Advance | None = None,
 ) -> RobotReport:
     """Compare every engine with the table.
@@ -90,14 +90,15 @@ def validate_robot(
         tolerance: Allowed angle, rad, and distance as a share of max(1 m, reach).
         folder: Folder with the robot's files; None to export them to a temporary one.
         source: URDF or MJCF that the robot was imported from, to compare its masses with.
-        source_options: Those that it was imported with; base and tip say which part of it the robot is.
+        base: Link of the source that became base_link; by default the root.
+        tip: Link or site of the source that became tool0; by default where the arm ends.
         advance: Called with the number of configurations that an engine has computed.
 
     Returns:
         The report. A file that is missing or that an engine refuses is a check that failed.
 
     Raises:
-        ArgumentError: ``seed`` or ``tolerance`` is of a wrong kind.
+        ArgumentError: An argument is of a wrong kind.
         Dh2simError: ``samples`` is not a whole number of at least 1, ``tolerance`` is not above 0 and below 1, or the
             source is not of this robot.
         ImportedFileError: The source is wrong.
@@ -109,13 +110,17 @@ def validate_robot(
     if not 0.0 < number("tolerance", tolerance) < 1.0:
         raise Dh2simError(f"tolerance must be above 0 and below 1, got {tolerance!r}")
     seed = whole_number("seed", seed)
-    if isinstance(robot, MechanismModel):
+    if source is None and (base, tip) != (None, None):
+        raise Dh2simError("base and tip are links of the source, and need it")
+    if folder is not None:
+        folder = file_path("folder", folder)
+    model = written_model(loaded(robot))
+    if isinstance(model, MechanismModel):
         if source is not None:
-            raise Dh2simError(f"{robot.name}: a mechanism has no source to be compared with")
-        return validate_mechanism(robot, samples=samples, seed=seed, tolerance=tolerance, folder=folder)
+            raise Dh2simError(f"{model.name}: a mechanism has no source to be compared with")
+        return validate_mechanism(model, samples=samples, seed=seed, tolerance=tolerance, folder=folder)
     start_yourdfpy()
-    model = model_of(load_robot(robot) if isinstance(robot, str | PathLike) else robot)
-    arm = None if source is None else _source_arm(source, source_options, model)
+    arm = None if source is None else _source_arm(source, base, tip, model)
     with mujoco_warnings() as warned:
         if folder is not None:
             finish_interrupted(folder.parent, folder.name)
@@ -127,7 +132,7 @@ def validate_robot(
                 report = replace(report, checks=(check, *report.checks))
         else:
             with TemporaryDirectory(prefix="dh2sim-") as temporary:
-                export_robot(model, Path(temporary), verified=False)
+                export_robot(model, Path(temporary), verify=False)
                 made = Path(temporary) / model.name
                 report = _validate(model, made, samples, seed, tolerance, arm, advance, made=True)
     return replace(report, warnings=warning_sentences(warned, [joint.name for joint in model.moving_joints]))
@@ -258,11 +263,11 @@ def _dynamics(model: RobotModel, engines: list[Mover], q: Array, seed: int) -> l
     return checks
 
 
-def _source_arm(source: str | PathLike[str], options: ImportOptions | None, model: RobotModel) -> SourceArm:
+def _source_arm(source: str | PathLike[str], base: str | None, tip: str | None, model: RobotModel) -> SourceArm:
     from dh2sim.importing.sources import ImportOptions
     from dh2sim.validate.source import SourceArm
 
-    return SourceArm.read(source, options or ImportOptions(), model)
+    return SourceArm.read(source, ImportOptions(base=base, tip=tip), model)
 
 
 def _masses(model: RobotModel, engines: list[Mover], source: SourceArm, q: Array) -> list[Check]:

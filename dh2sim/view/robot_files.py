@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from dh2sim.errors import Dh2simError
-from dh2sim.export import Format, render, verify
+from dh2sim.export import Format, render, verify_files
 from dh2sim.input_files import read_input
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.robot.catalog import builtin_path, builtin_robots
@@ -51,7 +51,7 @@ def model_file(model: RobotModel, kind: Format) -> Download:
     files = render(model, [kind])
     with tempfile.TemporaryDirectory() as folder:
         write_files(files, Path(folder))
-        (result,) = verify(model, Path(folder), [kind])
+        (result,) = verify_files(model, Path(folder), [kind])
     summary = f"largest difference to the table {result.position_error:.1e} m, {result.rotation_error:.1e} rad"
     name = f"{model.name}.{_SUFFIXES[kind]}"
     if any(link.mesh is not None for link in model.all_links):

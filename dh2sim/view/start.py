@@ -8,7 +8,7 @@ from typing import Any
 
 from dh2sim.arguments import text, whole_number
 from dh2sim.model.mechanism import MechanismModel, build_mechanism
-from dh2sim.robot.spec import RobotSpec
+from dh2sim.robot.spec import SpecLike, spec_of
 from dh2sim.view.initial_state import folder_of, open_state
 from dh2sim.view.mechanism.server import MechanismViewer
 from dh2sim.view.server import PageServer, Viewer, free_port
@@ -43,7 +43,7 @@ def serve(
 
 
 def start_viewer(
-    spec: RobotSpec,
+    robot: SpecLike,
     *,
     host: str = "127.0.0.1",
     port: int = 8080,
@@ -53,6 +53,7 @@ def start_viewer(
     """Show a robot or a mechanism in the browser, and return at once: see ``Robot.view``."""
     text("host", host)
     whole_number("port", port)
+    spec = spec_of(robot)
     shown: ViewState | MechanismModel
     if spec.is_mechanism:
         shown = build_mechanism(spec)

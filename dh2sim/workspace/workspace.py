@@ -11,11 +11,11 @@ from typing import Final, TypedDict
 import numpy as np
 
 from dh2sim.errors import ConfigurationError, SettingsError
-from dh2sim.kinematics.chain import SpecLike, spec_of
 from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.model.build import build_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.progress import Stage, silent
+from dh2sim.robot.spec import SpecLike, spec_of
 from dh2sim.typing import Array, read_only
 from dh2sim.workspace.dexterity import Dexterity, Turn, dexterity_at
 from dh2sim.workspace.extremes import Extreme, distance_from, extreme_of, greatest, height_along, least

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dh2sim.calibrate.calibration import calibrate
+from dh2sim.calibrate.calibration import calibrate_robot
 from dh2sim.calibrate.measurements import measurements
 from dh2sim.calibrate.result import Calibration, ParameterStatus
 from dh2sim.errors import CalibrationError
@@ -30,7 +30,7 @@ def fitted(name: str, kind: str, count: int = 50, **options: object) -> tuple[Ro
     q = random_q(nominal, count, 2)
     given = measured(nominal, true, kind, q, seed=3)
     options.setdefault("held_out", False)
-    return true, calibrate(nominal, given, noise=SIGMA, **options)  # type: ignore[arg-type]
+    return true, calibrate_robot(nominal, given, noise=SIGMA, **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
@@ -90,7 +90,7 @@ def test_a_tracker_may_stand_anywhere_and_the_tool_be_any() -> None:
     )
     q = random_q(nominal, 40, 2)
     for kind in ("pose", "position"):
-        found = calibrate(nominal, measured(nominal, true, kind, q, seed=3), noise=SIGMA, held_out=False)
+        found = calibrate_robot(nominal, measured(nominal, true, kind, q, seed=3), noise=SIGMA, held_out=False)
         assert abs(found.fit.chi2_per_dof - 1.0) < 4.0 * found.chi2_spread
         assert found.errors_before.length < 10e-3
         assert np.abs(table_tool_pose(found.robot, q)[:, :3, 3] - table_tool_pose(true, q)[:, :3, 3]).max() < 3e-4
@@ -111,7 +111,7 @@ def test_several_stations_have_poses_of_their_own_and_base_link_stays() -> None:
     T[:, :3, :3], T[:, :3, 3] = given.rotation, given.position
     T[::2] = seen @ T[::2]
     stations = ["left" if k % 2 == 0 else "right" for k in range(60)]
-    found = calibrate(nominal, measurements(nominal, q, poses=T, stations=stations), noise=SIGMA)
+    found = calibrate_robot(nominal, measurements(nominal, q, poses=T, stations=stations), noise=SIGMA)
     assert abs(found.fit.chi2_per_dof - 1.0) < 4.0 * found.chi2_spread
     assert found.identifiable == 20 - 6
     assert np.array_equal(found.robot.base.pose.xyz, nominal.base.pose.xyz)
@@ -156,7 +156,7 @@ def sockets(count: int = 30, places: int = 3) -> tuple[RobotSpec, dict[str, list
 def test_a_ball_in_sockets_tells_the_arm_once_a_distance_is_known() -> None:
     nominal, names, q = sockets(12, 4)
     given = measurements(nominal, q, distances=np.full(len(q), 0.06), **names)  # type: ignore[arg-type]
-    found = calibrate(nominal, given)
+    found = calibrate_robot(nominal, given)
     assert found.identifiable == 34 - 6 - 3
     assert found.errors_before.length > 10 * found.errors.length
     assert found.held_out is not None
@@ -166,7 +166,7 @@ def test_a_ball_in_sockets_tells_the_arm_once_a_distance_is_known() -> None:
     assert found.held_out.nominal is not None
     assert found.held_out.fitted.length < 0.2 * found.held_out.nominal.length
     assert found.held_out.fitted.artefact < 2e-4
-    unknown = calibrate(nominal, measurements(nominal, q, **names), held_out=False)  # type: ignore[arg-type]
+    unknown = calibrate_robot(nominal, measurements(nominal, q, **names), held_out=False)  # type: ignore[arg-type]
     assert unknown.identifiable == 34 - 6 - 3 - 1
     held = [each for each in unknown.parameters if "scale" in each.reason]
     assert [each.name for each in held] == ["joint_5.d"]  # the longest
@@ -181,10 +181,10 @@ def test_outliers_are_named_and_left_out() -> None:
     position = given.position.copy()
     position[[7, 23]] += [0.004, -0.002, 0.001]
     given = replace(given, position=position)
-    plain = calibrate(nominal, given, held_out=False)
+    plain = calibrate_robot(nominal, given, held_out=False)
     assert {outlier.row for outlier in plain.outliers} >= {7, 23}
     assert not any(outlier.left_out for outlier in plain.outliers)
-    robust = calibrate(nominal, given, robust=True, noise=SIGMA, held_out=False)
+    robust = calibrate_robot(nominal, given, robust=True, noise=SIGMA, held_out=False)
     assert {outlier.row for outlier in robust.outliers if outlier.left_out} == {7, 23}
     assert robust.fit.dof == 3 * 58 - 25
     assert abs(robust.fit.chi2_per_dof - 1.0) < 4.0 * robust.chi2_spread
@@ -220,15 +220,15 @@ def test_too_few_measurements_are_refused_in_words() -> None:
     q = random_q(nominal, 40, 2)
     q[:, 3] = 0.3
     given = measured(nominal, off(nominal, 1e-3, 1), "pose", q, seed=3)
-    text = refusal(CalibrationError, calibrate, nominal, given)
+    text = refusal(CalibrationError, calibrate_robot, nominal, given)
     assert "40 poses cannot fix 30 parameters of the robot: they determine only" in text
     assert "joint_4 does not move." in text
-    text = refusal(CalibrationError, calibrate, nominal, given.rows([0] * 40))
+    text = refusal(CalibrationError, calibrate_robot, nominal, given.rows([0] * 40))
     assert "them, not joint_1.a, joint_1.alpha, joint_2.theta, joint_2.a, joint_2.alpha, joint_2.beta and " in text
     assert " others. No joint moves." in text
     narrow = random_q(nominal, 40, 2) * 1e-3
     given = measured(nominal, off(nominal, 1e-3, 1), "position", narrow, seed=3)
-    assert "the tool would be known to" in refusal(CalibrationError, calibrate, nominal, given, noise=SIGMA)
+    assert "the tool would be known to" in refusal(CalibrationError, calibrate_robot, nominal, given, noise=SIGMA)
 
 
 def test_positions_in_another_unit_are_refused() -> None:
@@ -236,7 +236,7 @@ def test_positions_in_another_unit_are_refused() -> None:
     given = measured(nominal, off(nominal, 1e-3, 1), "position", random_q(nominal, 40, 2), seed=3)
     assert given.position is not None
     for factor, said in ((1e3, "mm taken for m"), (0.0254, "m taken for inches")):
-        text = refusal(CalibrationError, calibrate, nominal, replace(given, position=factor * given.position))
+        text = refusal(CalibrationError, calibrate_robot, nominal, replace(given, position=factor * given.position))
         assert text.startswith("40 positions: positions are spread over ")
         assert text.endswith(f", where the table says 0.354 m: they look like {said}")
 
@@ -246,7 +246,7 @@ def test_positions_whose_columns_are_exchanged_are_refused() -> None:
     given = measured(nominal, off(nominal, 1e-3, 1), "position", random_q(nominal, 24, 2), seed=3)
     assert given.position is not None
     swapped = replace(given, position=given.position[:, [1, 0, 2]], station=("tracker",) * 24)
-    text = refusal(CalibrationError, calibrate, nominal, swapped, held_out=False)
+    text = refusal(CalibrationError, calibrate_robot, nominal, swapped, held_out=False)
     assert "a component, of an arm that gets around by 954 mm: columns or rows are exchanged" in text
 
 
@@ -256,7 +256,7 @@ def test_a_head_whose_own_table_has_no_length_that_moves_is_fitted(kind: str) ->
     tilt = replace(row("tilt"), limits=Limits(position=(-1.4, 1.4)))
     head = RobotSpec(name="head", rows=(pan, tilt), tool=ToolSpec(xyz=np.array([0.25, 0.0, 0.05])))
     true = off(head, 2e-3, 1)
-    found = calibrate(head, measured(head, true, kind, random_q(head, 60, 2), seed=3), held_out=False)
+    found = calibrate_robot(head, measured(head, true, kind, random_q(head, 60, 2), seed=3), held_out=False)
     q = random_q(head, 50, 9)
     off_by = table_tool_pose(found.robot, q)[:, :3, 3] - table_tool_pose(true, q)[:, :3, 3]
     assert np.linalg.norm(off_by, axis=1).max() < 2.0 * SIGMA
@@ -265,7 +265,7 @@ def test_a_head_whose_own_table_has_no_length_that_moves_is_fitted(kind: str) ->
 def test_copied_rows_are_noted() -> None:
     nominal = robot("scara")
     given = measured(nominal, off(nominal, 1e-3, 1), "pose", random_q(nominal, 30, 2), seed=3)
-    found = calibrate(nominal, given.rows([*range(30), 3, 7]), held_out=False)
+    found = calibrate_robot(nominal, given.rows([*range(30), 3, 7]), held_out=False)
     assert any(note.startswith("2 rows are exact copies of another:") for note in found.notes)
 
 
@@ -274,7 +274,7 @@ def test_a_tool_that_only_noise_moves_off_the_last_axis_is_fitted(name: str, siz
     nominal = robot(name)
     true = off(nominal, size, seed)
     given = measured(nominal, true, "position", random_q(nominal, 60, 2), seed=3)
-    found = calibrate(nominal, given, noise=SIGMA, held_out=False)
+    found = calibrate_robot(nominal, given, noise=SIGMA, held_out=False)
     assert found.identifiable <= found.possible < {robot: count for robot, _, count in COUNTS}[name]
     off_by = [
         np.linalg.norm((table_tool_pose(found.robot, q) - table_tool_pose(true, q))[:3, 3])
@@ -286,7 +286,7 @@ def test_a_tool_that_only_noise_moves_off_the_last_axis_is_fitted(name: str, siz
 def test_odd_robots_of_mixed_conventions_with_fixed_and_flipped_rows_are_fitted() -> None:
     true = off(ODD_ROBOT, 1e-3, 1)
     q = random_q(ODD_ROBOT, 80, 2)
-    found = calibrate(ODD_ROBOT, measured(ODD_ROBOT, true, "pose", q, seed=3), noise=SIGMA, held_out=False)
+    found = calibrate_robot(ODD_ROBOT, measured(ODD_ROBOT, true, "pose", q, seed=3), noise=SIGMA, held_out=False)
     turning = sum(row.type.turns for row in ODD_ROBOT.rows)
     sliding = sum(row.type.moves and not row.type.turns for row in ODD_ROBOT.rows)
     assert found.identifiable == 4 * turning + 2 * sliding + 6
@@ -296,7 +296,7 @@ def test_odd_robots_of_mixed_conventions_with_fixed_and_flipped_rows_are_fitted(
 def test_estimated_noise_is_the_noise() -> None:
     nominal = robot("stanford")
     given = measured(nominal, off(nominal, 1e-3, 1), "pose", random_q(nominal, 80, 2), seed=3)
-    found = calibrate(nominal, given, held_out=False)
+    found = calibrate_robot(nominal, given, held_out=False)
     assert math.isclose(found.fit.sigma.length, SIGMA, rel_tol=0.15)
     assert math.isclose(found.fit.sigma.angle, SIGMA, rel_tol=0.15)
 
@@ -309,7 +309,7 @@ def test_exact_data_are_fitted(sigma: tuple[float, float]) -> None:
     poses = table_tool_pose(true, q).copy()
     poses[:, :3, 3] += sigma[0] * rng.normal(size=(40, 3))
     poses[:, :3, :3] = turned(sigma[1] * rng.normal(size=(40, 3))) @ poses[:, :3, :3]
-    found = calibrate(nominal, measurements(nominal, q, poses=poses), held_out=False)
+    found = calibrate_robot(nominal, measurements(nominal, q, poses=poses), held_out=False)
     unseen = random_q(nominal, 50, 4)
     error = np.abs(table_tool_pose(found.robot, unseen) - table_tool_pose(true, unseen)).max()
     assert error < (1e-8 if sigma == (0.0, 0.0) else 4e-4)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dh2sim import Fixed, Robot
-from dh2sim.calibrate.calibration import calibrate
+from dh2sim.calibrate.calibration import calibrate_robot
 from dh2sim.calibrate.measurements import Kind
 from dh2sim.calibrate.plan import plan_measurements
 from dh2sim.errors import CalibrationError
@@ -70,7 +70,7 @@ def test_what_a_plan_predicts_is_what_fits_show() -> None:
         true = off(nominal, 1e-3, k)
         for name, q in (("plan", plan.q), ("random", random_q(nominal, 12, 500 + k))):
             given = measured(nominal, true, "position", q, seed=k)
-            found = calibrate(nominal, given, noise=SIGMA, held_out=False).robot
+            found = calibrate_robot(nominal, given, noise=SIGMA, held_out=False).robot
             gap = (table_tool_pose(found, unseen) - table_tool_pose(true, unseen))[:, :3, 3]
             squares[name].append(float((gap**2).sum(axis=1).mean()))
     rms = {name: float(np.sqrt(np.median(values))) for name, values in squares.items()}

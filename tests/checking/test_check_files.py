@@ -24,7 +24,7 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     robots.mkdir()
     write(robots, small("first"))
     write(robots, small("second"))
-    export_robot(build_model(load_robot(robots / "first.yaml")), tmp_path / "generated", verified=False)
+    export_robot(build_model(load_robot(robots / "first.yaml")), tmp_path / "generated", verify=False)
     return tmp_path
 
 

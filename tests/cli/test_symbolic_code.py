@@ -16,15 +16,15 @@ ALL = "pose,jacobian,inverse-dynamics"
 def test_code_is_printed_in_every_language(language: str) -> None:
     done = dh2sim("symbolic", "rpr", "--what", "pose, jacobian", "--as", language)
     assert (done.status, done.err) == (0, "")
-    assert done.out == generate_code(robot("rpr"), ["pose", "jacobian"], language)
-    assert dh2sim("symbolic", "rpr", "--as", language.upper()).out == generate_code(robot("rpr"), "pose", language)
+    assert done.out == generate_code(robot("rpr"), language, ["pose", "jacobian"])
+    assert dh2sim("symbolic", "rpr", "--as", language.upper()).out == generate_code(robot("rpr"), language, "pose")
 
 
 def test_code_is_written_to_a_file_and_a_file_is_not_overwritten_unasked(tmp_path: Path) -> None:
     file = tmp_path / "arm.c"
     done = dh2sim("symbolic", "rpr", "--what", ALL, "--as", "c", "-o", file)
     assert (done.status, done.out) == (0, f"{file}: rpr: pose, jacobian, inverse-dynamics as c\n")
-    assert file.read_text() == generate_code(robot("rpr"), ALL.split(","), "c")
+    assert file.read_text() == generate_code(robot("rpr"), "c", ALL.split(","))
     again = dh2sim("symbolic", "rpr", "--as", "c", "-o", file)
     assert again.status == 2
     assert "already exists" in again.err

@@ -79,6 +79,6 @@ def test_forces_of_general_links_equal_those_of_mujoco(name: str) -> None:
 
 
 def test_links_that_cannot_move_a_joint_are_not_in_its_code() -> None:
-    text = generate_code(with_general_links(robot("planar_2r")), "inverse-dynamics", "python")
+    text = generate_code(with_general_links(robot("planar_2r")), "python", "inverse-dynamics")
     # its axes are vertical
     assert set(re.findall(r"^([A-Z]+[0-9]) =", text, flags=re.MULTILINE)) == {"ZZ1", "MX2", "MY2", "ZZ2"}

@@ -33,8 +33,8 @@ def size(spec: RobotSpec, q: Array) -> float:
 def test_code_of_any_robot_gives_the_tables_poses(drawn: tuple[RobotSpec, Array]) -> None:
     spec, q = drawn
     allowed = 1e-12 * size(spec, q)
-    functions = python_functions(generate_code(spec, ["pose", "jacobian"], "python"))
-    numpy = python_functions(generate_code(spec, ["pose", "jacobian"], "numpy"))
+    functions = python_functions(generate_code(spec, "python", ["pose", "jacobian"]))
+    numpy = python_functions(generate_code(spec, "numpy", ["pose", "jacobian"]))
     T, J = table_tool_pose(spec, q), geometric_jacobian(spec, q)
     np.testing.assert_allclose([functions["fk"](row) for row in q], T, rtol=0, atol=allowed)
     np.testing.assert_allclose(numpy["fk"](q), T, rtol=0, atol=allowed)
@@ -47,12 +47,12 @@ def test_code_of_any_robot_gives_the_tables_poses(drawn: tuple[RobotSpec, Array]
 def test_code_of_a_catalogue_robot_gives_the_tables_poses(name: str) -> None:
     spec = robot(name)
     q = np.random.default_rng(5).uniform(-3, 3, (20, len(spec.moving_rows)))
-    fk = python_functions(generate_code(spec, "pose", "numpy"))["fk"]
+    fk = python_functions(generate_code(spec, "numpy", "pose"))["fk"]
     np.testing.assert_allclose(fk(q), table_tool_pose(spec, q), rtol=0, atol=1e-12 * size(spec, q))
 
 
 def test_numpy_code_takes_batches_of_any_shape_and_lists() -> None:
-    functions = python_functions(generate_code(robot("stanford"), ALL, "numpy"))
+    functions = python_functions(generate_code(robot("stanford"), "numpy", ALL))
     q = np.random.default_rng(6).uniform(-1, 1, (2, 3, 6))
     T, J = functions["fk"](q), functions["jacobian"](q)
     assert (T.shape, J.shape) == ((2, 3, 4, 4), (2, 3, 6, 6))
@@ -65,7 +65,7 @@ def test_numpy_code_takes_batches_of_any_shape_and_lists() -> None:
 
 
 def test_python_code_takes_any_sequence_of_the_right_length_and_returns_plain_lists() -> None:
-    functions = python_functions(generate_code(robot("planar_2r"), ALL, "python"))
+    functions = python_functions(generate_code(robot("planar_2r"), "python", ALL))
     for q in ([1, 2], (1.0, 2.0), np.array([1, 2]), range(1, 3)):
         T = functions["fk"](q)
         assert functions["fk"]([1.0, 2.0]) == T
@@ -85,7 +85,7 @@ def test_code_of_a_robot_without_joints_or_with_one_runs() -> None:
 
 def test_the_header_says_what_the_code_is() -> None:
     spec = robot("puma560")
-    text = generate_code(spec, ALL, "python")
+    text = generate_code(spec, "python", ALL)
     header = " ".join(line.removeprefix("#").strip() for line in text.split("\n\n")[0].splitlines())
     assert spec.source_file is not None
     assert f"puma560: made by dh2sim from puma560.yaml (SHA-256 {spec.source_file.sha256})." in header
@@ -95,15 +95,15 @@ def test_the_header_says_what_the_code_is() -> None:
     assert "fk: 40 multiplications, 20 additions, 12 sines and cosines; at most " in header
     assert "Inverse dynamics: links, tool, gravity and armature; no friction, damping or payload." in header
     assert "made by dh2sim from a robot made in code" in Robot([Revolute()]).code()
-    assert "Inverse dynamics" not in generate_code(spec, "pose", "python")
+    assert "Inverse dynamics" not in generate_code(spec, "python", "pose")
 
 
 @pytest.mark.parametrize("language", ["python", "numpy", "c", "cpp", "matlab", "javascript"])
 def test_a_comment_holds_whatever_a_file_is_called(language: str) -> None:
     text = "name: odd\nconvention: standard\njoints: [{type: revolute, a: 0.3}]"
     file = '*/ int x; /* \n"""\n%}\x1b[31m é \\'
-    code = generate_code(parse_robot(text, file=file), "pose", language)
-    plain = generate_code(parse_robot(text, file="odd.yaml"), "pose", language)
+    code = generate_code(parse_robot(text, file=file), language, "pose")
+    plain = generate_code(parse_robot(text, file="odd.yaml"), language, "pose")
     assert code.isascii()
     assert "\x1b" not in code
     assert len(code.splitlines()) == len(plain.splitlines())
@@ -114,8 +114,8 @@ def test_a_comment_holds_whatever_a_file_is_called(language: str) -> None:
 
 @pytest.mark.parametrize("language", ["python", "numpy", "c", "cpp", "matlab", "javascript"])
 def test_the_same_robot_gives_the_same_code(language: str) -> None:
-    assert generate_code(robot("rpr"), ALL, language) == generate_code(
-        build_model(robot("rpr")), reversed(ALL), language
+    assert generate_code(robot("rpr"), language, ALL) == generate_code(
+        build_model(robot("rpr")), language, reversed(ALL)
     )
 
 
@@ -123,17 +123,17 @@ def test_masses_are_needed_for_inverse_dynamics_alone() -> None:
     spec = Robot([Revolute(a=0.3, link=LinkSpec(mesh=MeshSpec(file=Path("nowhere.stl"))))]).spec
     assert "def fk" in generate_code(spec)
     with pytest.raises(MeshError, match=r"nowhere\.stl"):
-        generate_code(spec, "inverse-dynamics")
+        generate_code(spec, what="inverse-dynamics")
 
 
 def test_unknown_words_are_refused_with_what_is_allowed() -> None:
     spec = robot("rpr")
     with pytest.raises(Dh2simError, match=r"unknown language 'pyton'.* Did you mean 'python'"):
-        generate_code(spec, "pose", "pyton")
+        generate_code(spec, "pyton", "pose")
     with pytest.raises(Dh2simError, match=r"unknown code 'poses'.* Did you mean 'pose'"):
-        generate_code(spec, ["jacobian", "poses"])
+        generate_code(spec, what=["jacobian", "poses"])
     with pytest.raises(Dh2simError, match="choose at least one of pose, jacobian, inverse-dynamics"):
-        generate_code(spec, [])
+        generate_code(spec, what=[])
 
 
 @given(st.sampled_from(["pose", "jacobian", "inverse-dynamics"]), robots_with_joint_vectors(max_rows=3))
@@ -143,7 +143,7 @@ def test_each_function_can_be_had_alone(what: str, drawn: tuple[RobotSpec, Array
         model = build_model(spec)
     except ModelError:
         return  # nothing to move
-    names = python_functions(generate_code(model, what, "python"))
+    names = python_functions(generate_code(model, "python", what))
     wanted = {"pose": "fk", "jacobian": "jacobian", "inverse-dynamics": "inverse_dynamics"}
     assert [name for name in wanted.values() if name in names] == [wanted[what]]
     arguments = [q[0].tolist()] * (3 if what == "inverse-dynamics" else 1)
@@ -168,7 +168,7 @@ tool: {{xyz: [0, 0, "reach - half"]}}
 )
 def test_lengths_follow_the_parameters_that_they_are_made_of(unit: str, reach: float, own: float, power: str) -> None:
     spec = parse_robot(PARAMETERS.format(unit=unit, reach=reach, own=own, power=power))
-    text = generate_code(spec, ["pose", "jacobian"], "python")
+    text = generate_code(spec, "python", ["pose", "jacobian"])
     assert "reach = 0.5  # m" in text
     q = [0.3, -0.4, 0.2]
     np.testing.assert_allclose(python_functions(text)["fk"](q), table_tool_pose(spec, q), rtol=0, atol=1e-14)

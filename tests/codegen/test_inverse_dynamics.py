@@ -58,7 +58,7 @@ def assert_equal_forces(found: Array, expected: Array) -> None:
 
 
 def forces_of(built: RobotModel, q: Array, qd: Array, qdd: Array) -> Array:
-    function = python_functions(generate_code(built, "inverse-dynamics", "numpy"))["inverse_dynamics"]
+    function = python_functions(generate_code(built, "numpy", "inverse-dynamics"))["inverse_dynamics"]
     return np.asarray(function(q, qd, qdd))
 
 

@@ -79,11 +79,11 @@ def test_code_compiles_without_a_warning_and_equals_the_table(name: str, languag
     q, qd, qdd = (generator.uniform(-3, 3, (10, n)) for _ in range(3))
     call = Call(functions=("fk", "jacobian", "inverse_dynamics"), arguments=(q, qd, qdd), folder=tmp_path)
     prefix = {"return": "return_", "std": "std" if language is Language.MATLAB else "std_"}.get(name, name)
-    T, J, tau = results(language, generate_code(robot, ALL, language), prefix, call)
+    T, J, tau = results(language, generate_code(robot, language, ALL), prefix, call)
     reach = max(1.0, float(np.abs(table_frame_poses(robot.spec, q)[..., :3, 3]).max()))
     np.testing.assert_allclose(T, table_tool_pose(robot.spec, q), rtol=0, atol=1e-12 * reach)
     np.testing.assert_allclose(J, geometric_jacobian(robot.spec, q), rtol=0, atol=1e-12 * reach)
-    numpy = python_functions(generate_code(robot, "inverse-dynamics", "numpy"))["inverse_dynamics"](q, qd, qdd)
+    numpy = python_functions(generate_code(robot, "numpy", "inverse-dynamics"))["inverse_dynamics"](q, qd, qdd)
     np.testing.assert_allclose(tau, numpy, rtol=0, atol=1e-12 * max(1.0, float(np.abs(numpy).max(initial=0.0))))
 
 
@@ -136,7 +136,7 @@ def test_python_code_passes_strict_type_checks(tmp_path: Path) -> None:
     from mypy import api
 
     for language in (Language.PYTHON, Language.NUMPY):
-        (tmp_path / f"{language}_code.py").write_text(generate_code(model("odd"), ALL, language))
+        (tmp_path / f"{language}_code.py").write_text(generate_code(model("odd"), language, ALL))
     out, errors, status = api.run(["--strict", "--config-file=", *map(str, sorted(tmp_path.glob("*.py")))])
     assert status == 0, out + errors
 

@@ -33,7 +33,7 @@ def kills(count: int, out: Path) -> Counter[str]:
     """Kill exports at random moments; whatever is found afterwards is one version, and nothing else is left."""
     versions, chance, found = _versions(out / "versions"), random.Random(1), Counter[str]()
     folder = out / "made"
-    export_robot(MODELS[0], folder, verified=False)
+    export_robot(MODELS[0], folder, verify=False)
     for _ in range(count):
         child = os.fork()
         if child == 0:
@@ -47,7 +47,7 @@ def kills(count: int, out: Path) -> Counter[str]:
         differing = [bool(drift(model, folder)) for model in MODELS]  # as ``export --check`` does
         found["mixed after a look"] += contents(folder / "small") not in versions
         found["seen as none of the versions"] += all(differing)
-        export_robot(chance.choice(MODELS), folder, verified=False)
+        export_robot(chance.choice(MODELS), folder, verify=False)
         found["mixed after the next export"] += contents(folder / "small") not in versions
         found["left after the next export"] += os.listdir(folder) != ["small"]
     return found
@@ -68,7 +68,7 @@ def pairs(count: int, out: Path) -> Counter[str]:
 def _versions(folder: Path) -> list[dict[str, bytes]]:
     made = []
     for number, model in enumerate(MODELS):
-        export_robot(model, folder / str(number), verified=False)
+        export_robot(model, folder / str(number), verify=False)
         made.append(contents(folder / str(number) / "small"))
     return made
 
@@ -76,7 +76,7 @@ def _versions(folder: Path) -> list[dict[str, bytes]]:
 def _export_for_ever(folder: Path) -> NoReturn:
     chance = random.Random(os.getpid())
     while True:
-        export_robot(chance.choice(MODELS), folder, verified=False)
+        export_robot(chance.choice(MODELS), folder, verify=False)
 
 
 def _forked(model: RobotModel, folder: Path) -> int:
@@ -85,7 +85,7 @@ def _forked(model: RobotModel, folder: Path) -> int:
         return child
     try:
         for _ in range(3):
-            export_robot(model, folder, verified=False)
+            export_robot(model, folder, verify=False)
     except BaseException:
         os._exit(1)
     os._exit(0)

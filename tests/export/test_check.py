@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,28 @@ def _check(folder: Path, *options: str) -> Outcome:
 
 def test_files_that_are_current_pass(exported: Path) -> None:
     assert _check(exported) == Outcome(status=0, out="small: up to date\n", err="")
+
+
+def test_an_export_and_a_check_are_printed_as_json(exported: Path) -> None:
+    made = exported / "made" / "small"
+    [robot] = json.loads(dh2sim("export", exported / "robot.yaml", "--out", exported / "made", "--json").out)[
+        "robots"
+    ]
+    assert robot["name"] == "small"
+    assert [file["path"] for file in robot["files"]] == [
+        str(made / n) for n in ("small.urdf", "small.xml", "scene.xml")
+    ]
+    assert not any(file["changed"] for file in robot["files"])
+    assert {each["format"] for each in robot["verified"]} == {"urdf", "mjcf"}
+    assert all(each["max_position_error"] < 1e-14 for each in robot["verified"])
+    assert json.loads(_check(exported, "--json").out) == {
+        "ok": True, "robots": [{"name": "small", "ok": True, "drift": []}]
+    }  # fmt: skip
+    (made / "scene.xml").unlink()
+    found = _check(exported, "--json")
+    drift = [{"path": str(made / "scene.xml"), "what": "missing"}]
+    assert (found.status, found.err) == (1, "")
+    assert json.loads(found.out) == {"ok": False, "robots": [{"name": "small", "ok": False, "drift": drift}]}
 
 
 @pytest.mark.parametrize("name", ["small.urdf", "small.xml", "scene.xml"])

@@ -6,7 +6,7 @@ import pytest
 
 from dh2sim import build_model, parse_robot
 from dh2sim.errors import EngineError, MismatchError
-from dh2sim.export import Format, export_robot, verify
+from dh2sim.export import Format, export_robot, verify_files
 from dh2sim.formats.urdf.write import to_urdf
 from tests.export.broken import shifted_chain
 from tests.program import Outcome, contents, dh2sim
@@ -87,7 +87,7 @@ def test_what_mujoco_refuses_is_reported_without_a_temporary_path(tmp_path: Path
     text = to_urdf(model)
     (tmp_path / "small.urdf").write_text(text.replace('<mass value="', '<mass value="1e-20" was="'))
     with pytest.raises(EngineError) as refusal:
-        verify(model, tmp_path, [Format.URDF])
+        verify_files(model, tmp_path, [Format.URDF])
     assert str(refusal.value).startswith("small: small.urdf: MuJoCo refuses the file: ")
     assert str(refusal.value).endswith("; nothing was written")
     assert str(tmp_path) not in str(refusal.value)

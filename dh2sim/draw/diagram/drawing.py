@@ -21,8 +21,9 @@ from dh2sim.draw.plot_style import plot_style, save
 from dh2sim.errors import PictureError
 from dh2sim.extras import require_extra
 from dh2sim.files import atomic_file
-from dh2sim.kinematics.chain import SpecLike, build_chain, joint_vector, spec_of
+from dh2sim.kinematics.chain import build_chain, joint_vector
 from dh2sim.messages import member, shown
+from dh2sim.robot.spec import SpecLike, spec_of
 
 _DPI = 200
 

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from dh2sim.formats.mjcf.sites import placed
 from dh2sim.formats.mjcf.tree import DYNAMICS
 from dh2sim.formats.xml_write import child, number, numbers
 from dh2sim.kinematics.transforms import compose
 from dh2sim.model.mass import MassProperties
-from dh2sim.model.mechanism import MechanismModel
-from dh2sim.model.robot_model import Color, JointModel, LinkModel, RobotModel
+from dh2sim.model.mechanism import AnyModel
+from dh2sim.model.robot_model import Color, JointModel, LinkModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.row import ActuatorType
 from dh2sim.typing import Array
-
-Written: TypeAlias = RobotModel | MechanismModel
-"""What these elements are written of."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +35,7 @@ class MjcfOptions:
     """Whether named configurations become keyframes, whose controls take time to compute."""
 
 
-def add_actuators(mujoco: ET.Element, model: Written) -> None:
+def add_actuators(mujoco: ET.Element, model: AnyModel) -> None:
     """Add an actuator for every joint that is driven, in the order of the joints."""
     driven = [joint for joint in model.moving_joints if joint.actuator.type is not ActuatorType.NONE]
     if not driven:
@@ -61,7 +57,7 @@ def add_actuators(mujoco: ET.Element, model: Written) -> None:
             element.set("forcerange", numbers([-joint.effort, joint.effort]))
 
 
-def add_sensors(mujoco: ET.Element, model: Written) -> None:
+def add_sensors(mujoco: ET.Element, model: AnyModel) -> None:
     """Add sensors of every joint's position, velocity and actuator force, and of tool0's pose."""
     sensors = child(mujoco, "sensor")
     for suffix, tag in (("position", "jointpos"), ("velocity", "jointvel"), ("torque", "jointactuatorfrc")):
@@ -71,7 +67,7 @@ def add_sensors(mujoco: ET.Element, model: Written) -> None:
     child(sensors, "framequat", name="tool0_quat", objtype="site", objname="tool0")
 
 
-def add_option(mujoco: ET.Element, model: Written, options: MjcfOptions) -> None:
+def add_option(mujoco: ET.Element, model: AnyModel, options: MjcfOptions) -> None:
     """Add the options of the simulation."""
     option = child(
         mujoco,
@@ -85,7 +81,7 @@ def add_option(mujoco: ET.Element, model: Written, options: MjcfOptions) -> None
         child(option, "flag", **flags)
 
 
-def add_defaults(mujoco: ET.Element, model: Written) -> None:
+def add_defaults(mujoco: ET.Element, model: AnyModel) -> None:
     """Add the default classes."""
     outer = child(child(mujoco, "default"), "default", class_=class_name(model))
     child(outer, "joint", axis=numbers([0, 0, 1]))
@@ -100,17 +96,17 @@ def add_defaults(mujoco: ET.Element, model: Written) -> None:
     child(hidden, "geom", group="3")
 
 
-def class_name(model: Written) -> str:
+def class_name(model: AnyModel) -> str:
     """Return the name of the robot's default class; MuJoCo has a class main already."""
     return "main_robot" if model.name == "main" else model.name
 
 
-def _site_scale(model: Written) -> float:
+def _site_scale(model: AnyModel) -> float:
     radii = [shape.radius for link in model.all_links for shape in link.shapes if shape.solid]
     return 10.0 * min(radii)
 
 
-def add_assets(mujoco: ET.Element, model: Written) -> dict[Color, str]:
+def add_assets(mujoco: ET.Element, model: AnyModel) -> dict[Color, str]:
     """Add materials and meshes; return the materials' names by colour."""
     asset = child(mujoco, "asset")
     materials: dict[Color, str] = {}
@@ -168,7 +164,7 @@ def add_joint(body: ET.Element, joint: JointModel, reference: float = 0.0) -> No
 
 
 def add_geoms(
-    body: ET.Element, model: Written, link: LinkModel, T_link_dh: Array, materials: dict[Color, str]
+    body: ET.Element, model: AnyModel, link: LinkModel, T_link_dh: Array, materials: dict[Color, str]
 ) -> None:
     """Add the shapes of a link, and its mesh."""
     if link.mesh is not None:
@@ -205,7 +201,7 @@ def _geom(body: ET.Element, class_: str, shape: Shape, material: str, weight: di
     child(body, "geom", class_=class_, **attributes, **weight, **_moved(shape.T_link_shape))
 
 
-def add_contact(mujoco: ET.Element, model: Written) -> None:
+def add_contact(mujoco: ET.Element, model: AnyModel) -> None:
     """Add the pairs of links that do not collide."""
     if model.excluded:
         contact = child(mujoco, "contact")

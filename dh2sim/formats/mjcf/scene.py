@@ -10,10 +10,10 @@ from dh2sim.formats.xml_write import child, document, number, numbers, provenanc
 from dh2sim.kinematics.forward import reference_joint_poses
 from dh2sim.kinematics.transforms import compose, identity, move_point
 from dh2sim.kinematics.tree import body_poses
-from dh2sim.model.build import ModelLike
 from dh2sim.model.mechanism import MechanismModel, written_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.shapes import Shape, ShapeKind
+from dh2sim.robot.spec import SpecLike
 from dh2sim.typing import Array, read_only
 
 VIEW_DIRECTION = (1.0, -1.25, 0.62)
@@ -34,7 +34,7 @@ class _Extent:
     """Height of the foot of the base; None where the arm hangs from it."""
 
 
-def to_scene(model: ModelLike | MechanismModel) -> str:
+def to_scene(model: SpecLike) -> str:
     """Write a scene that includes the robot's MJCF, ``<name>.xml`` beside it.
 
     Args:

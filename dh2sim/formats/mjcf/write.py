@@ -21,18 +21,18 @@ from dh2sim.formats.mjcf.mechanism import to_mechanism_mjcf
 from dh2sim.formats.mjcf.sites import add_site, placed
 from dh2sim.formats.xml_write import child, document, numbers, provenance
 from dh2sim.kinematics.transforms import compose, identity
-from dh2sim.model.build import ModelLike
 from dh2sim.model.mass import LIGHTEST
 from dh2sim.model.mechanism import MechanismModel, written_model
 from dh2sim.model.robot_model import Color, RobotModel
 from dh2sim.robot.row import JointType
+from dh2sim.robot.spec import SpecLike
 from dh2sim.typing import Array
 
 EXPORTED = MjcfOptions()
 """Of the files that ``dh2sim export`` writes."""
 
 
-def to_mjcf(model: ModelLike | MechanismModel, options: MjcfOptions | None = None) -> str:
+def to_mjcf(model: SpecLike, options: MjcfOptions | None = None) -> str:
     """Write a robot or a mechanism as MJCF.
 
     Args:

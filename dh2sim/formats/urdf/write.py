@@ -11,12 +11,12 @@ from dh2sim.formats.urdf.tree import DYNAMICS
 from dh2sim.formats.xml_write import child, document, number, numbers, provenance
 from dh2sim.kinematics.parallelograms import find_couplings
 from dh2sim.kinematics.transforms import compose, identity, invert, pose_from_rpy, rpy_from_rotation
-from dh2sim.model.build import ModelLike
 from dh2sim.model.mass import LIGHTEST, MassProperties
 from dh2sim.model.mechanism import BranchModel, MechanismModel, written_model
 from dh2sim.model.robot_model import Color, JointModel, LinkModel
 from dh2sim.model.shapes import Shape, ShapeKind, ShapePart
 from dh2sim.robot.row import JointType
+from dh2sim.robot.spec import SpecLike
 from dh2sim.typing import Array, read_only
 
 MASSLESS = MassProperties(mass=0.0, com=read_only([0.0, 0.0, 0.0]), inertia=read_only([[0.0] * 3] * 3))
@@ -27,7 +27,7 @@ T_FLANGE_DHN = pose_from_rpy([0, 0, 0], [0, math.pi / 2, 0])
 T_DHN_FLANGE = invert(T_FLANGE_DHN)
 
 
-def to_urdf(model: ModelLike | MechanismModel, *, dh_frames: bool = True) -> str:
+def to_urdf(model: SpecLike, *, dh_frames: bool = True) -> str:
     """Write a robot as URDF.
 
     Args:
