@@ -12,10 +12,10 @@ import numpy as np
 
 from dh2sim.errors import ConfigurationError, SettingsError
 from dh2sim.kinematics.sampling import random_configurations
-from dh2sim.model.build import build_model
+from dh2sim.model.build import model_of
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.progress import Stage, silent
-from dh2sim.robot.spec import SpecLike, spec_of
+from dh2sim.robot.spec import SpecLike
 from dh2sim.typing import Array, read_only
 from dh2sim.workspace.dexterity import Dexterity, Turn, dexterity_at
 from dh2sim.workspace.extremes import Extreme, distance_from, extreme_of, greatest, height_along, least
@@ -120,7 +120,7 @@ class Workspace:
 
 
 def compute_workspace(
-    robot: SpecLike | RobotModel,
+    robot: SpecLike,
     *,
     frame: str = "tool0",
     size: float | None = None,
@@ -156,7 +156,7 @@ def compute_workspace(
         UnknownFrameError: There is no such frame.
         ConfigurationError: The arm has no section, no choice of orientations, or more than ``MOST_JOINTS`` joints.
     """
-    model = _model_of(robot)
+    model = model_of(robot)
     spec, chain = model.spec, model.chain
     _check(size=1.0 if size is None else size, samples=samples, seed=seed, threads=threads, orientations=orientations)
     if dexterity and frame != "tool0":
@@ -238,13 +238,6 @@ def _usual_size(extent: Array) -> float:
         for size in sizes
         if size >= finest * (1.0 - 1e-9) and np.prod(extent / size + 1.0) <= USUAL
     )
-
-
-def _model_of(robot: SpecLike | RobotModel) -> RobotModel:
-    if isinstance(robot, RobotModel):
-        return robot
-    model = getattr(robot, "model", None)
-    return model if isinstance(model, RobotModel) else build_model(spec_of(robot))
 
 
 def _check(*, size: float, samples: int, seed: int, threads: int, orientations: int) -> None:
