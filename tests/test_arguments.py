@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dh2sim import Robot
+from dh2sim import Robot, robot_file_text
 from dh2sim.arguments import file_path, mapping, names, number, real_array, text, whole_number
 from dh2sim.errors import ArgumentError, Dh2simError
 from tests.refusals import refusal
@@ -87,6 +87,8 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "from_table": Robot.from_table,
     "save(path)": ARM.save,
     "view(port)": lambda x: ARM.view(port=x, browser=False),
+    "view(allow_hosts)": lambda x: ARM.view(allow_hosts=[x], browser=False),
+    "robot_file_text(angle)": lambda x: robot_file_text(ARM, angle=x),
 }
 
 
@@ -100,6 +102,10 @@ def test_a_wrong_argument_is_reported_in_the_packages_own_words(
             CALLS[call](value)
         assert isinstance(caught.value, Dh2simError), f"{kind}: {caught.value!r}"
     assert not list(tmp_path.iterdir())
+
+
+def test_a_port_that_does_not_exist_is_refused() -> None:
+    assert refusal(ArgumentError, ARM.view, port=65536, browser=False) == "port must be at most 65535, got 65536"
 
 
 def test_the_checks_take_what_is_right() -> None:

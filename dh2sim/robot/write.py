@@ -20,6 +20,7 @@ import numpy as np
 from dh2sim.arguments import file_path
 from dh2sim.errors import ModelError, NotFiniteError, OutputError
 from dh2sim.files import atomic_file
+from dh2sim.messages import member
 from dh2sim.robot.checks import default_name
 from dh2sim.robot.fields import Choice, Color, Dimension, Flag, Kind, MeshFile, Number, Numbers
 from dh2sim.robot.mechanism_checks import default_closure_name
@@ -215,8 +216,8 @@ def robot_file_text(
     *,
     header: Sequence[str] = (),
     folder: Path | None = None,
-    angle: AngleUnit = AngleUnit.DEG,
-    length: LengthUnit = LengthUnit.M,
+    angle: AngleUnit | str = AngleUnit.DEG,
+    length: LengthUnit | str = LengthUnit.M,
 ) -> str:
     """Return the text of a robot file that ``parse_robot`` reads as the same robot.
 
@@ -236,6 +237,7 @@ def robot_file_text(
         ModelError: A number is too large for the unit, or a mesh file has a name that YAML cannot hold.
     """
     spec = spec_of(robot)
+    angle, length = member(AngleUnit, angle, "angle"), member(LengthUnit, length, "length")
     parts = PartWriter(UnitWriter(units=Units(angle=angle, length=length)), folder)
     shared = parts.part(_shared_actuator(spec, parts))
     lines = [*comment_lines(header), f"name: {word(spec.name)}"]

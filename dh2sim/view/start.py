@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from dh2sim.arguments import text, whole_number
+from dh2sim.arguments import names, text, whole_number
+from dh2sim.errors import ArgumentError
 from dh2sim.model.mechanism import MechanismModel, build_mechanism
 from dh2sim.robot.spec import SpecLike, spec_of
 from dh2sim.view.initial_state import folder_of, open_state
@@ -52,7 +53,9 @@ def start_viewer(
 ) -> PageServer[Any]:
     """Show a robot or a mechanism in the browser, and return at once: see ``Robot.view``."""
     text("host", host)
-    whole_number("port", port)
+    if whole_number("port", port) > 65535:
+        raise ArgumentError(f"port must be at most 65535, got {port}")
+    allow_hosts = names("allow_hosts", allow_hosts)
     spec = spec_of(robot)
     shown: ViewState | MechanismModel
     if spec.is_mechanism:
