@@ -37,11 +37,12 @@ def rollouts() -> Iterator[Row]:
     model = mujoco.MjModel.from_xml_string(mjcf)  # as exported
     lean = mujoco.MjModel.from_xml_string(mjcf)
     lean.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_SENSOR)  # as simulated: no sensor is recorded
-    ceiling, lowest, stock, closed, least, own_loop = (Ratios() for _ in range(6))
+    ceiling, lowest, stock, closed, alike, least, own_loop = (Ratios() for _ in range(7))
     runs: list[Usage] = []
     calls_alone = _calls_alone()
     with TemporaryDirectory() as folder:
-        for controller in ("hold", "computed-torque", Spring):  # so that nothing is imported while the clock runs
+        # so that nothing is imported while the clock runs
+        for controller in ("hold", "sine", "computed-torque", Spring):
             _run(folder, controller, 64)
         for _ in range(7):
             with quiet_engine():
@@ -52,7 +53,9 @@ def rollouts() -> Iterator[Row]:
             ceiling.add(bare, own)
             lowest.add(without_sensors, own)
             stock.add(measure(lambda: _stock_rollout(model, q0, ctrl)), own)
-            closed.add(measure(lambda: _run(folder, "computed-torque", ROLLOUTS)), own)
+            controlled = measure(lambda: _run(folder, "computed-torque", ROLLOUTS))
+            closed.add(controlled, own)
+            alike.add(controlled, measure(lambda: _run(folder, "sine", ROLLOUTS)))
             some = measure(lambda: _run(folder, "hold", TOGETHER))
             own_loop.add(measure(lambda: _run(folder, Spring, TOGETHER)), some)
             with quiet_engine():
@@ -65,7 +68,8 @@ def rollouts() -> Iterator[Row]:
     yield ceiling.row("mj_step in C, nothing recorded / the same steps into Zarr", least=0.95)
     yield lowest.row("mj_step in C without sensors / the same steps into Zarr")
     yield stock.row("mujoco.rollout, left in memory / the same steps into Zarr", least=1.25)
-    yield closed.row("computed-torque / hold, both into Zarr", most=1.3)
+    yield alike.row("computed-torque / sine, whose data take as much space, both into Zarr", most=1.3)
+    yield closed.row("computed-torque / hold, whose data take a third of it")
     yield least.row(f"MuJoCo's calls alone, step by step / hold, {TOGETHER} rollouts")
     yield own_loop.row(f"spring and damper in Python / hold, {TOGETHER} rollouts into Zarr", most=1.5)
 

@@ -76,20 +76,25 @@ def check_dynamics(
         greatest force on the same joint in any of the states, so that light wrists count as much as heavy shoulders.
         Inertias and forces that are tiny beside those of the robot's mass and weight at its reach are only rounding:
         they have the lower bounds ``LEAST_INERTIA`` and ``LEAST_FORCE``. Where an engine rounds inertias, so are
-        forces that are small beside those which the links' own inertias can make.
+        entries and forces that are small beside those which the links' own inertias can make.
     """
     terms = engine.dynamic_terms(q, velocity, model.spec.gravity)
     lever = max(model.reach, LEAST_LEVER)
     inertia, rounded = _inertia(model, lever), _inertia(model, max(model.longest_lever, LEAST_LEVER))
     least = np.sqrt(max(LEAST_INERTIA * inertia, ROUNDING * rounded))
     diagonal = np.maximum(np.sqrt(np.maximum(np.einsum("kii->ki", reference.mass_matrix), 0.0)), least)
+    rounds = engine.inertia_rounding > TOLERANCE
+    carried, rate = _carried_inertia(model), _rate(model, velocity)
+    if rounds:
+        diagonal = np.maximum(diagonal, np.sqrt(carried))
     mass = np.abs(terms.mass_matrix - reference.mass_matrix) / (diagonal[:, :, None] * diagonal[:, None, :])
     weight = model.mass * (1.0 + float(np.linalg.norm(model.spec.gravity)))  # 1 m/s^2 for what the motion makes
-    made_far_out = weight * model.longest_lever + rounded * max(1.0, _rate(model, velocity)) ** 2
+    made_far_out = weight * model.longest_lever + rounded * max(1.0, rate) ** 2
     least_force = max(LEAST_FORCE * weight * lever, ROUNDING * made_far_out)
     force = np.maximum(np.abs(reference.bias).max(axis=0), least_force)
     names = [joint.name for joint in model.moving_joints]
-    made = np.maximum(force, _turning_torque(model, velocity)) if engine.inertia_rounding > TOLERANCE else force
+    # at most the torque with which links keep turning
+    made = np.maximum(force, carried * rate**2) if rounds else force
     bias, gravity = np.abs(terms.bias - reference.bias) / made, np.abs(terms.gravity - reference.gravity) / force
     tolerance = max(TOLERANCE, engine.inertia_rounding)
     return [
@@ -105,17 +110,15 @@ def _inertia(model: RobotModel, lever: float) -> float:
     return model.mass * lever * lever + math.fsum(own)
 
 
-def _turning_torque(model: RobotModel, velocity: Array) -> Array:
-    """Return an upper bound of the torque, N·m, with which links keep turning: by the joints that carry them, (n,).
+def _carried_inertia(model: RobotModel) -> Array:
+    """Return the inertia about themselves, kg·m², of the links that each moving joint carries, shape (n,).
 
-    It is their inertia about themselves times the square of their rate: for a rod that turns about its length, say,
-    far more than what is left of it.
+    Of a rod, say, it is far more than that about its length.
     """
     own = [0.0 if body is None else float(np.trace(body.inertia)) for body in model.bodies]
     carried = np.cumsum(own[::-1])[::-1]
-    moving = [row for row, joint in enumerate(model.joints) if joint.type.moves]
-    bound: Array = carried[moving] * _rate(model, velocity) ** 2
-    return bound
+    moving: Array = carried[[joint.type.moves for joint in model.joints]]
+    return moving
 
 
 def _rate(model: RobotModel, velocity: Array) -> float:

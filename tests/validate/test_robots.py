@@ -162,6 +162,25 @@ def test_a_rod_of_kilometres_that_turns_about_its_length_is_judged_by_its_inerti
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not PYBULLET, reason="PyBullet is not installed")
+def test_a_mass_matrix_is_judged_beside_the_inertia_of_the_rods_that_a_joint_carries() -> None:
+    rods = (
+        "name: rods\nconvention: hayati\nbase: {rpy: [-1.5707963267948966, -1.5707963267948966, 1e-06]}\njoints:\n"
+        "  - {type: continuous, a: 1e-06, beta: 1.5707963267948966, link: {density: 39.64740800021732}}\n"
+        "  - {type: fixed, convention: modified, alpha: -1.0, theta: 3.141592653589793}\n"
+        "  - {type: revolute, theta: 0.016206977847951044, beta: 1.5707963267948966}\n"
+        "  - {type: continuous, a: -100000.0, alpha: -1000000.0}\n"
+        "  - {type: prismatic, a: 0.5, limits: {position: [0, 1]}, link: {mass: 0.8783650558214348}}\n"
+        "  - {type: fixed, a: -20000.0, theta: 1.5707963267948966, link: {radius: 1e-06}}\n"
+        "  - {type: continuous, convention: standard, theta: 1.5707963267948966}\n"
+        "  - {type: revolute, theta: -1.5707963267948966, link: {mass: 0.1, com: [1e-06, -20000.0, 1e-06],"
+        " inertia: {ixx: 0.25, iyy: 1.0353981633974483, izz: 0.7853981633974583}}}\n"
+    )
+    report = validate_robot(build_model(parse_robot(rods)), samples=50)
+    assert [check for check in report.checks if check.ok is False] == []
+
+
+@pytest.mark.slow
 def test_a_planet_on_a_fast_arm_is_judged_by_the_forces_that_its_motion_makes() -> None:
     planet = (
         "name: planet\nconvention: modified\nunits: {angle: deg}\njoints:\n"
