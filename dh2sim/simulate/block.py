@@ -90,8 +90,10 @@ def simulate_block(job: Job, rollouts: range, *, threads: int = 0, advance: Adva
     arrays = _empty(job, rollouts)
     made: dict[int, DesignPlant] = {}
     threads = whole_number("threads", threads) or available_processors()
-    parts = [rollouts] if job.options.engine == WARP else _divided(rollouts, threads)  # a device is to be filled
-    workers = max(1, min(threads, len(parts)))
+    # what others wrote may need the main thread, and may have to be interrupted
+    takers = threads if job.controller.own else 1
+    parts = [rollouts] if job.options.engine == WARP else _divided(rollouts, takers)  # a device is to be filled
+    workers = max(1, min(takers, len(parts)))
     turns = Turns(workers)
 
     def simulate(part: range) -> None:
@@ -106,11 +108,11 @@ def simulate_block(job: Job, rollouts: range, *, threads: int = 0, advance: Adva
     return arrays
 
 
-def _divided(rollouts: range, threads: int) -> list[range]:
-    """Return the rollouts that are simulated together: as many groups as all threads can take turns with."""
+def _divided(rollouts: range, takers: int) -> list[range]:
+    """Return the rollouts that are simulated together: as many groups as can take turns."""
     total = len(rollouts)
-    count = max(-(-total // BATCH_SIZE), min(threads, total // LEAST_SIZE))
-    workers = min(threads, count) or 1
+    count = max(-(-total // BATCH_SIZE), min(takers, total // LEAST_SIZE))
+    workers = min(takers, count) or 1
     count = min(-(-count // workers) * workers, total)
     return [rollouts[total * k // count : total * (k + 1) // count] for k in range(count)]
 

@@ -13,10 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 
 class Turns:
-    """Lets one thread at a time run Python, and all of them MuJoCo.
-
-    So controllers, which may be anybody's, need not be safe to be called by several threads at once.
-    """
+    """Lets one thread at a time run Python, and all of them MuJoCo."""
 
     def __init__(self, workers: int) -> None:
         """Begin with nobody's turn; with one worker, it is always the caller's."""

@@ -45,6 +45,8 @@ class ControllerChoice:
     """Whether it follows a reference, which can be recorded."""
     first: Mapping[str, float] | None = None
     """Where the reference of a file begins, by joint, rad and m."""
+    own: bool
+    """Whether the code is part of dh2sim."""
 
 
 BUILT_IN: Final[Mapping[str, type]] = MappingProxyType(
@@ -158,6 +160,7 @@ def _choice(name: str, found: type, text: str, *, own: bool) -> ControllerChoice
         digest=" ".join(filter(None, (code, prepared.digest))),
         follows=prepared.follows,
         first=prepared.first,
+        own=own,
     )
 
 

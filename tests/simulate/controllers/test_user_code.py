@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import hashlib
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,23 @@ def test_a_class_of_an_interactive_session_is_a_controller() -> None:
     run = rollout(arm(), rollouts=2, steps=5, controller=Sink)
     assert run.attrs["controller"] == "__main__:Sink"
     assert np.isfinite(run.qpos.values).all()
+
+
+def test_a_users_code_runs_in_the_thread_that_asks_for_rollouts() -> None:
+    threads = set()
+
+    class Sink:
+        actuation = "motor"
+
+        def __init__(self, batch: RolloutBatch) -> None:  # noqa: ARG002
+            threads.add(threading.current_thread())
+
+        def control(self, observation: Observation) -> Array:
+            threads.add(threading.current_thread())
+            return -observation.v
+
+    rollout(arm(), rollouts=200, steps=2, controller=Sink, threads=3)
+    assert threads == {threading.current_thread()}
 
 
 def test_a_class_in_a_package_is_a_controller(folder: Path) -> None:
