@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from dh2sim.arguments import file_path, names
-from dh2sim.errors import EngineError, MismatchError, ModelError
+from dh2sim.errors import ArgumentError, EngineError, MismatchError, ModelError
 from dh2sim.files import atomic_files, finish_interrupted
 from dh2sim.formats.mjcf.scene import to_scene
 from dh2sim.formats.mjcf.write import to_mjcf
@@ -359,6 +359,7 @@ def export_robot(
         What was written, how well it matches, and what the formats cannot hold.
 
     Raises:
+        ArgumentError: an argument is of a wrong kind, or there is no format.
         ModelError: a format cannot hold the robot.
         EngineError: MuJoCo refuses a file.
         MismatchError: a file's poses differ from the table's.
@@ -366,6 +367,8 @@ def export_robot(
     """
     folder = file_path("out", out)
     wanted = list(dict.fromkeys(member(Format, name, "format") for name in names("formats", formats)))
+    if not wanted:
+        raise ArgumentError(f"formats must be at least one of {listed(Format)}")
     model = written_model(robot)
     files = render(model, wanted, dh_frames=dh_frames)
     target = folder / model.name

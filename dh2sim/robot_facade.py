@@ -201,7 +201,7 @@ class Robot:
         Raises:
             Dh2simError: The file is wrong or holds no serial arm; the text says what and where.
         """
-        where = {"package_paths": package_paths, "root": root, "arguments": arguments or {}}
+        where = {"package_paths": package_paths, "root": root, "arguments": {} if arguments is None else arguments}
         return cls._imported(path, base=base, tip=tip, convention=convention, tolerance=tolerance, name=name, **where)
 
     @classmethod

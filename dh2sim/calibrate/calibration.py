@@ -17,7 +17,7 @@ from dh2sim.calibrate.hayati_rows import fit_rows
 from dh2sim.calibrate.held_out import Errors, errors_of, held_out_errors
 from dh2sim.calibrate.identify import find_basis
 from dh2sim.calibrate.initial import initial_states
-from dh2sim.calibrate.measurements import Kind, Measurements
+from dh2sim.calibrate.measurements import Kind, Measurements, noise_sigmas
 from dh2sim.calibrate.observations import Observations, State
 from dh2sim.calibrate.outliers import find_outliers
 from dh2sim.calibrate.parameters import Group, RobotParameters, Values
@@ -114,10 +114,7 @@ def calibrate_robot(
 def _sigma(noise: float | tuple[float, float] | None) -> Sigma:
     if noise is None:
         return Sigma(length=1e-3, angle=1e-3, length_known=False, angle_known=False)
-    length, angle = noise if isinstance(noise, tuple) else (noise, noise)
-    for value in (length, angle):
-        if not (math.isfinite(value) and value > 0.0):
-            raise CalibrationError(f"noise must be a positive number, got {value!r}")
+    length, angle = noise_sigmas(noise)
     return Sigma(length=length, angle=angle)
 
 

@@ -13,6 +13,7 @@ from typing import Final, NoReturn
 
 import numpy as np
 
+from dh2sim.arguments import file_path
 from dh2sim.calibrate.measurements import OTHER_KINDS, Kind, Measurements, grouped, problems_of
 from dh2sim.errors import Dh2simError, MeasurementFileError, Problem
 from dh2sim.input_files import check_columns, read_input, utf16_hint
@@ -123,6 +124,7 @@ def read_measurements(
         MeasurementFileError: The file is wrong; the error holds everything that is, with its place.
         Dh2simError: It cannot be read, or the kind is unknown.
     """
+    file_path("path", path)
     spec = serial_spec_of(robot)
     name = os.fspath(path)
     wanted = None if kind is None else member(Kind, OTHER_KINDS.get(str(kind), str(kind)), "kind")

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dh2sim.arguments import real_array
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.messages import counted
@@ -32,6 +33,20 @@ class Kind(StrEnum):
 
 OTHER_KINDS: Final = {"point": "position", "points": "position", "poses": "pose", "distances": "distance"}
 """What the kinds are called elsewhere."""
+
+
+def noise_sigmas(noise: object) -> tuple[float, float]:
+    """Return standard deviations of a component, m and rad, that are given together or as one number.
+
+    Raises:
+        ArgumentError: They are not numbers.
+        CalibrationError: They are not above 0, or not one or two.
+    """
+    given = real_array("noise", noise)
+    if given.shape not in ((), (2,)) or not (np.isfinite(given) & (given > 0.0)).all():
+        raise CalibrationError(f"noise must be a positive number, m, or two, m and rad; got {given.tolist()}")
+    length, angle = np.broadcast_to(given, 2).tolist()
+    return length, angle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

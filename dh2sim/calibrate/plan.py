@@ -21,7 +21,7 @@ from dh2sim.arguments import whole_number
 from dh2sim.calibrate.calibration import random_vectors
 from dh2sim.calibrate.hayati_rows import fit_rows
 from dh2sim.calibrate.identify import find_basis
-from dh2sim.calibrate.measurements import OTHER_KINDS, Kind
+from dh2sim.calibrate.measurements import OTHER_KINDS, Kind, noise_sigmas
 from dh2sim.calibrate.parameters import Group, Parameter, RobotParameters, Values
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.chain import serial_spec_of
@@ -112,7 +112,7 @@ def plan_measurements(
     count, seed = whole_number("count", count, least=1), whole_number("seed", seed)
     if count > MOST:
         raise CalibrationError(f"the number of configurations must be at most {MOST}, got {count}")
-    length, angle = noise if isinstance(noise, tuple) else (noise, noise)
+    length, angle = noise_sigmas(noise)
     joints = len(spec.moving_rows)
     if not joints:
         raise CalibrationError(f"{spec.name} has no joint that moves")

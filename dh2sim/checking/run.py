@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
+from dh2sim.arguments import below_one, file_path, file_paths, instance, names, whole_number
 from dh2sim.checking.files import changed_files, find_robot_files
 from dh2sim.checking.findings import PART_OF_RULE, Baseline, CheckPart, CheckReport, Finding, RobotCheck
 from dh2sim.errors import Dh2simError, RobotError
 from dh2sim.export import drift
+from dh2sim.messages import member
 from dh2sim.model.mechanism import MechanismModel, written_model
 from dh2sim.model.robot_model import RobotModel
 from dh2sim.model.slips import find_slips
@@ -27,10 +29,10 @@ _LINE = re.compile(r"from line (\d+)$")
 
 
 def check_files(
-    paths: Iterable[str | PathLike[str]] = (".",),
+    paths: Iterable[str | PathLike[str]] | str | PathLike[str] = (".",),
     *,
     exports: str | PathLike[str] | None = None,
-    parts: Collection[CheckPart | str] = ALL_PARTS,
+    parts: Collection[CheckPart | str] | CheckPart | str = ALL_PARTS,
     samples: int = 200,
     seed: int = 0,
     tolerance: float = 1e-12,
@@ -41,7 +43,7 @@ def check_files(
     """Check robot files, their exports, and the poses that all engines read from these.
 
     Args:
-        paths: Robot files, and folders that are searched for them.
+        paths: Robot files, and folders that are searched for them; one or several.
         exports: Folder with a folder of exports for every robot, which all must have then. By default 'generated',
             where robots without exports are exported afresh.
         parts: What to check, of 'files', 'drift' and 'poses'. Files are read in any case.
@@ -56,15 +58,22 @@ def check_files(
         What was found. An invalid robot file counts as a finding.
 
     Raises:
+        ArgumentError: An argument is of a wrong kind, ``samples`` is below 1, or ``tolerance`` is not above 0 and
+            below 1.
         UnknownRobotError: A path does not exist.
         Dh2simError: git cannot say what changed, or a part is unknown.
     """
-    chosen = tuple(CheckPart(part) for part in parts)
-    files = find_robot_files([Path(path) for path in paths])
-    folder = Path("generated" if exports is None else exports)
+    chosen = tuple(member(CheckPart, part, "part") for part in names("parts", parts))
+    places = file_paths("paths", paths)
+    folder = file_path("exports", "generated" if exports is None else exports)
+    samples, seed = whole_number("samples", samples, least=1), whole_number("seed", seed)
+    tolerance = below_one("tolerance", tolerance)
+    if baseline is not None:
+        instance("baseline", baseline, Baseline)
+    files = find_robot_files(places)
     read = [_read(path) for path in files]
     if changed_since is not None:
-        changed = changed_files(changed_since, _folder_of(files, paths))
+        changed = changed_files(changed_since, _folder_of(files, places))
         read = [entry for entry in read if entry.depends_on(changed, folder)]
     first: dict[str, Path] = {}
     robots = []
@@ -247,11 +256,11 @@ def _with_baseline(report: CheckReport, baseline: Baseline | None, *, whole: boo
     return replace(report, robots=tuple(robots), outdated=outdated if whole else 0)
 
 
-def _folder_of(files: Sequence[Path], paths: Iterable[str | PathLike[str]]) -> Path:
+def _folder_of(files: Sequence[Path], places: Sequence[Path]) -> Path:
     """Return a folder of the repository that the files are in."""
     if files:
         return files[0].parent
-    return next((Path(path) for path in paths if Path(path).is_dir()), Path())
+    return next((place for place in places if place.is_dir()), Path())
 
 
 def _posix(file: str) -> str:

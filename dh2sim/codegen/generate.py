@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from dh2sim.arguments import names
+from dh2sim.arguments import names, text
 from dh2sim.codegen.base_parameters import base_parameters
 from dh2sim.codegen.check import force_error, jacobian_error, pose_error
 from dh2sim.codegen.forward import joint_turns, tool_jacobian, tool_pose
@@ -72,7 +72,8 @@ def _asked_for(
         raise Dh2simError(f"choose at least one of {', '.join(What)}")
     model = model_of(robot) if What.INVERSE_DYNAMICS in wanted else None
     spec = serial_spec_of(robot) if model is None else model.spec
-    return _program(spec, model, [each for each in What if each in wanted], name or spec.name), spec, model
+    called = spec.name if name is None else text("name", name) or spec.name
+    return _program(spec, model, [each for each in What if each in wanted], called), spec, model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

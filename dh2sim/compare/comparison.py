@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from dh2sim.arguments import below_one
 from dh2sim.compare.fitting import Fit, ToolResidual, any_fit, best_fit, joint_samples, measured
 from dh2sim.compare.geometry import LABELS, Difference, first_difference
 from dh2sim.compare.inputs import PLAINLY, ReadRobot, read_any
@@ -230,12 +231,11 @@ def diff(
         Dh2simError: A file is wrong, or a robot has closed loops, branches, or more than ``MOST_JOINTS`` joints that
             move.
     """
-    if isinstance(tolerance, bool) or not isinstance(tolerance, int | float) or not 0.0 < tolerance < 1.0:
-        raise Dh2simError(f"tolerance must be above 0 and below 1, got {tolerance!r}")
+    tolerance = below_one("tolerance", tolerance)
     of_a, of_b = read_any(a, options_a), read_any(b, options_b)
     for read in (of_a, of_b):
         require_comparable(read.spec)
-    return compared(of_a, of_b, float(tolerance))
+    return compared(of_a, of_b, tolerance)
 
 
 def require_comparable(spec: RobotSpec) -> None:

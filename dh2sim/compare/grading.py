@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
 
+from dh2sim.arguments import below_one, file_paths, instance
 from dh2sim.compare.comparison import Comparison, compared, require_comparable
 from dh2sim.compare.inputs import PLAINLY, ReadRobot, read_any
 from dh2sim.compare.matching import ObstacleKind
@@ -193,7 +194,7 @@ def _plain(node: Node) -> object:
 
 def grade(
     solution: SpecLike | str | os.PathLike[str],
-    submissions: Iterable[str | os.PathLike[str]],
+    submissions: Iterable[str | os.PathLike[str]] | str | os.PathLike[str],
     *,
     rubric: Rubric | None = None,
     tolerance: float = TOLERANCE_OF_GRADES,
@@ -203,17 +204,22 @@ def grade(
 
     Args:
         solution: The right robot, in any form that ``diff`` takes.
-        submissions: Files of any kind that dh2sim reads.
+        submissions: Files, or a file, of any kind that dh2sim reads.
         rubric: What submissions are worth; by default 10 points, and shares of them.
         tolerance: Greatest difference of tool0, rad, and m for a reach of up to 1 m, then of the reach.
         options: How tables are to be read that do not say it themselves.
 
     Raises:
+        ArgumentError: An argument is of a wrong kind, or ``tolerance`` is not above 0 and below 1.
         Dh2simError: The solution cannot be read. A submission that cannot be is graded as unreadable.
     """
+    files = file_paths("submissions", submissions)
+    rubric = Rubric() if rubric is None else instance("rubric", rubric, Rubric)
+    tolerance = below_one("tolerance", tolerance)
+    instance("options", options, ImportOptions)
     right = read_any(solution)
     require_comparable(right.spec)
-    return [_grade(right, os.fspath(file), rubric or Rubric(), tolerance, options) for file in submissions]
+    return [_grade(right, os.fspath(file), rubric, tolerance, options) for file in files]
 
 
 def _grade(right: ReadRobot, file: str, rubric: Rubric, tolerance: float, options: ImportOptions) -> Grade:

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from dh2sim.arguments import file_path
+from dh2sim.arguments import file_path, file_paths, instance, mapping, number, text
 from dh2sim.errors import Dh2simError
 from dh2sim.formats.calibration import is_calibration
 from dh2sim.formats.serial_robot import SerialRobot
@@ -79,26 +79,22 @@ class ImportOptions:
         Raises:
             Dh2simError: An option has a value that is not allowed.
         """
-        paths = self.package_paths
+        given = mapping("arguments", self.arguments).items()
         changed: dict[str, Any] = {
             "convention": _choice(Convention, self.convention, "convention"),
             "angle": _choice(AngleUnit, self.angle, "angle"),
             "length": _choice(LengthUnit, self.length, "length"),
-            "arguments": MappingProxyType({name: str(value) for name, value in self.arguments.items()}),
-            "package_paths": (paths,) if isinstance(paths, str | os.PathLike) else tuple(paths),
+            "arguments": MappingProxyType({name: str(value) for name, value in given}),
+            "package_paths": tuple(file_paths("package_paths", self.package_paths)),
+            "root": None if self.root is None else file_path("root", self.root),
         }
-        for path in (*changed["package_paths"], *([] if self.root is None else [self.root])):
-            if not isinstance(path, str | os.PathLike):
-                raise Dh2simError(f"package_paths and root must be paths, got {path!r}")
         for name, value in changed.items():
             object.__setattr__(self, name, value)
-        if isinstance(self.tolerance, bool) or not isinstance(self.tolerance, int | float):
-            raise Dh2simError(f"tolerance must be a number, got {self.tolerance!r}")
-        if not 0.0 < self.tolerance < math.inf:
+        if not 0.0 < number("tolerance", self.tolerance) < math.inf:
             raise Dh2simError(f"tolerance must be a positive number, got {self.tolerance!r}")
         for what in ("base", "tip", "name"):
-            if not isinstance(value := getattr(self, what), str | None):
-                raise Dh2simError(f"{what} must be a string, got {value!r}")
+            if (value := getattr(self, what)) is not None:
+                text(what, value)
 
 
 def import_robot(
@@ -116,8 +112,7 @@ def import_robot(
         MismatchError: The table that was made is not the file's kinematics to within the tolerance.
         Dh2simError: The file cannot be read, or is of another format.
     """
-    if not isinstance(options, ImportOptions):
-        raise Dh2simError(f"options must be ImportOptions, got {options!r}")
+    instance("options", options, ImportOptions)
     file = os.fspath(file_path("path", path))
     return import_data(read_file(Path(file)), file, options, folder=folder)
 

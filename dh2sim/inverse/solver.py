@@ -11,7 +11,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dh2sim.arguments import mapping, real_array
+from dh2sim.arguments import flag, mapping, real_array
 from dh2sim.errors import ConfigurationError
 from dh2sim.inverse.branches import branch_names
 from dh2sim.inverse.elimination import Found, Method
@@ -140,6 +140,7 @@ class InverseSolver:
             ConfigurationError: A pose is not a rigid transform, ``q0`` has the wrong shape, a joint to lock is
                 unknown, or more than ``MOST_JOINTS`` joints move and ``numeric`` is not given.
         """
+        limits, numeric = flag("limits", limits), flag("numeric", numeric)
         goals = read_goals(T)
         poses = goals.reshape(-1, 4, 4)
         near = self._home if q0 is None else joint_vector(self._chain, q0)

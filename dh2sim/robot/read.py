@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-from dh2sim.errors import Dh2simError, RobotError, UnknownRobotError
+from dh2sim.errors import ArgumentError, Dh2simError, RobotError, UnknownRobotError
 from dh2sim.input_files import read_input
 from dh2sim.messages import Loc, did_you_mean, listed, loc_of, path_of, shown
 from dh2sim.robot.catalog import builtin_mechanisms, builtin_path, builtin_robots
@@ -72,8 +72,11 @@ def parse_robot(
         mesh_files: Whether it may name mesh files; if not, no path in it is followed.
 
     Raises:
+        ArgumentError: ``text`` is neither a string nor bytes.
         RobotFileError: The text is wrong; the error holds everything that is.
     """
+    if not isinstance(text, str | bytes):
+        raise ArgumentError(f"text must be a string or bytes, got {type(text).__name__}")
     data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
     report = Report(file)
     folder = directory or Path.cwd()

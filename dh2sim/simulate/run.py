@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 
+from dh2sim.arguments import whole_numbers
 from dh2sim.errors import SettingsError
 from dh2sim.extras import require_extra
 from dh2sim.model.mechanism import written_model
@@ -110,6 +111,8 @@ def rollout(
         MissingExtraError: xarray is not installed, or what a place or an executor needs.
     """
     require_extra("data", "xarray", what="a run as an xarray dataset")
+    if blocks is not None:
+        blocks = whole_numbers("blocks", blocks)
     model = written_model(loaded(robot))
     job = with_block_size(prepare(model, options_for(model, **options)), block_size)
     if out is None:
@@ -202,7 +205,7 @@ def check_share(share: tuple[int, int] | None, *, alone: bool) -> None:
         return
     if not alone:
         raise SettingsError([("share", "must not be given together with blocks")])
-    index, shares = share
+    index, shares = whole_numbers("share", share, count=2)
     if not 1 <= index <= shares:
         allowed = "1/1" if shares <= 1 else f"one of 1/{shares} to {shares}/{shares}"
         raise SettingsError([("share", f"must be {allowed}, got {index}/{shares}")])

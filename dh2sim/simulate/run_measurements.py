@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dh2sim.calibrate.measurements import Kind, Measurements, measurements
+from dh2sim.calibrate.measurements import Kind, Measurements, measurements, noise_sigmas
 from dh2sim.errors import CalibrationError
 from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.kinematics.rotations import rotations_of_quaternions, rotations_of_vectors
@@ -51,9 +50,7 @@ def run_measurements(
     spec = serial_spec_of(robot)
     if kind not in (Kind.POSE, Kind.POSITION):
         raise CalibrationError(f"a run records poses of tool0, not what kind '{kind}' needs; use pose or position")
-    length, angle = noise if isinstance(noise, tuple) else (noise, noise)
-    if not all(math.isfinite(value) and value > 0.0 for value in (length, angle)):
-        raise CalibrationError(f"noise must be a positive number, got {noise!r}")
+    length, angle = noise_sigmas(noise)
     if count < 1:
         raise CalibrationError(f"count must be at least 1, got {count}")
     if isinstance(run, str | os.PathLike):

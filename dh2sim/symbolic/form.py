@@ -5,12 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any
 
 from dh2sim.symbolic.angles import Angle, trig_of
 from dh2sim.symbolic.expression import Named, Nesting, Sum, atoms_of, name_sums
 from dh2sim.symbolic.polynomial import Atom, Matrix
 from dh2sim.symbolic.table import Letter, SymbolicTable
+
+
+class JointNames(StrEnum):
+    """What joint coordinates are called."""
+
+    THETA = "theta"
+    """With d_i for slides."""
+    Q = "q"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,8 +71,7 @@ class Form:
     """Sentences to print below."""
     error: float = math.nan
     """Largest difference from numbers at random configurations, as a share of their size."""
-    joint_names: str = "theta"
-    """What coordinates of turning rows are called: ``theta`` or ``q``."""
+    joint_names: str = JointNames.THETA
 
     @property
     def sums(self) -> list[Sum]:

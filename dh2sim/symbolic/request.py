@@ -12,7 +12,7 @@ from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.messages import member
 from dh2sim.robot.spec import SpecLike
 from dh2sim.symbolic.expression import Lengths, Style
-from dh2sim.symbolic.form import Equation, Form
+from dh2sim.symbolic.form import Equation, Form, JointNames
 from dh2sim.symbolic.kinematics import FormNotation, jacobian_form, matrices_form, pose_form
 from dh2sim.symbolic.reading import symbolic_table
 from dh2sim.symbolic.table import Fold
@@ -42,7 +42,7 @@ class SymbolicKeywords(TypedDict, total=False):
     numbers: bool
     letters: bool
     fold: Fold | str
-    joint_names: str
+    joint_names: JointNames | str
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def symbolic_form(
     numbers: bool = False,
     letters: bool = False,
     fold: Fold | str = "parallel",
-    joint_names: str = "theta",
+    joint_names: JointNames | str = "theta",
 ) -> SymbolicForm:
     """Return the kinematics of a robot in symbols, compared with its table at random configurations.
 
@@ -148,13 +148,13 @@ def symbolic_form(
         lengths=None if lengths is None else member(Lengths, lengths, "lengths"),
         names=names,
         fold=member(Fold, fold, "fold"),
-        joint_names=joint_names,
+        joint_names=member(JointNames, joint_names, "joint_names"),
     )
     match wanted:
         case What.DYNAMICS:
             from dh2sim.symbolic.motion_form import dynamics_form
 
-            form = dynamics_form(table, bodies, names=names, joint_names=joint_names)
+            form = dynamics_form(table, bodies, names=names, joint_names=notation.joint_names)
         case What.POSE:
             form = pose_form(table, source, target, notation)
         case What.JACOBIAN:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from dh2sim.arguments import file_path, number, whole_number
+from dh2sim.arguments import below_one, file_path, whole_number
 from dh2sim.engines.examined import Examined
 from dh2sim.engines.mujoco_engine import MujocoEngine
 from dh2sim.engines.pinocchio_engine import PinocchioEngine
@@ -98,22 +98,21 @@ def validate_robot(
         The report. A file that is missing or that an engine refuses is a check that failed.
 
     Raises:
-        ArgumentError: An argument is of a wrong kind.
-        Dh2simError: ``samples`` is not a whole number of at least 1, ``tolerance`` is not above 0 and below 1, or the
-            source is not of this robot.
+        ArgumentError: An argument is of a wrong kind, ``samples`` is below 1, or ``tolerance`` is not above 0 and
+            below 1.
+        Dh2simError: The source is not of this robot.
         ImportedFileError: The source is wrong.
         ModelError: A format cannot hold the robot.
         OutputError: The files cannot be written to the temporary folder.
     """
-    if not isinstance(samples, int | np.integer) or samples < 1:
-        raise Dh2simError(f"samples must be a whole number of at least 1, got {samples!r}")
-    if not 0.0 < number("tolerance", tolerance) < 1.0:
-        raise Dh2simError(f"tolerance must be above 0 and below 1, got {tolerance!r}")
-    seed = whole_number("seed", seed)
+    samples, seed = whole_number("samples", samples, least=1), whole_number("seed", seed)
+    tolerance = below_one("tolerance", tolerance)
     if source is None and (base, tip) != (None, None):
         raise Dh2simError("base and tip are links of the source, and need it")
     if folder is not None:
         folder = file_path("folder", folder)
+    if source is not None:
+        source = file_path("source", source)
     model = written_model(loaded(robot))
     if isinstance(model, MechanismModel):
         if source is not None:

@@ -118,6 +118,11 @@ def test_a_path_that_does_not_exist_is_an_error() -> None:
         check_files(["nowhere"])
 
 
+def test_one_path_and_one_part_may_be_given_alone(repository: Path) -> None:
+    report = check_files("robots/first.yaml", parts="files")
+    assert [robot.file for robot in report.robots] == ["robots/first.yaml"]
+
+
 # ---------------------------------------------------------------------------- changes
 
 

@@ -35,6 +35,12 @@ def test_a_right_table_written_otherwise_has_full_points(tmp_path: Path) -> None
     assert (given.points, given.outcome, given.comments, given.full) == (10.0, "right", (), True)
 
 
+def test_one_submission_may_be_given_alone(tmp_path: Path) -> None:
+    file = write(tmp_path, RIGHT)
+    [given] = grade(file, str(file))
+    assert (given.submission, given.points) == (str(file), 10.0)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "outcome", "points", "comment"),
     [

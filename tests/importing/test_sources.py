@@ -214,7 +214,7 @@ def test_a_table_of_several_is_read_by_its_number() -> None:
 def test_options_may_be_plain_strings() -> None:
     options = ImportOptions(convention="modified", angle="deg", length="mm", package_paths="meshes")
     assert (options.convention, options.angle, options.length, options.package_paths) == (
-        Convention.MODIFIED, AngleUnit.DEG, LengthUnit.MM, ("meshes",),
+        Convention.MODIFIED, AngleUnit.DEG, LengthUnit.MM, (Path("meshes"),),
     )  # fmt: skip
     text = b"theta,d,a,alpha\nq1,100,0,90\n"
     for spec in (
@@ -234,8 +234,9 @@ def test_options_may_be_plain_strings() -> None:
         ({"tolerance": "1e-4"}, "tolerance must be a number, got '1e-4'"),
         ({"tolerance": -1e-4}, "tolerance must be a positive number, got -0.0001"),
         ({"tolerance": math.nan}, "tolerance must be a positive number, got nan"),
-        ({"package_paths": [3]}, "package_paths and root must be paths, got 3"),
-        ({"root": 3}, "package_paths and root must be paths, got 3"),
+        ({"package_paths": [3]}, "package_paths must be a path or several, got [3]"),
+        ({"root": 3}, "root must be a path, got 3"),
+        ({"arguments": [1]}, "arguments must be a mapping of names to values, got [1]"),
         ({"tip": 3}, "tip must be a string, got 3"),
     ],
 )
@@ -280,7 +281,8 @@ def test_an_element_that_nobody_knows_is_refused_by_its_name_where_the_file_is_x
 
 def test_what_is_no_options_and_a_convention_that_is_not_made_are_refused() -> None:
     assert (
-        refusal(Dh2simError, import_robot, "arm.urdf", "modified") == "options must be ImportOptions, got 'modified'"
+        refusal(Dh2simError, import_robot, "arm.urdf", "modified")
+        == "options must be of type ImportOptions, got 'modified'"
     )
     assert _refused(ARM, ImportOptions(convention="hayati")) == (
         "a table is made in the standard or the modified convention; Hayati rows are used where they are needed"

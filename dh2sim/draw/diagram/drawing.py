@@ -11,7 +11,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from dh2sim.arguments import number, real_array
+from dh2sim.arguments import file_path, number, real_array
 from dh2sim.draw.diagram.arm import place_arm
 from dh2sim.draw.diagram.kinematic import draw_kinematic
 from dh2sim.draw.diagram.linkage import place_mechanism
@@ -88,7 +88,7 @@ class RobotDrawing:
             MissingExtraError: png and pdf need matplotlib, of the extra 'plot'.
             OutputError: The file cannot be written.
         """
-        file = Path(path)
+        file = file_path("path", path)
         kind = format_of(file) if format is None else member(DrawingFormat, format, "format", PictureError)
         if kind in (DrawingFormat.SVG, DrawingFormat.TIKZ):
             text = self.svg if kind is DrawingFormat.SVG else self.tikz

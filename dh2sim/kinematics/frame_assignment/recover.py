@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from dh2sim.arguments import instance, number
+from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.arm_path import arm_path
 from dh2sim.kinematics.frame_assignment.assign import assign_frames
 from dh2sim.kinematics.frame_assignment.result import Assignment, JointPart, LinkPart, Tolerances
@@ -15,6 +17,7 @@ from dh2sim.kinematics.sampling import random_configurations
 from dh2sim.kinematics.serial_chain import SerialChain, SerialJoint, serial_link_poses
 from dh2sim.kinematics.table_oracle import table_frame_poses, table_tool_pose
 from dh2sim.kinematics.transforms import pose_errors, rpy_from_rotation
+from dh2sim.messages import member
 from dh2sim.robot.links import BaseSpec, Pose, ToolSpec
 from dh2sim.robot.row import Convention, Row
 from dh2sim.robot.spec import RobotSpec
@@ -197,7 +200,7 @@ class Recovery:
 def recover_table(
     chain: SerialChain,
     *,
-    convention: Convention = Convention.STANDARD,
+    convention: Convention | str = Convention.STANDARD,
     tolerance: float = TOLERANCE,
     name: str = "robot",
 ) -> Recovery:
@@ -217,10 +220,14 @@ def recover_table(
         The table with its residual, which can be above the tolerance: compare them.
 
     Raises:
-        ValueError: ``convention`` is Hayati's, which is not a convention for a whole table.
+        ArgumentError: An argument is of a wrong kind.
+        Dh2simError: ``convention`` is unknown, or Hayati's, which is not a convention for a whole table.
     """
+    instance("chain", chain, SerialChain)
+    tolerance = number("tolerance", tolerance)
+    convention = member(Convention, convention, "convention")
     if convention is Convention.HAYATI:
-        raise ValueError("a table is made in the standard or the modified convention")
+        raise Dh2simError("a table is made in the standard or the modified convention")
     reach = bounded_reach(chain)
     scale = reach or 1.0
     best: Recovery | None = None

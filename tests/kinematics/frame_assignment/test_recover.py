@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dh2sim.errors import Dh2simError
 from dh2sim.kinematics.chain import build_chain
 from dh2sim.kinematics.far_frames import far_frames
 from dh2sim.kinematics.frame_assignment.recover import chain_reach, measure_residual, recover_table, within
@@ -291,7 +292,7 @@ def test_a_chain_of_400_joints_is_recovered() -> None:
 
 
 def test_hayati_is_no_convention_of_a_whole_table() -> None:
-    with pytest.raises(ValueError, match=r"^a table is made in the standard or the modified convention$"):
+    with pytest.raises(Dh2simError, match=r"^a table is made in the standard or the modified convention$"):
         recover_table(chain_of([Axis(np.zeros(3), Z)], np.eye(4)), convention=Convention.HAYATI)
 
 
