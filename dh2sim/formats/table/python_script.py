@@ -47,6 +47,8 @@ LINKS: Final[Mapping[str, tuple[bool | None, bool | None, tuple[str, ...]]]] = {
 }  # fmt: skip
 """Constructors of links: whether the joint is prismatic, the row modified, and the names of positional arguments."""
 ROBOTS: Final = ("DHRobot", "SerialLink")
+_CHANGES: Final = ("append", "extend", "insert", "reverse", "pop", "remove", "clear", "sort")
+"""Methods that change a list."""
 MADE_IN_PYTHON: Final = re.compile(r"\b(?:(?:Revolute|Prismatic)M?DH|DHLink|DHRobot)\b")
 _ATTEMPTS: Final = 20
 """Lines that are no Python and are passed over, such as the magic of a notebook."""
@@ -278,7 +280,7 @@ class _PythonScript:
         match node:
             case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
                 held = node.func.value if isinstance(node.func, ast.Attribute) else None
-                if name == "append" and isinstance(held, ast.Name):
+                if name in _CHANGES and isinstance(held, ast.Name):
                     return are_links(self._named(held.id))
                 return self._function(name) in (*LINKS, *ROBOTS) or (name == "__init__" and _is_super(node))
             case ast.Attribute(attr=attribute, ctx=ast.Store()):
@@ -425,10 +427,10 @@ class _PythonScript:
             return self._link(name, node)
         if name in ROBOTS or (name == "__init__" and _is_super(node) and self._gives_links(node)):
             return self._robot(node, own=name == "__init__")
-        if name == "append" and holder is not None and len(node.args) == 1:
+        if name in _CHANGES and holder is not None:
             held = self.value(holder)
-            if isinstance(held, list) and len(held) < MAX_ITEMS:
-                held.append(self.value(node.args[0]))
+            if isinstance(held, list):
+                self._change(held, name, node)
             return None
         if name.startswith("addconfiguration") and holder is not None and len(node.args) == 2:
             self._configuration(holder, node)
@@ -447,6 +449,22 @@ class _PythonScript:
         if name in ("zero", "zeros") and not arguments:
             return 0.0
         return Unknown(f"the function {shown(name)} on line {node.lineno} is not known")
+
+    def _change(self, held: list[object], name: str, node: ast.Call) -> None:
+        """Follow a method that changes a list."""
+        match name, [self.value(argument) for argument in node.args]:
+            case "append", [item]:
+                held[len(held) :] = [item][: MAX_ITEMS - len(held)]
+            case "extend", [list() as items]:
+                held[len(held) :] = items[: MAX_ITEMS - len(held)]
+            case "extend", [other]:
+                held.append(other if isinstance(other, Unknown) else Unknown("it is no list"))
+            case "insert", [float() as place, item] if len(held) < MAX_ITEMS:
+                held.insert(int(place), item)
+            case "reverse", []:
+                held.reverse()
+            case _ if are_links(held):
+                raise ScriptError(f"what '{name}' does to a list of links is not read", *_place(node))
 
     def _gives_links(self, node: ast.Call) -> bool:
         first = node.args[0] if node.args else next((w.value for w in node.keywords if w.arg == "links"), None)

@@ -115,6 +115,10 @@ def test_a_script_with_poses_set_afterwards() -> None:
         "    L.append(RevoluteDH(d=d, a=a, alpha=np.deg2rad(alpha)))\nr = DHRobot(L)",
         "L = []\nfor i, (d, a) in enumerate(zip([0.4, 0], [0, .3])):\n    L += [RevoluteDH(d, a, (1 - i) * pi / 2)]\n"
         "r = DHRobot(L)",
+        "L = []\nfor d, a, alpha in [(0.4, 0, pi/2), (0, .3, 0)]:\n    L.extend([RevoluteDH(d, a, alpha)])\n"
+        "r = DHRobot(L)",
+        "L = [RevoluteDH(a=0.3)]\nL.insert(0, RevoluteDH(d=0.4, alpha=pi/2))\nr = DHRobot(L)",
+        "L = [RevoluteDH(a=0.3), RevoluteDH(d=0.4, alpha=pi/2)]\nL.reverse()\nr = DHRobot(L)",
         "def f(n):\n    return [0.0] * n\nd = [0.4, 0]; d[1] = 0.0\n"
         "r = DHRobot([RevoluteDH(d[0], 0, pi/2), RevoluteDH(d[1], .3)])",
     ],
@@ -142,6 +146,8 @@ def test_links_as_people_write_them(text: str) -> None:
         ("r = DHRobot([RevoluteDH(d=1), PrismaticMDH()])",
          ["arm.py:1:31: some links are standard and others modified; a robot has only one of them"]),
         ("r = DHRobot([RevoluteDH(d=1)\n", ["arm.py:1:13: this cannot be read as Python: '[' was never closed"]),
+        ("L = [RevoluteDH(), RevoluteDH()]\nL.pop()\nr = DHRobot(L)",
+         ["arm.py:2:1: what 'pop' does to a list of links is not read"]),
         ("r = DHRobot([RevoluteDH(**p)])", ["arm.py:1:14: arguments behind ** cannot be read"]),
         ("r = DHRobot([RevoluteDH(d=9**9**9)])", ["arm.py:1:14: d: the number is too large"]),
         ("r = DHRobot([RevoluteDH(d=[1] * (1e308 * 10))])", ["arm.py:1:14: d: a list times something is not read"]),
