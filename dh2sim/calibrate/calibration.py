@@ -143,7 +143,7 @@ class _Task:
         self.held: dict[int, str] = dict.fromkeys(
             (k for k in range(len(self.parameters)) if k not in self.free), "not among the unknown"
         )
-        self.notes: list[str] = []
+        self.notes = list(measured.notes)
         require_metres(self.robot, measured)
         self._hold_what_has_no_reference()
         self.free = {k for k in self.free if k not in self.held}

@@ -20,7 +20,7 @@ from dh2sim.input_files import check_columns, read_input, utf16_hint
 from dh2sim.kinematics.chain import serial_spec_of
 from dh2sim.kinematics.rotations import rotations_of_quaternions, rotations_of_vectors
 from dh2sim.kinematics.transforms import pose_from_rpy
-from dh2sim.messages import counted, did_you_mean, listed, member, shown
+from dh2sim.messages import closest, counted, did_you_mean, listed, member, shown
 from dh2sim.robot.spec import RobotSpec, SpecLike
 from dh2sim.robot.units import AngleUnit, LengthUnit
 from dh2sim.typing import Array, read_only
@@ -114,7 +114,8 @@ def read_measurements(
     """Read a file of measurements.
 
     Args:
-        path: A CSV file: commas, semicolons or tabs between columns, the first line names them.
+        path: A CSV file: commas, semicolons or tabs between columns, the first line names them. Columns of other
+            names are left out, with a note, where the file has all that is needed without them.
         robot: That was measured.
         kind: 'pose', 'position', 'distance' or 'socket'; by default as the columns say.
         groups: The column whose rows of one value are held out together; by default ``placement``, else ``group``,
@@ -163,9 +164,11 @@ def _read(text: str, spec: RobotSpec, report: _Report, kind: Kind | None, groups
         check_columns(len(cells))
     except ValueError as error:
         report.stop(number, 1, f"the file {error}")
-    columns = _columns(cells, number, spec, report, groups)
+    columns, unused = _columns(cells, number, spec, report, groups)
     kind = _kind(columns, kind, number, report)
     _require_columns(columns, kind, spec, number, report)
+    if report.problems:
+        _report_unused(unused, number, spec, report)
     rows = [(line, _split(content, separator)) for line, content in lines[1:]]
     if not rows:
         report(number, 1, "", "there are no measurements below the header")
@@ -197,6 +200,7 @@ def _read(text: str, spec: RobotSpec, report: _Report, kind: Kind | None, groups
         group_name=_folded(used) if used else "",
         lines=tuple(places),
         file=report.file,
+        notes=_note_on(unused),
     )
     for row, column_name, message in problems_of(found):
         line = places[row] if row >= 0 else number
@@ -237,15 +241,14 @@ def _folded(name: str) -> str:
 
 def _columns(
     cells: Sequence[_Cell], line: int, spec: RobotSpec, report: _Report, groups: str | None
-) -> dict[str, _Column]:
-    """Return the columns by name; report those that are unknown, twice there, or without a unit."""
+) -> tuple[dict[str, _Column], list[_Cell]]:
+    """Return the columns by name, and the headings of others; report columns twice there, or without a unit."""
     rows = spec.moving_rows
     joints = {_folded(row.name): k for k, row in enumerate(rows)}
-    known = [*(row.name for row in rows), *_LENGTHS, *_ANGLES, *_PLAIN, *_TEXTS, *_IGNORED]
     found: dict[str, _Column] = {}
+    unused: list[_Cell] = []
     for index, cell in enumerate(cells):
-        match = _HEADING.fullmatch(cell.text)
-        name, unit = (match["name"], match["unit"] or "") if match else (cell.text, "")
+        name, unit = _parts(cell.text)
         key = _folded(name)
         if not unit and key not in joints and (suffixed := _SUFFIXED.fullmatch(key)):
             key, unit = suffixed["name"], suffixed["unit"]
@@ -276,12 +279,7 @@ def _columns(
                     f"expected the name of a column, found {shown(cell.text)}: the first line must name the columns"
                 )
                 report.stop(line, cell.column, message)
-            message = "the column has no name"
-            if cell.text:
-                message = f"unknown column {shown(name)}.{did_you_mean(name, known)}"
-                if not any("unknown column" in problem.message for problem in report.problems):
-                    message += f" Columns: {listed(row.name for row in rows)}; {_COLUMNS}"
-            report(line, cell.column, "", message)
+            unused.append(cell)
             continue
         if column.name in found:
             report(line, cell.column, cell.text, f"column {shown(column.name)} is there twice")
@@ -290,7 +288,47 @@ def _columns(
     if groups is not None and _folded(groups) not in found:
         names = [cell.text for cell in cells]
         report(line, 1, "", f"there is no column {shown(groups)} to group by.{did_you_mean(groups, names)}")
-    return found
+    _report_slips(unused, found, line, spec, report)
+    return found, unused
+
+
+def _parts(heading: str) -> tuple[str, str]:
+    """Return the name and the unit of a heading."""
+    match = _HEADING.fullmatch(heading)
+    return (match["name"], match["unit"] or "") if match else (heading, "")
+
+
+def _report_slips(
+    unused: list[_Cell], found: Mapping[str, _Column], line: int, spec: RobotSpec, report: _Report
+) -> None:
+    """Report unknown columns that look like one that is not there, or like a joint that the robot does not have."""
+    oriented = any(part in found for parts in _ORIENTATIONS.values() for part in parts)
+    absent = {*_POSITION, "distance", *_TEXTS, *(() if oriented else (*_ANGLES, *_PLAIN))} - found.keys()
+
+    def is_slip(name: str) -> bool:
+        joint = _JOINT_ALIAS.fullmatch(name)
+        return joint is not None or (len(name) > 2 and closest(name, sorted(absent), likeness=0.75) is not None)
+
+    if any(is_slip(_folded(_parts(cell.text)[0])) for cell in unused):
+        _report_unused(unused, line, spec, report)
+
+
+def _report_unused(unused: list[_Cell], line: int, spec: RobotSpec, report: _Report) -> None:
+    """Report unknown columns as what may be wrong, once."""
+    joints = [row.name for row in spec.moving_rows]
+    known = [*joints, *_LENGTHS, *_ANGLES, *_PLAIN, *_TEXTS, *_IGNORED]
+    columns = f" Columns: {listed(joints)}; {_COLUMNS}"
+    for cell in unused:
+        name = _parts(cell.text)[0]
+        message = f"unknown column {shown(name)}.{did_you_mean(name, known)}{columns}"
+        report(line, cell.column, "", message if cell.text else "the column has no name")
+        columns = "" if cell.text else columns
+    unused.clear()
+
+
+def _note_on(unused: Sequence[_Cell]) -> tuple[str, ...]:
+    names = [shown(cell.text) if cell.text else "one without a name" for cell in unused]
+    return (f"Columns of the file that are left out: {listed(names)}.",) if names else ()
 
 
 def _unit(unit: str, units: Mapping[str, float], name: str, line: int, cell: _Cell, report: _Report) -> float:

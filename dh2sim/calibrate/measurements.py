@@ -78,6 +78,8 @@ class Measurements:
     lines: tuple[int, ...] = ()
     """Of the file, from 1."""
     file: str = ""
+    notes: tuple[str, ...] = ()
+    """What of the file is left out."""
 
     def __len__(self) -> int:
         """Return the number of rows."""

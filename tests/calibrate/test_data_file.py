@@ -123,6 +123,35 @@ def test_everything_wrong_in_a_file_is_reported_at_once_with_its_place(tmp_path:
     assert any("1:63: unknown column 'distanse'. Did you mean 'distance'?" in line for line in lines)
 
 
+EXTRA = f"Nr;{JOINTS.replace(',', ';')};x [mm];y [mm];z [mm];Bemerkung;Temperatur [°C];T1;"
+
+
+def test_columns_of_other_names_are_left_out_with_a_note(tmp_path: Path) -> None:
+    file = write(tmp_path, EXTRA, "1;10,5;1;2;3;4;5;6,25;warm;21,5;x;", "2;20;1;2;3;4;5;6;;22;;")
+    found = read_measurements(file, SCARA)
+    assert found.notes == (
+        "Columns of the file that are left out: 'Nr', 'Bemerkung', 'Temperatur [°C]', 'T1', one without a name.",
+    )
+    assert found.position is not None
+    assert found.position.tolist() == [[0.004, 0.005, 0.00625], [0.004, 0.005, 0.006]]
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        (f"{JOINTS},x [m],y [m],z [m],staton", "unknown column 'staton'. Did you mean 'station'?"),
+        (f"{JOINTS},x [m],y [m],z [m],q5 [deg]", "unknown column 'q5'."),
+        (f"{JOINTS},x [m],y [m],Höhe [m]", "unknown column 'Höhe'."),
+        (f"{JOINTS},Abstand [m]", "unknown column 'Abstand'."),
+    ],
+)
+def test_columns_of_other_names_are_errors_where_they_may_be_what_is_needed(
+    header: str, message: str, tmp_path: Path
+) -> None:
+    file = write(tmp_path, header, ",".join("1" * (header.count(",") + 1)))
+    assert message in refusal(MeasurementFileError, read_measurements, file, SCARA)
+
+
 def test_radians_that_are_called_degrees_are_noticed(tmp_path: Path) -> None:
     header = "joint_1 [deg],joint_2 [deg],joint_3 [mm],joint_4 [deg],x [m],y [m],z [m]"
     file = write(tmp_path, header, *(f"0.{k},1.{k},10,-2.{k},0,0,0" for k in range(6)))
