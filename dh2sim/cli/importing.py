@@ -102,9 +102,9 @@ def import_robot(
     at 20, and a difference is reported. Limits, masses, inertias and meshes are kept;
     what cannot be is listed. With --tolerance 1e-4 angles such as 1.5708 become 90 degrees.
 
-    Tables are read from Markdown, LaTeX, HTML, CSV, YAML and JSON, from printouts of the Robotics Toolbox, and from
-    its scripts in MATLAB and Python, which are read as text and never run. What a table does not say, its convention
-    or its units, is asked for.
+    Tables are read from Markdown, LaTeX, HTML, MediaWiki, CSV, YAML and JSON, from printouts of the Robotics
+    Toolbox, and from its scripts in MATLAB and Python, which are read as text and never run. What a table does not
+    say, its convention or its units, is asked for.
 
     \b
     Examples:

@@ -14,6 +14,8 @@ from dh2sim.robot.magnitudes import MOST_ROWS
 
 MAX_ROWS: Final = MOST_ROWS
 MAX_COLUMNS: Final = 50
+_MOST_CELLS: Final = 2 * MAX_COLUMNS
+"""Of a row whose cells have spans."""
 
 PREFIX: Final = re.compile(r"\s*(?:[%#>*]+|//+)?\s*")
 """What comes before a table inside a comment or a quotation."""
@@ -58,7 +60,55 @@ class Grid:
     @property
     def lines(self) -> range:
         """The lines from the first row to the last."""
-        return range(self.rows[0][0].line, self.rows[-1][0].line + 1)
+        return range(self.rows[0][0].line, max(cell.line for cell in self.rows[-1]) + 1)
+
+
+class SpannedRows:
+    """Rows of cells that may be several columns wide and several rows high, as in HTML."""
+
+    def __init__(self) -> None:
+        """Start without a row."""
+        self._rows: list[list[Cell | None]] = []
+        self._row = -1
+
+    def next_row(self) -> None:
+        """Begin a row."""
+        self._row += 1
+        if self._row == len(self._rows):  # it is there already where a cell above is more than one row high
+            self._rows.append([])
+
+    def add(self, cell: Cell, *, columns: int = 1, rows: int = 1) -> None:
+        """Put a cell into the first free place of the row; what follows it in its span is empty."""
+        if self._row < 0:
+            self.next_row()
+        if len(self._rows) > MAX_ROWS + 10 or len(self._rows[self._row]) > _MOST_CELLS:
+            return
+        here = self._rows[self._row]
+        at = next((k for k, other in enumerate(here) if other is None), len(here))
+        for below in range(rows):
+            if self._row + below >= len(self._rows):
+                self._rows.append([])
+            target = self._rows[self._row + below]
+            target += [None] * (at - len(target))
+            target[at : at + columns] = [
+                cell if k == 0 else Cell(text="", line=cell.line, column=cell.column) for k in range(columns)
+            ]
+
+    def rows(self) -> tuple[Cells, ...]:
+        """Return the rows in which something is written."""
+        return tuple(_whole(row) for row in self._rows if any(cell is not None and cell.text for cell in row))
+
+
+def _whole(row: Sequence[Cell | None]) -> Cells:
+    known = next(cell for cell in row if cell is not None)
+    if len(row) > 2 and len({(cell.line, cell.column) for cell in row if cell is not None}) == 1:
+        return (known,)  # a title or a remark, across all columns
+    return tuple(Cell(text="", line=known.line, column=known.column) if cell is None else cell for cell in row)
+
+
+def span_of(text: str | None) -> int:
+    """Return how many columns or rows an attribute of HTML says."""
+    return min(max(int(text), 1), MAX_COLUMNS) if text is not None and text.isdecimal() and len(text) < 4 else 1
 
 
 class TextPlaces:
@@ -149,7 +199,7 @@ def split(line: str, number: int, separator: str, *, count: int = 0) -> Cells:
         return _spaced(line, number, count)
     start = _prefix(line) if is_comment(line) else 0
     quoted = separator in ",;\t" and '"' in line
-    spans = list(_quoted(line, start, separator) if quoted else _between(line, start, re.escape(separator)))
+    spans = list(_quoted(line, start, separator) if quoted else between(line, start, re.escape(separator)))
     while len(spans) > max(count, 1) and not line[spans[-1][0] : spans[-1][1]].strip():
         spans.pop()
     return tuple(_cell(line, number, start, end) for start, end in spans)
@@ -170,7 +220,7 @@ def _prefix(line: str) -> int:
 def _piped(line: str, number: int) -> Cells:
     if not any(pipe in line for pipe in PIPES):
         return ()
-    spans = list(_between(line, 0, _PIPE.pattern))
+    spans = list(between(line, 0, _PIPE.pattern))
     if not line[spans[0][0] : spans[0][1]].strip(" \t%#>*/"):
         spans = spans[1:]
     else:
@@ -180,7 +230,8 @@ def _piped(line: str, number: int) -> Cells:
     return tuple(_cell(line, number, start, end) for start, end in spans)
 
 
-def _between(line: str, start: int, pattern: str) -> Iterator[tuple[int, int]]:
+def between(line: str, start: int, pattern: str) -> Iterator[tuple[int, int]]:
+    """Yield where the parts of a line are, from ``start`` on, that a pattern separates."""
     for found in re.compile(pattern).finditer(line, start):
         yield start, found.start()
         start = found.end()

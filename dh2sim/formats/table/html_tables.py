@@ -6,14 +6,13 @@ from collections.abc import Iterator, Sequence
 from html.parser import HTMLParser
 from typing import Final
 
-from dh2sim.formats.table.grid import MAX_COLUMNS, MAX_ROWS, Cell, Cells, Grid
+from dh2sim.formats.table.grid import Cell, Grid, SpannedRows, span_of
 
 _KEPT: Final = ("sub", "sup")
 """Elements in a cell that mean something."""
 _SPACES: Final = ("br", "p", "div")
 _LONGEST: Final = 500_000
 """Characters, from the first table on, that are read."""
-_MOST_CELLS: Final = 2 * MAX_COLUMNS
 
 
 def html_grids(lines: Sequence[str]) -> Iterator[Grid]:
@@ -35,8 +34,7 @@ class _TableParser(HTMLParser):
         self.grids: list[Grid] = []
         self._first = first
         self._depth = 0
-        self._rows: list[list[Cell | None]] = []
-        self._row = -1
+        self._rows = SpannedRows()
         self._text: list[str] | None = None
         self._span = (1, 1)
         self._place = (1, 1)
@@ -50,15 +48,14 @@ class _TableParser(HTMLParser):
             case "table":
                 self._depth += 1
                 if self._depth == 1:
-                    self._rows, self._row = [], -1
+                    self._rows = SpannedRows()
             case "tr" if self._depth == 1:
-                self._next_row()
+                self._end_cell()
+                self._rows.next_row()
             case "td" | "th" if self._depth == 1:
                 self._end_cell()
-                if self._row < 0:
-                    self._next_row()
                 values = dict(attrs)
-                self._span = _number(values.get("colspan")), _number(values.get("rowspan"))
+                self._span = span_of(values.get("colspan")), span_of(values.get("rowspan"))
                 line, column = self.getpos()
                 tag_text = self.get_starttag_text() or ""
                 if "\n" not in tag_text:
@@ -85,45 +82,15 @@ class _TableParser(HTMLParser):
         if self._text is not None:
             self._text.append(data)
 
-    def _next_row(self) -> None:
-        self._end_cell()
-        self._row += 1
-        if self._row == len(self._rows):  # it is there already where a cell above is more than one row high
-            self._rows.append([])
-
     def _end_cell(self) -> None:
-        if self._text is None or not self._rows or len(self._rows) > MAX_ROWS + 10:
+        if self._text is None:
             return
         text, (line, column) = " ".join("".join(self._text).split()), self._place
         self._text = None
-        row = self._row
-        cells = self._rows[row]
-        if len(cells) > _MOST_CELLS:
-            return
-        at = next((k for k, cell in enumerate(cells) if cell is None), len(cells))
-        for below in range(self._span[1]):
-            if row + below >= len(self._rows):
-                self._rows.append([])
-            target = self._rows[row + below]
-            target += [None] * (at - len(target))
-            target[at : at + self._span[0]] = [
-                Cell(text=text if k == 0 else "", line=line, column=column) for k in range(self._span[0])
-            ]
+        self._rows.add(Cell(text=text, line=line, column=column), columns=self._span[0], rows=self._span[1])
 
     def _end_table(self) -> None:
         self._end_cell()
-        rows = [_whole(row) for row in self._rows if any(cell is not None and cell.text for cell in row)]
-        if rows:
-            self.grids.append(Grid(rows=tuple(rows), separator="<", filled=True))
-        self._rows, self._row, self._depth, self._text = [], -1, 0, None
-
-
-def _number(text: str | None) -> int:
-    return min(max(int(text), 1), MAX_COLUMNS) if text is not None and text.isdecimal() and len(text) < 4 else 1
-
-
-def _whole(row: Sequence[Cell | None]) -> Cells:
-    known = next(cell for cell in row if cell is not None)
-    if len(row) > 2 and len({(cell.line, cell.column) for cell in row if cell is not None}) == 1:
-        return (known,)  # a title or a remark, across all columns
-    return tuple(Cell(text="", line=known.line, column=known.column) if cell is None else cell for cell in row)
+        if rows := self._rows.rows():
+            self.grids.append(Grid(rows=rows, separator="<", filled=True))
+        self._rows, self._depth = SpannedRows(), 0

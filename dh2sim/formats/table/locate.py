@@ -23,6 +23,7 @@ from dh2sim.formats.table.html_tables import html_grids
 from dh2sim.formats.table.latex_tables import latex_grids
 from dh2sim.formats.table.rst_tables import rst_grids
 from dh2sim.formats.table.scripts import script_tables
+from dh2sim.formats.table.wiki_tables import wiki_grids
 
 _SEPARATED: Final = (".csv", ".tsv", ".tab")
 _MAX_HEADING_LINES: Final = 2000
@@ -40,7 +41,9 @@ def locate(lines: Sequence[str], file: str) -> Located:
         lines: The file's lines.
         file: Its name, whose ending decides where to look first.
     """
-    pipes = tuple(pipe_grids(lines))
+    wiki = tuple(wiki_grids(lines))
+    inside = {number for grid in wiki for number in grid.lines}
+    pipes = tuple(pipe_grids(["" if number in inside else line for number, line in enumerate(lines, start=1)]))
     scripts, problems = script_tables(lines, file)
     suffix = PurePath(file).suffix.casefold()
     if not scripts:
@@ -51,6 +54,7 @@ def locate(lines: Sequence[str], file: str) -> Located:
         *_in_grids(latex_grids(lines)),
         *_in_grids(html_grids(lines)),
         *_in_grids(rst_grids(lines)),
+        *_in_grids(wiki),
         *scripts,
     ]
     taken = {number for table in marked for number in table.lines}

@@ -53,6 +53,11 @@ class MatlabParser:
         """The next token."""
         return self._tokens[self._position] if self._position < len(self._tokens) else END
 
+    @property
+    def rest(self) -> Sequence[Token]:
+        """The tokens that are not read yet."""
+        return self._tokens[self._position :]
+
     def _take(self, *texts: str) -> Token | None:
         token = self.next
         if token.kind == "operator" and token.text in texts:

@@ -81,16 +81,31 @@ def read_matlab(text: str) -> tuple[list[ToolboxRobot], list[ScriptError]]:
         tokens = tokens_of(text)
     except ScriptError as error:
         return [], [error]
-    statements = statements_of(tokens)
-    index = 0
-    while index < len(statements) and len(script.problems) <= MAX_PROBLEMS:
-        first = statements[index][0]
-        if first.kind == "name" and first.text in _SKIPPED:
-            index = script.skip(statements, index)
-        else:
-            script.run(statements[index])
-            index += 1
+    script.block(statements_of(tokens))
     return script.robots or script.loose_robot(), script.problems
+
+
+def _block_end(statements: Sequence[Sequence[Token]], index: int) -> int:
+    """Return the index behind the end of a loop or a condition."""
+    depth = 0
+    for stop in range(index, len(statements)):
+        first, *others = statements[stop]
+        if first.kind == "name":
+            depth += first.text in _OPENING
+            depth -= first.text in ("end", "endfor", "endif", "endwhile")
+        depth += sum(token.kind == "name" and token.text in _SKIPPED for token in others)
+        if depth <= 0:
+            return stop + 1
+    return len(statements)
+
+
+def _unwrapped(tokens: Sequence[Token], sign: str) -> Sequence[Token]:
+    """Return words without the brackets around those up to the first closing one, where a sign is between them."""
+    if not tokens or tokens[0].text not in ("(", "["):
+        return tokens
+    close = closing_bracket(tokens)
+    inside = tokens[1:close]
+    return [*inside, *tokens[close + 1 :]] if any(token.text == sign for token in inside) else tokens
 
 
 class _MatlabScript:
@@ -101,6 +116,69 @@ class _MatlabScript:
         self.robots: list[ToolboxRobot] = []
         self.problems: list[ScriptError] = []
         self._links: list[ToolboxLink] = []
+        self._turns = 0
+        """Elements that loops have gone through; their number is limited, as loops in loops multiply it."""
+
+    def block(self, statements: Sequence[Sequence[Token]]) -> None:
+        """Follow statements, one after the other."""
+        index = 0
+        while index < len(statements) and len(self.problems) <= MAX_PROBLEMS:
+            first = statements[index][0]
+            if first.kind != "name" or first.text not in _SKIPPED:
+                self.run(statements[index])
+                index += 1
+            elif first.text != "for" or (stop := self._loop(statements, index)) is None:
+                index = self.skip(statements, index)
+            else:
+                index = stop
+
+    def _loop(self, statements: Sequence[Sequence[Token]], index: int) -> int | None:
+        """Follow a loop over numbers that are known; return the index behind its end, or None where it cannot be."""
+        stop, ends = _block_end(statements, index), ("break", "continue", "return")
+        if any(token.kind == "name" and token.text in ends for tokens in statements[index:stop] for token in tokens):
+            return None
+        try:
+            tokens = _unwrapped(statements[index][1:], "=")
+            if len(tokens) < 3 or tokens[0].kind != "name" or tokens[1].text != "=":
+                return None
+            items, rest = self._items(_unwrapped(tokens[2:], ":"))
+        except (ScriptError, RecursionError):
+            return None
+        self._turns += len(items)
+        if self._turns > MAX_ITEMS:
+            return None
+        if rest and rest[0].kind != "name":
+            return None
+        body = [*([rest] if rest else []), *statements[index + 1 : stop - 1]]
+        for item in items:
+            self.values[tokens[0].text] = item
+            self.block(body)
+        return stop
+
+    def _items(self, tokens: Sequence[Token]) -> tuple[list[object], Sequence[Token]]:
+        """Return what a loop goes through, and the words behind it.
+
+        Raises:
+            ScriptError: It is not known.
+        """
+        bounds: list[float] = []
+        while True:
+            parser = MatlabParser(self, tokens)
+            value, tokens = parser.sum(), parser.rest
+            if not tokens or tokens[0].text != ":":
+                break
+            bounds.append(number(value))
+            tokens = tokens[1:]
+        if not bounds:
+            numbers = isinstance(value, list) and all(isinstance(item, float) for item in value)
+            if not numbers:
+                raise ScriptError("a loop over something else")
+            return list(value) if isinstance(value, list) else [], tokens
+        first, last, step = bounds[0], number(value), bounds[1] if len(bounds) > 1 else 1.0
+        if len(bounds) > 2 or not all(bound.is_integer() for bound in (first, last, step)) or not step:
+            raise ScriptError("a range that is not read")
+        whole = range(int(first), int(last) + (1 if step > 0 else -1), int(step))
+        return [float(item) for item in whole[: MAX_ITEMS + 1]], tokens
 
     def run(self, tokens: Sequence[Token]) -> None:
         """Follow a statement."""
@@ -117,22 +195,16 @@ class _MatlabScript:
 
     def skip(self, statements: Sequence[Sequence[Token]], index: int) -> int:
         """Pass over a loop or a condition, whose values are not known then; return the index behind its end."""
-        first, depth = statements[index][0], 0
-        while index < len(statements):
-            tokens = statements[index]
+        first, stop = statements[index][0], _block_end(statements, index)
+        for tokens in statements[index:stop]:
             word = tokens[0].text if tokens[0].kind == "name" else ""
-            depth += word in _OPENING
-            depth -= word in ("end", "endfor", "endif", "endwhile")
             if self._concerns_robots(tokens) and word not in _SKIPPED:
                 place = tokens[0]
                 what = "a condition" if first.text in ("if", "switch") else "a loop"
                 message = f"links that are made or changed in {what} are not read: write them one after the other"
                 self.problems.append(ScriptError(message, place.line, place.column))
             self._forget(tokens, first, reported=bool(self.problems))
-            index += 1
-            if depth <= 0:
-                break
-        return index
+        return stop
 
     def loose_robot(self) -> list[ToolboxRobot]:
         """Return the robot of all links, where a script makes none."""
@@ -267,11 +339,38 @@ class _MatlabScript:
             return pose
         if name in FUNCTIONS_OF_NUMBERS and arguments:
             return elementwise(FUNCTIONS_OF_NUMBERS[name], *arguments)
+        if name in _SIZES and arguments and isinstance(arguments[0], list):
+            return _size(name, arguments)
         if name in ("zeros", "ones") and arguments and 0 < (size := number(arguments[-1])) <= MAX_ITEMS:
             return NumberArray([float(name == "ones")] * int(size))
         if name in ("inches", "inch") and len(arguments) == 1:
             return number(arguments[0]) * 0.0254
         return Unknown(f"the function {shown(name)} on line {token.line} is not known")
+
+
+_SIZES: Final = ("size", "length", "numel", "numrows", "rows", "numcols", "columns", "height", "width")
+
+
+def _size(name: str, arguments: Sequence[object]) -> object:
+    """Return how many rows, columns or elements a matrix has."""
+    held = arguments[0]
+    assert isinstance(held, list)
+    nested = bool(held) and isinstance(held[0], list)
+    rows = len(held) if nested else 1
+    columns = len(held[0]) if nested else len(held)
+    match name:
+        case "numel":
+            return float(rows * columns)
+        case "length":
+            return float(max(rows, columns) if rows and columns else 0)
+        case "size" if len(arguments) == 1:
+            return NumberArray([float(rows), float(columns)])
+        case "size":
+            return float({1.0: rows, 2.0: columns}.get(number(arguments[1]), 1))
+        case "numrows" | "rows" | "height":
+            return float(rows)
+        case _:
+            return float(columns)
 
 
 _VECTOR: Final = ("theta", "d", "a", "alpha", "sigma", "offset")

@@ -89,8 +89,8 @@ def _numbers(table: Table, columns: Columns) -> Iterator[Cell]:
 _MAX_LISTED: Final = 20
 _NO_TABLE: Final = (
     "no table of Denavit-Hartenberg parameters found: none has headings such as theta, d, a and alpha. "
-    "Allowed: a table in Markdown, LaTeX, HTML, CSV, TSV, YAML or JSON, or a printout or a script of the Robotics "
-    "Toolbox for Python or MATLAB"
+    "Allowed: a table in Markdown, LaTeX, HTML, MediaWiki, CSV, TSV, YAML or JSON, or a printout or a script of the "
+    "Robotics Toolbox for Python or MATLAB"
 )
 
 

@@ -99,8 +99,8 @@ def test_two_columns_for_one_thing_are_refused() -> None:
 def test_a_text_without_a_table_says_what_is_looked_for() -> None:
     assert complaints("# A robot\n\n| a | b |\n|---|---|\n".replace("a |", "x |")) == [
         "t.md:1:1: no table of Denavit-Hartenberg parameters found: none has headings such as theta, d, a "
-        "and alpha. Allowed: a table in Markdown, LaTeX, HTML, CSV, TSV, YAML or JSON, or a printout or a script "
-        "of the Robotics Toolbox for Python or MATLAB"
+        "and alpha. Allowed: a table in Markdown, LaTeX, HTML, MediaWiki, CSV, TSV, YAML or JSON, or a printout or a "
+        "script of the Robotics Toolbox for Python or MATLAB"
     ]
 
 

@@ -19,7 +19,8 @@ ENDINGS = {"matlab": "m", "latex": "tex", "text": "txt"}
 
 def test_the_page_shows_every_kind() -> None:
     assert [kind for kind, _ in BLOCKS] == [
-        "md", "csv", "md", "latex", "html", "rst", "text", "matlab", "py", "matlab", "yaml", "py", "json", "py"
+        "md", "csv", "md", "latex", "html", "mediawiki", "rst", "text", "matlab", "py", "matlab", "yaml", "py",
+        "json", "py",
     ]  # fmt: skip
 
 

@@ -126,6 +126,51 @@ def test_a_wrong_cell_of_html_has_its_place() -> None:
     ]
 
 
+WIKI = """\
+Standard DH, lengths in mm:
+
+{| class="wikitable" style="text-align: center"
+|+ style="caption-side: bottom" | The arm
+|-
+! rowspan="2" | ''i'' !! colspan=2 | Joint !! colspan=2 | Link<ref name="x">note | d</ref>
+|-
+! θ<sub>''i''</sub> !! d<sub>''i''</sub> [[Metre|(mm)]] !! a<sub>''i''</sub> [mm] !! <math>\\alpha_i</math> (°)
+|- style="background: #eee"
+! scope="row" | 1
+| <math>\\theta_1^*</math> || 100 || 20 || {{math|90}}
+|-
+| 2 || θ<sub>2</sub> + 90° || style="color: red" | &minus;50 ||
+| '''&minus;37.3'''
+|-
+| 3
+|
+0
+| d<sub>3</sub>|| 75||0
+|}
+
+| not | of the | table |
+"""
+
+
+def test_a_table_of_a_wiki_is_read() -> None:
+    found, q = imported(WIKI, "arm.wiki"), (0.3, -0.5, 0.2)
+    expected = standard(q[0], 0.1, 0.02, H) @ standard(q[1] + H, -0.05, 0, math.radians(-37.3))
+    expected = expected @ standard(0, q[2], 0.075, 0)
+    np.testing.assert_allclose(tool_poses(found.spec, [q])[0], expected, atol=1e-15)
+    assert types(found.spec) == "rrp"
+
+
+def test_a_wrong_cell_of_a_wiki_has_its_place() -> None:
+    assert complaints(WIKI.replace("100", "one"), "arm.wiki") == [
+        "arm.wiki:11:30: row 1, d: the symbol 'one' has no value; write the number, or give its value in the text "
+        "around the table, such as 'one = 0.4 m'"
+    ]
+
+
+def test_a_table_of_a_wiki_that_never_ends_is_none() -> None:
+    assert "no table of" in complaints(WIKI.replace("|}", "") + "=" * 100_000, "arm.wiki")[0]
+
+
 SIDE = """\
 Standard DH parameters (deg, mm)
 

@@ -144,6 +144,45 @@ def test_links_as_people_write_them(text: str, expected: list[tuple[float, float
     assert numbers(imported(f"# Arm\n\n```matlab\n{text}\n```\n").spec) == numbers(imported(text, "arm.m").spec)
 
 
+LOOPS = [
+    "dh = [0 0.4 0 pi/2; 0 0 0.3 0];\nfor i = 1:size(dh, 1)\n    L(i) = Link(dh(i,:), 'standard');\nend",
+    "d = [0.4 0]; a = [0 0.3]; alpha = [pi/2 0]; L = [];\nfor k = (1:length(d))\n  L = [L Link('d', d(k), 'a', a(k), "
+    "'alpha', alpha(k))];\nend\nr = SerialLink(L);",
+    "n = 2; DH = [0.4 0 pi/2; 0 0.3 0];\nfor (i = n:-1:1)\n  for j = 1:3, x(j) = DH(i, j); end\n"
+    "  links{i} = Revolute('d', x(1), 'a', x(2), 'alpha', x(3));\nendfor\nr = SerialLink([links{1} links{2}]);",
+    "L(1) = Link([0 0 0.3 0]); L(2) = L(1);\nfor i=1:2 if i > 7, disp(i), end, end\nfor s = [0.4 9]\n  t = s\nend\n"
+    "for i=1:1 L(1) = Link([0 .4 0 pi/2]); end",
+    "for i = 1:1e9, x = i; end\nL(1) = Link([0 .4 0 pi/2]); L(2) = Link([0 0 .3 0]);",
+]
+
+
+@pytest.mark.parametrize("text", LOOPS)
+def test_loops_over_numbers_are_followed(text: str) -> None:
+    found = [(d, a, alpha) for _, d, a, alpha in numbers(imported(text, "arm.m").spec)]
+    assert found == [pytest.approx((0.4, 0, H)), pytest.approx((0, 0.3, 0))]
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        "for i = 1:n",
+        "for i = 1:0.5:2",
+        "while i < 3",
+        "for i = 1:2, if x, break, end",
+        "for i = 1:1000000",
+        "for i = 1:2:3:4",
+        "for i = 1:0:2",
+        "for",
+    ],
+)
+def test_links_in_other_loops_are_refused(loop: str) -> None:
+    text = f"{loop}\n  L(i) = Link([0 0.4 0 0]);\nend\nr = SerialLink(L);"
+    [complaint] = complaints(text, "arm.m")
+    assert complaint == (
+        "arm.m:2:3: links that are made or changed in a loop are not read: write them one after the other"
+    )
+
+
 def test_theta_of_a_revolute_link_is_left_out_as_the_toolbox_does_and_noted() -> None:
     found = imported("L(1) = Link([0.5 0.4 0 0]);\nL(2) = Link([0.5 0.4 0 0 1]);", "arm.m")
     assert numbers(found.spec) == [(0, 0.4, 0, 0), (0.5, 0, 0, 0)]
@@ -180,7 +219,7 @@ def test_two_robots_of_a_script_are_two_tables() -> None:
     ("text", "expected"),
     [
         ("for i=1:2\n  L(i) = Link([0 d(i) 0 0]);\nend\nr = SerialLink(L);",
-         ["arm.m:2:3: links that are made or changed in a loop are not read: write them one after the other"]),
+         ["arm.m:2:10: d: the function 'd' on line 2 is not known"]),
         ("if x\n  L(1) = Link([0 1 0 0]);\nend\nr = SerialLink(L);",
          ["arm.m:2:3: links that are made or changed in a condition are not read: write them one after the other"]),
         ("L(1) = Link([0 d1 0 0]);\nr = SerialLink(L);",

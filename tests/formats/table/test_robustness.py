@@ -17,7 +17,7 @@ from dh2sim.formats.table.read import TableImport, read_table
 from dh2sim.robot.magnitudes import MOST_ROWS
 from tests.formats.table.samples import STANDARD, complaints, imported, numbers
 from tests.formats.table.test_data_tables import KUKA as DICTIONARY
-from tests.formats.table.test_markup_tables import ARRAY, BOOKTABS, CSV_TABLE, HTML, LIST, SIDE, SIMPLE, TABULAR
+from tests.formats.table.test_markup_tables import ARRAY, BOOKTABS, CSV_TABLE, HTML, LIST, SIDE, SIMPLE, TABULAR, WIKI
 from tests.formats.table.test_matlab_script import JACO, LINKS, PUMA
 from tests.formats.table.test_python_script import MODEL, SCRIPT
 from tests.formats.table.test_real_tables import KUKA, PANDA, SCARA, STANFORD, STUDENT, UR5
@@ -30,7 +30,23 @@ TABLES = [
     STANFORD,
     STUDENT,
     UR5,
-    *(ARRAY, BOOKTABS, CSV_TABLE, LIST, SIMPLE, HTML, SIDE, TABULAR, JACO, LINKS, PUMA, MODEL, SCRIPT, DICTIONARY),
+    *(
+        ARRAY,
+        BOOKTABS,
+        CSV_TABLE,
+        LIST,
+        SIMPLE,
+        HTML,
+        SIDE,
+        TABULAR,
+        WIKI,
+        JACO,
+        LINKS,
+        PUMA,
+        MODEL,
+        SCRIPT,
+        DICTIONARY,
+    ),
     *(p.read_text("utf-8") for p in sorted(PRINTOUTS.glob("*.txt"))),
 ]
 SPICE = [
@@ -38,7 +54,7 @@ SPICE = [
     "<sub>", "1e999", "9**9**9", "pi/2", "q1", "theta", "alpha", "inf", "nan", "\\frac{", "**", "--", "1/0", "mm",
     "rad", "a_{i-1}", "standard DH", "modified", "\r", "\u200b", "½", "for ", "end\n", "...", "Link(", "L(1)",
     "RevoluteDH(", "self.", "SE3(", "@", "\\multicolumn{2}{c}{", "\\begin{array}", "<td", "<table>", "& ", "\\\\",
-    "lambda x: x", "L(1) = L;",
+    "lambda x: x", "L(1) = L;", "{|", "|}", "|-\n", "!!", "rowspan=3 |", "<math>", "</math>", "for i = 1:3\n",
 ]  # fmt: skip
 HEAD = "| theta | d | a | alpha |\n"
 
