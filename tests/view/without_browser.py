@@ -39,7 +39,7 @@ def connected(url: str, **options: Any) -> Iterator[Any]:
 
     address, protocols = url.replace("http", "ws", 1), [f"viser-v{viser.__version__}"]
     # nobody reads what comes, and to close it waits for room in its queue; a busy server answers late
-    settings: dict[str, Any] = {"max_size": None, "max_queue": (None, None), "open_timeout": DEADLINE}
+    settings: dict[str, Any] = {"max_size": None, "max_queue": 2**30, "open_timeout": DEADLINE}
     with client.connect(address, **{"origin": url, **settings, **options}, subprotocols=protocols) as connection:
         yield connection
 
