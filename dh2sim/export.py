@@ -359,7 +359,7 @@ def export_robot(
         What was written, how well it matches, and what the formats cannot hold.
 
     Raises:
-        ArgumentError: an argument is of a wrong kind, or there is no format.
+        ArgumentError: an argument is of a wrong kind, or no format is given.
         ModelError: a format cannot hold the robot.
         EngineError: MuJoCo refuses a file.
         MismatchError: a file's poses differ from the table's.

@@ -175,6 +175,8 @@ def test_a_wrong_argument_is_reported_in_the_packages_own_words(
         (lambda: ARM.symbolic(joint_names="x"), "unknown joint_names 'x'. Allowed: theta, q"),
         (lambda: ARM.export(formats=[]), "formats must be at least one of urdf, mjcf"),
         (lambda: ARM.ik(T, limits="yes"), "limits must be True or False, got 'yes'"),  # type: ignore[arg-type]
+        (lambda: ARM.save("a.yaml", overwrite="no"), "overwrite must be True or False, got 'no'"),  # type: ignore[arg-type]
+        (lambda: ARM.rollout(out="a", overwrite="no"), "overwrite must be True or False, got 'no'"),  # type: ignore[arg-type]
     ],
 )
 def test_what_an_argument_may_be_is_said_with_its_name(

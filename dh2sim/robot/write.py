@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from dh2sim.arguments import file_path
+from dh2sim.arguments import file_path, flag
 from dh2sim.errors import ModelError, NotFiniteError, OutputError
 from dh2sim.files import atomic_file
 from dh2sim.messages import member
@@ -196,12 +196,13 @@ def save_robot(
         overwrite: Whether to replace a file.
 
     Raises:
+        ArgumentError: An argument is of a wrong kind.
         OutputError: There is a file already, or it cannot be written.
         ModelError: As for ``robot_file_text``.
     """
     spec = spec_of(robot)
     file = file_path("path", path)
-    if file.exists() and not overwrite:
+    if not flag("overwrite", overwrite) and file.exists():
         raise OutputError(f"'{file}' already exists; choose another name, or pass overwrite=True")
     units = spec.units if spec.source_file else Units(angle=AngleUnit.DEG)
     header = [f"Note: {note}" for note in notes]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 
-from dh2sim.arguments import whole_numbers
+from dh2sim.arguments import flag, whole_numbers
 from dh2sim.errors import SettingsError
 from dh2sim.extras import require_extra
 from dh2sim.model.mechanism import written_model
@@ -244,12 +244,14 @@ def open_run(
         join: Whether to write to it beside others, who may have made it.
 
     Raises:
+        ArgumentError: An argument is of a wrong kind.
         SettingsError: Options are given that exclude each other.
         RunError: There is something else, or a run with other options.
         OutputError: It cannot be written.
     """
     from dh2sim.simulate.store.writer import RunWriter
 
+    resume, overwrite = flag("resume", resume), flag("overwrite", overwrite)
     if resume and overwrite:
         raise SettingsError([("resume", "must not be given together with overwrite")])
     if join and overwrite:

@@ -216,7 +216,7 @@ def measure_designs(
         require_table(path)
     report = advance or (lambda _: None)
     total = task.designs.count
-    with Journal.open(path, settings_of(model, task), overwrite=overwrite) as journal:
+    with Journal.open(path, settings_of(model, task), overwrite=arguments.flag("overwrite", overwrite)) as journal:
         chunks = range(-(-total // CHUNK))
         sizes = {chunk: min(CHUNK, total - chunk * CHUNK) for chunk in chunks}
         pending = [chunk for chunk in chunks if journal.length(chunk) < sizes[chunk]]
